@@ -1,0 +1,3 @@
+"""The system-identification workbench: reference traces in, frozen surrogates of known accuracy out."""
+
+__version__ = "0.1.0"

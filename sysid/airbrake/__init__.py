@@ -1,0 +1,1 @@
+"""Reference physics: command vector in, traces of a compiled air-brake model out."""

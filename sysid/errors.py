@@ -1,0 +1,165 @@
+"""Every error the workbench raises on purpose, each saying what, where, expected, got and remedy.
+
+Two families matter to a caller: a :class:`UserError` can be cured by changing the input (the command
+line leaves with exit code 2), any other :class:`SysidError` is ours (exit code 1).
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+
+
+class SysidError(Exception):
+    """Root of all errors raised on purpose.
+
+    Args:
+        what: One sentence: what went wrong.
+        where: File, line, channel or sample it went wrong at.
+        expected: What would have been accepted.
+        got: What came instead.
+        remedy: What the reader can do now.
+
+    Example:
+        >>> print(SysidError("the record is empty", where="a.csv", remedy="record some samples"))
+        the record is empty
+          where:    a.csv
+          remedy:   record some samples
+    """
+
+    exit_code = 1
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: object = None,
+        expected: object = None,
+        got: object = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.what = what
+        self.where = where
+        self.expected = expected
+        self.got = got
+        self.remedy = remedy
+        details = {"where": where, "expected": expected, "got": got, "remedy": remedy}
+        lines = [f"  {key + ':':<9} {value}" for key, value in details.items() if value is not None]
+        super().__init__("\n".join([what, *lines]))
+
+
+class UserError(SysidError):
+    """The input can be changed so that this does not happen again."""
+
+    exit_code = 2
+
+
+class ConfigError(UserError):
+    """A pipeline, data-set or option value that cannot be used as written."""
+
+
+class TraceError(UserError):
+    """A trace that breaks what a trace promises: uniform time, finite values, named channels."""
+
+
+class UnitError(UserError):
+    """A unit that is not known, or that does not measure the quantity it stands on."""
+
+
+class ReaderError(UserError):
+    """A file that cannot be read as the kind of file it claims to be."""
+
+
+class StabilityError(UserError):
+    """A time step or a coefficient table for which a simulation cannot be trusted."""
+
+
+class ChannelError(UserError):
+    """A channel that is asked for and not there.
+
+    Args:
+        missing: Names asked for and absent.
+        available: Names that are there.
+        where: The trace or file looked in.
+
+    Example:
+        >>> print(ChannelError(["BPP"], ["BP", "AR"], where="EST01"))
+        missing channel BPP
+          where:    EST01
+          expected: one of BP, AR
+          got:      BPP
+          remedy:   did you mean BP?
+    """
+
+    def __init__(self, missing: Sequence[str], available: Sequence[str], *, where: object = None) -> None:
+        self.missing = tuple(missing)
+        self.available = tuple(available)
+        near = {name: difflib.get_close_matches(name, available, n=1) for name in missing}
+        guesses = [match[0] for match in near.values() if match]
+        remedy = f"did you mean {', '.join(guesses)}?" if guesses else "name one of the channels that are there"
+        super().__init__(
+            f"missing channel {', '.join(missing)}",
+            where=where,
+            expected=f"one of {', '.join(available)}",
+            got=", ".join(missing),
+            remedy=remedy,
+        )
+
+
+class MissingExtraError(UserError):
+    """An optional dependency that is not installed.
+
+    Args:
+        package: The package that could not be imported.
+        extra: The name of our extra that brings it.
+        purpose: What it is needed for.
+    """
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        super().__init__(
+            f"{purpose} needs the package {package}, which is not installed",
+            expected=package,
+            got="no such package in this environment",
+            remedy=f'pip install "sysid-workbench[{extra}]"',
+        )
+
+
+class BundleError(UserError):
+    """A bundle on disk that is damaged, incomplete or newer than this version can read."""
+
+
+class FitDivergedError(SysidError):
+    """A fit that ended without any usable model.
+
+    Args:
+        what: What happened.
+        last_state: The last parameters that were finite, so that nothing is lost.
+        remedy: What to try next.
+    """
+
+    def __init__(self, what: str, *, last_state: object = None, remedy: str | None = None) -> None:
+        self.last_state = last_state
+        super().__init__(what, remedy=remedy)
+
+
+class ParityError(SysidError):
+    """An exported file whose output differs from its model by more than the tolerance.
+
+    Args:
+        file: The file that was checked.
+        case: The case with the largest difference.
+        difference: The largest absolute difference, in the output's unit.
+        tolerance: What was allowed, in the same unit.
+        unit: The output's unit.
+    """
+
+    def __init__(self, file: str, case: str, difference: float, tolerance: float, unit: str) -> None:
+        self.difference = difference
+        self.tolerance = tolerance
+        super().__init__(
+            f"{file} does not reproduce its model",
+            where=f"case {case}",
+            expected=f"a largest difference of at most {tolerance:g} {unit}",
+            got=f"{difference:g} {unit}",
+            remedy="the file was not published; please report this with the bundle's model.json",
+        )

@@ -1,0 +1,1 @@
+"""Traces and a structure in, a FitResult out."""

@@ -1,0 +1,1 @@
+"""Files on disk in, a TraceSet in the units that were asked for out."""

@@ -1,0 +1,1 @@
+"""Compiled recursions: free run and forward sensitivities."""

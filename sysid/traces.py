@@ -1,0 +1,334 @@
+"""Trace and TraceSet: the words that every other room speaks.
+
+A **trace** is one experiment: a uniform sample time, named channels with units, float64, frozen. A
+**trace set** is a group of traces with a role each. Experiments are never concatenated: a recursion
+starts afresh in each of them.
+"""
+
+from __future__ import annotations
+
+import enum
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ChannelError, TraceError
+from sysid.units import Reference
+
+
+class Role(enum.Enum):
+    """What a trace may be used for. Scores on a trace count only if nothing was chosen on it."""
+
+    ESTIMATION = "estimation"
+    SELECTION = "selection"
+    VALIDATION = "validation"
+    TEST = "test"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """A named quantity.
+
+    Args:
+        name: Short name, unique in its trace (``"BP"``).
+        unit: A unit known to pint (``"psi"``); ``"1"`` for a pure number.
+        reference: For pressures, what they are measured from.
+        description: What it is, for people.
+    """
+
+    name: str
+    unit: str
+    reference: Reference = Reference.NONE
+    description: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name and unit as they stand on an axis, for example ``BP [psi gauge]``."""
+        suffix = "" if self.reference is Reference.NONE else f" {self.reference.value}"
+        return f"{self.name} [{self.unit}{suffix}]"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """One experiment.
+
+    Args:
+        name: Name of the case (``"EST01"``).
+        sample_time: Seconds between samples.
+        channels: What the columns of ``values`` are.
+        values: Shape ``(n_samples, n_channels)``, float64; copied and made read-only.
+        start_time: Time of the first sample in seconds.
+        usable: Shape ``(n_samples,)``, bool; ``False`` marks samples (gaps) that count in no loss and
+            in no figure of merit. ``None`` means that all count.
+        provenance: What was done to the samples on their way here, one sentence each.
+
+    Raises:
+        TraceError: If shapes disagree, a value is not finite, or the sample time is not positive.
+
+    Example:
+        >>> trace = Trace(name="a", sample_time=0.1, channels=(Channel(name="u", unit="V"),), values=np.zeros((3, 1)))
+        >>> trace.time.tolist(), trace["u"].shape
+        ([0.0, 0.1, 0.2], (3,))
+    """
+
+    name: str
+    sample_time: float
+    channels: tuple[Channel, ...]
+    values: NDArray[np.float64]
+    start_time: float = 0.0
+    usable: NDArray[np.bool_] | None = None
+    provenance: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        values = np.array(self.values, dtype=np.float64, order="C")
+        values.setflags(write=False)
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "channels", tuple(self.channels))
+        object.__setattr__(self, "provenance", tuple(self.provenance))
+        self._check()
+        if self.usable is not None:
+            usable = np.array(self.usable, dtype=np.bool_)
+            usable.setflags(write=False)
+            object.__setattr__(self, "usable", usable)
+
+    def _check(self) -> None:
+        if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
+            raise TraceError(
+                "values and channels do not match",
+                where=f"trace {self.name}",
+                expected=f"values of shape (n_samples, {len(self.channels)})",
+                got=f"shape {self.values.shape}",
+                remedy="give one column per channel",
+            )
+        names = self.channel_names
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise TraceError(
+                f"channel {', '.join(repeated)} appears more than once",
+                where=f"trace {self.name}",
+                expected="a different name for each channel",
+                got=", ".join(names),
+                remedy="rename or drop one of them",
+            )
+        if not (np.isfinite(self.sample_time) and self.sample_time > 0.0):
+            raise TraceError(
+                "the sample time is not positive",
+                where=f"trace {self.name}",
+                expected="seconds between samples, above 0",
+                got=self.sample_time,
+                remedy="correct sample_time",
+            )
+        if len(self.values) == 0:
+            raise TraceError(
+                "the trace has no samples", where=f"trace {self.name}", remedy="check the file it came from"
+            )
+        bad = ~np.isfinite(self.values)
+        if bad.any():
+            row, column = (int(index) for index in np.argwhere(bad)[0])
+            raise TraceError(
+                f"{int(bad.sum())} values are not finite",
+                where=f"trace {self.name}, channel {names[column]}, sample {row}",
+                expected="finite numbers",
+                got=self.values[row, column],
+                remedy="ask for a repair at ingest, or mark the samples as not usable",
+            )
+        if self.usable is not None and np.shape(self.usable) != (len(self.values),):
+            raise TraceError(
+                "the usable mask does not match the samples",
+                where=f"trace {self.name}",
+                expected=f"shape ({len(self.values)},)",
+                got=f"shape {np.shape(self.usable)}",
+                remedy="give one truth value per sample",
+            )
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, channel: str) -> NDArray[np.float64]:
+        return self.values[:, self.index(channel)]
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Names of the channels, in column order."""
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time of each sample in seconds, shape ``(n_samples,)``."""
+        return self.start_time + self.sample_time * np.arange(len(self.values), dtype=np.float64)
+
+    @property
+    def duration(self) -> float:
+        """Seconds covered: samples times sample time."""
+        return len(self.values) * self.sample_time
+
+    @property
+    def usable_samples(self) -> NDArray[np.bool_]:
+        """The mask as an array, all true where none was given."""
+        return np.ones(len(self.values), dtype=np.bool_) if self.usable is None else self.usable
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 over everything that a fit can see: time, channels, values and mask."""
+        head = [self.start_time, self.sample_time, [[c.name, c.unit, c.reference.value] for c in self.channels]]
+        sha = hashlib.sha256(json.dumps(head).encode())
+        sha.update(self.values.tobytes())
+        sha.update(np.packbits(self.usable_samples).tobytes())
+        return sha.hexdigest()
+
+    def index(self, channel: str) -> int:
+        """Column of a channel.
+
+        Args:
+            channel: Its name.
+
+        Returns:
+            The column in ``values``.
+
+        Raises:
+            ChannelError: If there is no such channel.
+        """
+        try:
+            return self.channel_names.index(channel)
+        except ValueError:
+            raise ChannelError([channel], self.channel_names, where=f"trace {self.name}") from None
+
+    def channel(self, name: str) -> Channel:
+        """The channel of that name (:class:`ChannelError` if there is none)."""
+        return self.channels[self.index(name)]
+
+    def columns(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Several channels side by side.
+
+        Args:
+            names: Channel names.
+
+        Returns:
+            Shape ``(n_samples, len(names))``, C order.
+
+        Raises:
+            ChannelError: If one is missing; all missing ones are named.
+        """
+        missing = [name for name in names if name not in self.channel_names]
+        if missing:
+            raise ChannelError(missing, self.channel_names, where=f"trace {self.name}")
+        return np.ascontiguousarray(self.values[:, [self.index(name) for name in names]])
+
+    def with_provenance(self, *sentences: str) -> Trace:
+        """The same trace with sentences added to its provenance."""
+        return replace(self, provenance=(*self.provenance, *sentences))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TraceSet:
+    """Named traces with a role each.
+
+    Args:
+        name: Name of the data set.
+        traces: The experiments; all share sample time and channels.
+        roles: Role of each trace, by name; those not named are for validation.
+        source: How the traces came to be, for people (a command, a file, a rig).
+
+    Raises:
+        TraceError: If names repeat, a role names no trace, or sample times or channels differ.
+    """
+
+    name: str
+    traces: tuple[Trace, ...]
+    roles: Mapping[str, Role] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "traces", tuple(self.traces))
+        object.__setattr__(
+            self, "roles", {t.name: self.roles.get(t.name, Role.VALIDATION) for t in self.traces} | dict(self.roles)
+        )
+        if not self.traces:
+            raise TraceError("the trace set is empty", where=f"data set {self.name}", remedy="give at least one trace")
+        names = self.names
+        if len(set(names)) != len(names):
+            raise TraceError(
+                "two traces have the same name",
+                where=f"data set {self.name}",
+                expected="a different name for each trace",
+                got=", ".join(names),
+                remedy="rename one of them",
+            )
+        strangers = sorted(set(self.roles) - set(names))
+        if strangers:
+            raise TraceError(
+                f"a role is given to {', '.join(strangers)}, which is not in the set",
+                where=f"data set {self.name}",
+                expected=f"one of {', '.join(names)}",
+                got=", ".join(strangers),
+                remedy="correct the name in roles",
+            )
+        first = self.traces[0]
+        for trace in self.traces[1:]:
+            self._check_alike(first, trace)
+
+    def _check_alike(self, first: Trace, other: Trace) -> None:
+        if not np.isclose(first.sample_time, other.sample_time, rtol=1e-9, atol=0.0):
+            raise TraceError(
+                "the traces have different sample times",
+                where=f"data set {self.name}, trace {other.name}",
+                expected=f"{first.sample_time:g} s as in {first.name}",
+                got=f"{other.sample_time:g} s",
+                remedy="resample them to one sample time at ingest",
+            )
+        ours, theirs = ([(c.name, c.unit, c.reference) for c in t.channels] for t in (first, other))
+        if ours != theirs:
+            raise TraceError(
+                "the traces have different channels",
+                where=f"data set {self.name}, trace {other.name}",
+                expected=", ".join(channel.label for channel in first.channels),
+                got=", ".join(channel.label for channel in other.channels),
+                remedy="choose the same channels, in the same units, for every trace",
+            )
+
+    def __len__(self) -> int:
+        return len(self.traces)
+
+    def __iter__(self) -> Iterator[Trace]:
+        return iter(self.traces)
+
+    def __getitem__(self, name: str) -> Trace:
+        for trace in self.traces:
+            if trace.name == name:
+                return trace
+        raise TraceError(
+            f"no trace named {name}",
+            where=f"data set {self.name}",
+            expected=f"one of {', '.join(self.names)}",
+            got=name,
+            remedy="correct the name of the case",
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the traces, in order."""
+        return tuple(trace.name for trace in self.traces)
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds between samples, the same for every trace."""
+        return self.traces[0].sample_time
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels that every trace has."""
+        return self.traces[0].channels
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 over names, roles and the digests of the traces."""
+        parts = [[t.name, self.roles[t.name].value, t.digest] for t in self.traces]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+    def with_role(self, *roles: Role) -> tuple[Trace, ...]:
+        """The traces that have one of these roles, in order."""
+        return tuple(trace for trace in self.traces if self.roles[trace.name] in roles)

@@ -1,0 +1,1 @@
+"""Models and traces in, figures of merit out."""

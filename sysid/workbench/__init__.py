@@ -1,0 +1,1 @@
+"""Configuration, steps, tracking and the command line."""
