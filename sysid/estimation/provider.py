@@ -1,0 +1,262 @@
+"""Providers: where residuals and Jacobians come from. Open and closed loop differ here and nowhere else."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import blas
+
+from sysid.kernels import recursion as kernel
+from sysid.models import History, Mapping, Recursion, Start
+from sysid.traces import Trace
+
+BLOCK = 1024
+"""Rows of the Jacobian that are alive at a time: 1024 rows of 300 parameters are 2.4 MB, which the second-level
+cache holds until the normal equations have used them. Memory does not grow with the length of the records."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Experiment:
+    """One record as an estimator sees it.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+        output: Measured output, shape ``(n_samples,)``.
+        history: The samples before the first.
+        weights: Weight of each squared residual, shape ``(n_samples,)``; zero where a sample does not count.
+            ``None`` for all ones.
+    """
+
+    inputs: NDArray[np.float64]
+    output: NDArray[np.float64]
+    history: History
+    weights: NDArray[np.float64] | None = None
+
+    @classmethod
+    def from_trace(cls, trace: Trace, mapping: Mapping, start: Start, rest_output: float) -> Experiment:
+        """The record of one trace.
+
+        Args:
+            trace: The trace.
+            mapping: Which channels go in, which comes out.
+            start: Where its history comes from.
+            rest_output: Output at rest.
+
+        Returns:
+            The experiment, without the samples that became history.
+
+        Raises:
+            ChannelError: If the trace lacks a channel of the mapping.
+            TraceError: If the trace is not longer than a measured start.
+        """
+        inputs, output = trace.columns(mapping.inputs), trace.columns([mapping.output])[:, 0]
+        history = start.history(inputs, output, rest_output)
+        n = start.n_measured
+        usable = trace.usable_samples[n:]
+        weights = None if usable.all() else usable.astype(np.float64)
+        return cls(inputs=inputs[n:], output=output[n:], history=history, weights=weights)
+
+    @property
+    def n_counted(self) -> int:
+        """Samples that count."""
+        return len(self.output) if self.weights is None else int(np.count_nonzero(self.weights))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linearisation:
+    r"""What a Gauss-Newton method needs to know at one point.
+
+    Args:
+        loss: :math:`\frac12 \sum w e^2` in scaled numbers.
+        gradient: :math:`J^T W e` with :math:`e = \hat y - y`, shape ``(n_parameters,)``.
+        gauss_newton: :math:`J^T W J`, shape ``(n_parameters, n_parameters)``.
+    """
+
+    loss: float
+    gradient: NDArray[np.float64]
+    gauss_newton: NDArray[np.float64]
+
+
+class AbstractProvider(ABC):
+    """Residuals of a model over experiments, as a function of its flat parameters."""
+
+    n_samples: int
+    """Samples that count."""
+
+    @abstractmethod
+    def loss(self, theta: NDArray[np.float64]) -> float:
+        """Half the weighted sum of squared residuals; ``inf`` where it is not finite.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            The loss in scaled numbers.
+        """
+
+    @abstractmethod
+    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+        """Loss, gradient and Gauss-Newton matrix.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            All three.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class _Record:
+    """An experiment in scaled numbers, with room for what the kernel writes."""
+
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    target: NDArray[np.float64]
+    root_weights: NDArray[np.float64] | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecursionProvider(AbstractProvider):
+    """Residuals of a :class:`Recursion`, in open loop (one step ahead) or closed loop (free run).
+
+    Args:
+        template: Lags, neurons, scaling and bounds; its parameters are ignored.
+        experiments: The records; each starts from its own history.
+        closed: Free run if true, one step ahead otherwise.
+    """
+
+    template: Recursion
+    experiments: tuple[Experiment, ...]
+    closed: bool
+    n_samples: int = field(init=False)
+    _records: tuple[_Record, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "experiments", tuple(self.experiments))
+        object.__setattr__(self, "n_samples", sum(e.n_counted for e in self.experiments))
+        object.__setattr__(self, "_records", tuple(self._record(e) for e in self.experiments))
+
+    def _record(self, experiment: Experiment) -> _Record:
+        u, y = self.template.extended(experiment.inputs, experiment.history)
+        target = self.template.scaling.scale_output(experiment.output)
+        if not self.closed:
+            y[self.template.lags.depth :] = target
+        roots = None if experiment.weights is None else np.sqrt(experiment.weights)
+        return _Record(u, y, target, roots)
+
+    def loss(self, theta: NDArray[np.float64]) -> float:
+        """Half the weighted sum of squared residuals; see the base class."""
+        total = 0.0
+        for record in self._records:
+            if self.closed:
+                kernel.free_run(record.u, record.y, *self._arguments(record, theta))
+                residual = record.y[self.template.lags.depth :] - record.target
+            else:
+                residual = self._pass(record, theta)[0] - record.target
+            residual = residual if record.root_weights is None else residual * record.root_weights
+            total += 0.5 * float(residual @ residual)
+        return total if np.isfinite(total) else np.inf
+
+    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+        """Loss, gradient and Gauss-Newton matrix; see the base class."""
+        n_p = len(theta)
+        gradient = np.zeros(n_p)
+        matrix = np.zeros((n_p, n_p), order="F")
+        loss = 0.0
+        for record in self._records:
+            out, h, c = self._pass(record, theta)
+            residual = out - record.target
+            residual = residual if record.root_weights is None else residual * record.root_weights
+            loss += 0.5 * float(residual @ residual)
+            for first, block in self._blocks(record, theta, h, c):
+                rows = slice(first, first + len(block))
+                weighted = block if record.root_weights is None else block * record.root_weights[rows, None]
+                gradient += weighted.T @ residual[rows]
+                # Row-major (rows, parameters) is column-major (parameters, rows): no copy, half the flops of gemm.
+                matrix = blas.dsyrk(1.0, weighted.T, beta=1.0, c=matrix, overwrite_c=1)
+        upper = np.triu(matrix)
+        return Linearisation(loss=loss, gradient=gradient, gauss_newton=upper + np.triu(upper, 1).T)
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The whole Jacobian of the scaled output, unweighted, records one after the other.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            Shape ``(n_samples_of_all_records, n_parameters)``.
+        """
+        blocks = []
+        for record in self._records:
+            _, h, c = self._pass(record, theta)
+            blocks += [block.copy() for _, block in self._blocks(record, theta, h, c)]
+        return np.concatenate(blocks)
+
+    def _blocks(self, record: _Record, theta: NDArray[np.float64], h: NDArray[np.float64], c: NDArray[np.float64]):  # type: ignore[no-untyped-def]  # a generator of (first, rows)
+        lags = self.template.lags
+        carry = max(lags.output, default=0) if self.closed else 0
+        n = len(record.target)
+        J = np.empty((carry + BLOCK, len(theta)))
+        for first in range(0, n, BLOCK):
+            rows = min(BLOCK, n - first)
+            if first:
+                J[:carry] = J[BLOCK : BLOCK + carry]
+            kernel.sensitivities(
+                record.u, record.y, lags.depth, first, rows, *self._tables(), theta,
+                self.template.neurons, self.closed, h, c, carry, J,
+            )  # fmt: skip
+            yield first, J[carry : carry + rows]
+
+    def _pass(self, record: _Record, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        n = len(record.target)
+        out = np.empty(n)
+        h = np.empty((n, self.template.neurons))
+        c = np.empty((n, len(self.template.lags.output) + 1))
+        kernel.activations(record.u, record.y, *self._arguments(record, theta), self.closed, out, h, c)
+        return out, h, c
+
+    def _tables(self) -> tuple[NDArray[np.int64], ...]:
+        lags = self.template.lags
+        return lags.input_channel, lags.input_lag, lags.output_lag
+
+    def _arguments(self, record: _Record, theta: NDArray[np.float64]) -> tuple[object, ...]:
+        template = self.template
+        n = len(record.target)
+        return (template.lags.depth, n, *self._tables(), theta, template.neurons, template.low, template.high)
+
+    def at(self, theta: NDArray[np.float64]) -> Recursion:
+        """The recursion with these parameters.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            The recursion.
+        """
+        return replace(self.template, theta=theta)
+
+
+def experiments_of(
+    traces: Sequence[Trace], mapping: Mapping, start: Start, rest_output: float
+) -> tuple[Experiment, ...]:
+    """The experiments of several traces.
+
+    Args:
+        traces: The traces; never concatenated.
+        mapping: Which channels go in, which comes out.
+        start: Where each history comes from.
+        rest_output: Output at rest.
+
+    Returns:
+        One experiment per trace.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If a trace is not longer than a measured start.
+    """
+    return tuple(Experiment.from_trace(trace, mapping, start, rest_output) for trace in traces)

@@ -1,0 +1,131 @@
+"""FitResult: what an estimator gives back, never a tuple."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models import AbstractModel, model_from_dict
+
+
+class Status(enum.Enum):
+    """How a fit ended; the value is the sentence that a person reads."""
+
+    CONVERGED = "The loss no longer improves: a minimum was reached."
+    EXACT = "Linear least squares: the minimum was computed directly."
+    MAX_ITERATIONS = "The iterations ran out while the loss was still improving; allow more of them."
+    TIME_LIMIT = "The time limit was reached while the loss was still improving; allow more time."
+    STALLED = "No step improves the loss any more although its gradient is not zero; try another start."
+    NOT_IMPROVED = "The fit did not improve on where it started; try another start, or more damping."
+    INTERRUPTED = "Interrupted; this is the best model up to then."
+    UNSTABLE = "The free run leaves its bounds on at least one record; choose another start or fewer lags."
+
+    @property
+    def usable(self) -> bool:
+        """Whether the model may be compared with others."""
+        return self not in {Status.NOT_IMPROVED, Status.UNSTABLE}
+
+
+class Loop(enum.Enum):
+    """What a model was fitted for: one step ahead from measured output, or its own free run."""
+
+    OPEN = "open"
+    CLOSED = "closed"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence:
+    """What Bayesian regularisation found.
+
+    Args:
+        log_evidence: Logarithm of the marginal likelihood of the scaled residuals.
+        beta: Precision of the scaled residuals.
+        alphas: Precision of the prior of each group of weights.
+        effective_parameters: Number of parameters that the data determine, per group.
+        parameters: Number of parameters, per group.
+    """
+
+    log_evidence: float
+    beta: float
+    alphas: Dict[str, float]
+    effective_parameters: Dict[str, float]
+    parameters: Dict[str, int]
+
+    @property
+    def total_effective_parameters(self) -> float:
+        """Sum over the groups."""
+        return float(sum(self.effective_parameters.values()))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitResult:
+    """A fitted model and how it came about.
+
+    Args:
+        model: The model with the best parameters.
+        status: How the fit ended.
+        loop: What it was fitted for.
+        history: Learning curve: columns of equal length, among them ``iteration`` and ``mse`` (mean squared
+            error over the estimation records in the output's unit squared).
+        train_time_s: Wall time of the fit in seconds.
+        seed: Seed of its random start; ``None`` where nothing is random.
+        evidence: From Bayesian regularisation, where it was used.
+        notes: Sentences worth knowing: choices made, restarts compared, stability.
+    """
+
+    model: AbstractModel
+    status: Status
+    loop: Loop
+    history: Dict[str, NDArray[np.float64]]
+    train_time_s: float
+    seed: int | None = None
+    evidence: Evidence | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as JSON values."""
+        evidence = self.evidence
+        return {
+            "model": self.model.to_dict(),
+            "status": self.status.name,
+            "loop": self.loop.value,
+            "history": {name: np.asarray(column).tolist() for name, column in self.history.items()},
+            "train_time_s": self.train_time_s,
+            "seed": self.seed,
+            "evidence": None
+            if evidence is None
+            else {
+                "log_evidence": evidence.log_evidence,
+                "beta": evidence.beta,
+                "alphas": dict(evidence.alphas),
+                "effective_parameters": dict(evidence.effective_parameters),
+                "parameters": dict(evidence.parameters),
+            },
+            "notes": list(self.notes),
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> FitResult:
+        """The result that :meth:`to_dict` wrote.
+
+        Args:
+            fields: What it wrote.
+
+        Returns:
+            The result.
+        """
+        return cls(
+            model=model_from_dict(fields["model"]),
+            status=Status[fields["status"]],
+            loop=Loop(fields["loop"]),
+            history={name: np.asarray(column, dtype=np.float64) for name, column in fields["history"].items()},
+            train_time_s=fields["train_time_s"],
+            seed=fields["seed"],
+            evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
+            notes=tuple(fields["notes"]),
+        )

@@ -1,0 +1,53 @@
+"""Termination: when to stop."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from sysid.estimation.result import Status
+
+MAX_DAMPING = 1e12
+"""Damping at which a step no longer changes the parameters in double precision."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Termination:
+    """Limits of a fit.
+
+    Args:
+        max_iterations: Steps taken or tried.
+        max_time_s: Wall time in seconds.
+        tolerance: Relative improvement of the penalised loss over ``patience`` iterations below which the fit
+            has converged.
+        patience: Iterations over which improvement is judged.
+    """
+
+    max_iterations: int = 200
+    max_time_s: float = float("inf")
+    tolerance: float = 1e-4
+    patience: int = 10
+
+    def check(self, *, iteration: int, started: float, losses: list[float], damping: float) -> Status | None:
+        """Whether to stop now.
+
+        Args:
+            iteration: Iterations done.
+            started: When the fit began, by ``time.perf_counter``.
+            losses: Penalised loss after each iteration since the objective last changed.
+            damping: Damping factor now.
+
+        Returns:
+            Why to stop, or ``None`` to go on.
+        """
+        if damping > MAX_DAMPING:
+            return Status.STALLED
+        if len(losses) > self.patience:
+            before, now = losses[-1 - self.patience], losses[-1]
+            if before - now <= self.tolerance * abs(before):
+                return Status.CONVERGED
+        if iteration >= self.max_iterations:
+            return Status.MAX_ITERATIONS
+        if time.perf_counter() - started > self.max_time_s:
+            return Status.TIME_LIMIT
+        return None

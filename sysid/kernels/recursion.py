@@ -1,0 +1,237 @@
+r"""The recursion of a lagged network, its free run and its exact forward sensitivities, compiled.
+
+With the regressors :math:`x_t` (lagged inputs, then lagged outputs) one step is
+
+.. math::
+    \hat y_t = \mathrm{clip}\bigl(w^T x_t + c + \textstyle\sum_k v_k h_{t,k}\bigr),
+    \qquad h_{t,k} = \tanh(W_k x_t + b_k).
+
+In a free run the lagged outputs in :math:`x_t` are the recursion's own. Differentiating with respect to
+the parameters :math:`\theta` gives, with :math:`s_{t,k} = v_k (1 - h_{t,k}^2)`,
+
+.. math::
+    \frac{d \hat y_t}{d\theta} = \frac{\partial \hat y_t}{\partial\theta}
+      + \sum_l c_{t,l}\,\frac{d \hat y_{t-l}}{d\theta},
+    \qquad c_{t,l} = w_l + \sum_k s_{t,k} W_{k,l}
+
+a linear recursion over the rows of the Jacobian (real-time recurrent learning, Williams and Zipser 1989):
+exact, forward, one pass. With a single output it costs ``n_parameters * (1 + n_output_lags)`` multiply-adds
+a sample, which is why it beats backpropagation through time for networks of this size: it yields the whole
+Jacobian that Gauss-Newton methods need. A clipped sample has a zero row.
+
+Parameters are one flat vector ``[W (n_neurons, n_regressors) | b | v | c | w]``. The linear part ``w`` stands
+last so that a network without it is a shorter vector; no neurons at all leaves ``[c | w]``, an ARX model with
+an intercept. Everything is in the model's scaled numbers. Time is extended to the left by ``depth`` past
+samples, so that ``u[depth + t]`` and ``y[depth + t]`` belong to step ``t``.
+
+Limits: one output; the Jacobian of an unstable free run grows without bound, which the clip stops.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+# Sums may be reordered, which is what lets the compiler vectorise them; NaN and infinity keep their meaning.
+_FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, low, high):
+    """Run the recursion on its own output, writing ``y[depth:]`` in place.
+
+    Args:
+        u: Scaled inputs with history, shape ``(depth + n_steps, n_inputs)``.
+        y: Scaled outputs, shape ``(depth + n_steps,)``; the first ``depth`` are read, the rest written.
+        depth: Past samples before step 0.
+        n_steps: Steps to run.
+        input_channel: Shape ``(n_input_regressors,)``.
+        input_lag: Shape ``(n_input_regressors,)``.
+        output_lag: Shape ``(n_output_regressors,)``.
+        theta: Parameters; with or without the linear part.
+        n_neurons: Number of neurons.
+        low: Lower bound of the output.
+        high: Upper bound of the output.
+    """
+    n_in, n_out = len(input_lag), len(output_lag)
+    n_x = n_in + n_out
+    W = theta[: n_neurons * n_x].reshape(n_neurons, n_x)
+    b = theta[n_neurons * n_x :]
+    v = b[n_neurons:]
+    linear = len(theta) > n_neurons * (n_x + 2) + 1
+    constant = v[n_neurons]
+    w = v[n_neurons + 1 :]
+    x = np.empty(n_x)
+    for t in range(depth, depth + n_steps):
+        for i in range(n_in):
+            x[i] = u[t - input_lag[i], input_channel[i]]
+        for i in range(n_out):
+            x[n_in + i] = y[t - output_lag[i]]
+        total = constant
+        if linear:
+            for i in range(n_x):
+                total += w[i] * x[i]
+        for k in range(n_neurons):
+            a = b[k]
+            for i in range(n_x):
+                a += W[k, i] * x[i]
+            total += v[k] * math.tanh(a)
+        y[t] = min(max(total, low), high) if not math.isnan(total) else total
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def activations(
+    u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, low, high, closed, out, h, c
+):
+    """One pass that keeps what the sensitivities need.
+
+    Args:
+        u: As in :func:`free_run`.
+        y: As in :func:`free_run`; written in a free run (``closed``), read as measured otherwise.
+        depth: As in :func:`free_run`.
+        n_steps: As in :func:`free_run`.
+        input_channel: As in :func:`free_run`.
+        input_lag: As in :func:`free_run`.
+        output_lag: As in :func:`free_run`.
+        theta: As in :func:`free_run`.
+        n_neurons: As in :func:`free_run`.
+        low: As in :func:`free_run`.
+        high: As in :func:`free_run`.
+        closed: Whether the output feeds back.
+        out: Predicted output, shape ``(n_steps,)``, written.
+        h: Activations, shape ``(n_steps, n_neurons)``, written.
+        c: Derivative with respect to each lagged output, shape ``(n_steps, n_output_regressors + 1)``, written;
+            the last column is 0 where the output is clipped and 1 elsewhere.
+    """
+    n_in, n_out = len(input_lag), len(output_lag)
+    n_x = n_in + n_out
+    W = theta[: n_neurons * n_x].reshape(n_neurons, n_x)
+    b = theta[n_neurons * n_x :]
+    v = b[n_neurons:]
+    linear = len(theta) > n_neurons * (n_x + 2) + 1
+    constant = v[n_neurons]
+    w = v[n_neurons + 1 :]
+    x = np.empty(n_x)
+    for t in range(n_steps):
+        for i in range(n_in):
+            x[i] = u[depth + t - input_lag[i], input_channel[i]]
+        for i in range(n_out):
+            x[n_in + i] = y[depth + t - output_lag[i]]
+        total = constant
+        for i in range(n_out):
+            c[t, i] = w[n_in + i] if linear else 0.0
+        if linear:
+            for i in range(n_x):
+                total += w[i] * x[i]
+        for k in range(n_neurons):
+            a = b[k]
+            for i in range(n_x):
+                a += W[k, i] * x[i]
+            z = math.tanh(a)
+            h[t, k] = z
+            total += v[k] * z
+            slope = v[k] * (1.0 - z * z)
+            for i in range(n_out):
+                c[t, i] += slope * W[k, n_in + i]
+        bounded = min(max(total, low), high) if not math.isnan(total) else total
+        c[t, n_out] = 1.0 if bounded == total else 0.0
+        out[t] = bounded
+        if closed:
+            y[depth + t] = bounded
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def sensitivities(
+    u, y, depth, first, n_rows, input_channel, input_lag, output_lag, theta, n_neurons, closed, h, c, carry, J
+):
+    """Rows ``first`` to ``first + n_rows`` of the Jacobian of the output with respect to the parameters.
+
+    The record is walked in blocks, so that a block of rows stays in cache until the normal equations have
+    used it; ``J`` holds ``carry`` rows of the block before, which the caller moves to its head.
+
+    Args:
+        u: As in :func:`free_run`.
+        y: As in :func:`free_run`, filled.
+        depth: As in :func:`free_run`.
+        first: First step of the block.
+        n_rows: Steps in the block.
+        input_channel: As in :func:`free_run`.
+        input_lag: As in :func:`free_run`.
+        output_lag: As in :func:`free_run`.
+        theta: As in :func:`free_run`.
+        n_neurons: As in :func:`free_run`.
+        closed: Whether the output feeds back; otherwise the rows do not depend on each other.
+        h: As from :func:`activations`.
+        c: As from :func:`activations`.
+        carry: Rows kept from the block before: the longest output lag.
+        J: Shape ``(carry + n_rows, n_parameters)``; rows from ``carry`` on are written.
+    """
+    n_in, n_out = len(input_lag), len(output_lag)
+    n_x = n_in + n_out
+    n_p = len(theta)
+    v = theta[n_neurons * (n_x + 1) :]
+    bias_at = n_neurons * n_x
+    constant_at = n_neurons * (n_x + 2)
+    linear = n_p > constant_at + 1
+    x = np.empty(n_x)
+    for r in range(n_rows):
+        t = first + r
+        row = J[carry + r]
+        if c[t, n_out] == 0.0:
+            row[:] = 0.0
+            continue
+        for i in range(n_in):
+            x[i] = u[depth + t - input_lag[i], input_channel[i]]
+        for i in range(n_out):
+            x[n_in + i] = y[depth + t - output_lag[i]]
+        for k in range(n_neurons):
+            z = h[t, k]
+            slope = v[k] * (1.0 - z * z)
+            at = k * n_x
+            for i in range(n_x):
+                row[at + i] = slope * x[i]
+            row[bias_at + k] = slope
+            row[bias_at + n_neurons + k] = z
+        row[constant_at] = 1.0
+        if linear:
+            for i in range(n_x):
+                row[constant_at + 1 + i] = x[i]
+        if closed:
+            for i in range(n_out):
+                if t >= output_lag[i]:  # samples before the first step do not depend on the parameters
+                    factor = c[t, i]
+                    past = J[carry + r - output_lag[i]]
+                    for p in range(n_p):
+                        row[p] += factor * past[p]
+
+
+@njit(cache=True, nogil=True)
+def predict(u, measured, y, steps, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, low, high):
+    """Prediction ``steps`` ahead of every sample, writing ``y[depth:]``.
+
+    Each sample is the end of a free run of ``steps`` steps that starts from measured output.
+
+    Args:
+        u: As in :func:`free_run`.
+        measured: Scaled measured output with history, shape ``(depth + n_steps,)``.
+        y: Shape ``(depth + n_steps,)``; ``y[depth:]`` is written.
+        steps: How far ahead, at least 1.
+        depth: As in :func:`free_run`.
+        n_steps: As in :func:`free_run`.
+        input_channel: As in :func:`free_run`.
+        input_lag: As in :func:`free_run`.
+        output_lag: As in :func:`free_run`.
+        theta: As in :func:`free_run`.
+        n_neurons: As in :func:`free_run`.
+        low: As in :func:`free_run`.
+        high: As in :func:`free_run`.
+    """
+    window = np.empty(depth + steps)
+    for t in range(n_steps):
+        run = min(steps, t + 1)
+        first = t + 1 - run
+        window[:depth] = measured[first : first + depth]
+        free_run(u[first:], window, depth, run, input_channel, input_lag, output_lag, theta, n_neurons, low, high)
+        y[depth + t] = window[depth + run - 1]

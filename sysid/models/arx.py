@@ -1,0 +1,164 @@
+"""ARX: the output as a linear function of its own past and of past inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.lags import Lags
+from sysid.models.mapping import Mapping
+from sysid.models.recursion import Recursion
+from sysid.models.scaling import Scaling
+
+
+@dataclass(frozen=True, kw_only=True)
+class ARX(AbstractStructure):
+    """Orders of an ARX model, as in MATLAB's ``arx``.
+
+    Args:
+        na: Number of past outputs.
+        nb: Number of past values of each input.
+        nk: Dead time of each input in samples.
+        intercept: Fit a constant beside the lags. Without it, or data as deviations from an operating
+            point, an ARX model of pressures around 90 psi is not judged fairly.
+
+    Raises:
+        ConfigError: If an order is negative, or ``nb`` and ``nk`` differ in length.
+
+    Example:
+        >>> ARX(na=2, nb=(2,), nk=(3,)).label
+        'ARX [2; 2; 3]'
+    """
+
+    na: int
+    nb: tuple[int, ...]
+    nk: tuple[int, ...]
+    intercept: bool = True
+
+    kind = "ARX"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nb", tuple(self.nb))
+        object.__setattr__(self, "nk", tuple(self.nk))
+        if self.na < 0 or min(self.nb, default=-1) < 0 or min(self.nk, default=-1) < 0 or len(self.nb) != len(self.nk):
+            raise ConfigError(
+                "not the orders of an ARX model",
+                expected="na from 0 on, and one nb and one nk from 0 on for each input",
+                got=f"na = {self.na}, nb = {list(self.nb)}, nk = {list(self.nk)}",
+                remedy="write for example na: 2, nb: [2, 2], nk: [1, 1]",
+            )
+
+    @property
+    def label(self) -> str:
+        """As MATLAB writes the orders."""
+        return f"ARX [{self.na}; {' '.join(map(str, self.nb))}; {' '.join(map(str, self.nk))}]"
+
+    @property
+    def lags(self) -> Lags:
+        """The regressors."""
+        inputs = tuple(tuple(range(nk, nk + nb)) for nb, nk in zip(self.nb, self.nk, strict=True))
+        return Lags(inputs=inputs, output=tuple(range(1, self.na + 1)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        return {"kind": self.kind, "na": self.na, "nb": list(self.nb), "nk": list(self.nk), "intercept": self.intercept}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ARXModel(AbstractModel):
+    r"""A fitted ARX model, in the channels' units.
+
+    :math:`\hat y_t = d + \sum_i a_i y_{t-i} + \sum_j \sum_i b_{j,i} u_{j,t-n_{k,j}-i}`. Note the sign: MATLAB's
+    polynomial :math:`A(q)` has :math:`-a_i`.
+
+    Args:
+        orders: The structure.
+        coefficients: ``[b of input 1 | b of input 2 | ... | a]``, shape ``(n_regressors,)``.
+        intercept: The constant ``d`` in the output's unit.
+        mapping: Which channels go in, which comes out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+    """
+
+    orders: ARX
+    coefficients: NDArray[np.float64]
+    intercept: float
+    mapping: Mapping
+    sample_time: float
+    input_units: tuple[str, ...]
+    output_unit: str
+    rest_output: float
+
+    def __post_init__(self) -> None:
+        coefficients = np.array(self.coefficients, dtype=np.float64)
+        coefficients.setflags(write=False)
+        object.__setattr__(self, "coefficients", coefficients)
+        object.__setattr__(self, "input_units", tuple(self.input_units))
+
+    @property
+    def structure(self) -> ARX:
+        """The orders."""
+        return self.orders
+
+    @property
+    def n_parameters(self) -> int:
+        """Coefficients and, if fitted, the intercept."""
+        return len(self.coefficients) + self.orders.intercept
+
+    @property
+    def a(self) -> NDArray[np.float64]:
+        """Coefficients of the past outputs, shape ``(na,)``."""
+        return self.coefficients[len(self.coefficients) - self.orders.na :]
+
+    @property
+    def b(self) -> tuple[NDArray[np.float64], ...]:
+        """For each input the coefficients of its past values, shapes ``(nb_j,)``."""
+        ends = np.cumsum(self.orders.nb)
+        return tuple(np.split(self.coefficients[: ends[-1]], ends[:-1]))
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Poles in the z plane, shape ``(na,)``; a free run is stable if all lie inside the unit circle."""
+        return np.asarray(np.roots([1.0, *(-self.a)]), dtype=np.complex128)
+
+    @property
+    def recursion(self) -> Recursion:
+        """The same model as a recursion without neurons and without scaling."""
+        theta = np.concatenate([[self.intercept], self.coefficients])
+        return Recursion(
+            lags=self.orders.lags, neurons=0, theta=theta, scaling=Scaling.identity(len(self.mapping.inputs))
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return {
+            "structure": self.orders.to_dict(),
+            "mapping": str(self.mapping),
+            "sample_time": self.sample_time,
+            "input_units": list(self.input_units),
+            "output_unit": self.output_unit,
+            "rest_output": self.rest_output,
+            "coefficients": self.coefficients.tolist(),
+            "intercept": self.intercept,
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> ARXModel:
+        """The model that :meth:`to_dict` wrote."""
+        orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
+        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output", "intercept")}
+        return cls(
+            orders=ARX(**orders),
+            coefficients=np.array(fields["coefficients"], dtype=np.float64),
+            mapping=Mapping.parse(fields["mapping"]),
+            input_units=tuple(fields["input_units"]),
+            **rest,
+        )

@@ -1,0 +1,122 @@
+"""What every model can do."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping as Dict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models.history import History
+from sysid.models.mapping import Mapping
+from sysid.models.recursion import Recursion
+
+
+class AbstractStructure(ABC):
+    """What is chosen before a fit: orders, delays, neurons. Frozen, keyword-only, free of data."""
+
+    kind: str
+    """Name in files and on the screen, such as ``"NARX"``."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """Short text an engineer recognises, such as ``NARX 4/4/20``."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values, with ``kind``."""
+
+
+class AbstractModel(ABC):
+    """Structure, parameters, scaling and rest value: everything a free run needs.
+
+    Concrete models are frozen dataclasses with at least these fields.
+    """
+
+    mapping: Mapping
+    """Which channels go in, which comes out."""
+    sample_time: float
+    """Seconds between samples."""
+    input_units: tuple[str, ...]
+    """Unit of each input."""
+    output_unit: str
+    """Unit of the output."""
+    rest_output: float
+    """Output of the system at rest, in its unit: where a free run starts unless told otherwise."""
+
+    @property
+    @abstractmethod
+    def structure(self) -> AbstractStructure:
+        """What was chosen before the fit."""
+
+    @property
+    @abstractmethod
+    def n_parameters(self) -> int:
+        """Number of fitted parameters."""
+
+    @property
+    @abstractmethod
+    def recursion(self) -> Recursion:
+        """The form that is run and exported."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again, as JSON values."""
+
+    @classmethod
+    @abstractmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> AbstractModel:
+        """The model that :meth:`to_dict` wrote.
+
+        Args:
+            fields: What it wrote.
+
+        Returns:
+            The model, equal in every parameter.
+        """
+
+    def simulate(self, inputs: NDArray[np.float64], history: History | None = None) -> NDArray[np.float64]:
+        """Free run: the model is fed its own past output.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the mapping's order and units.
+            history: Samples before the first; by default at rest: inputs held at their first sample, output
+                at ``rest_output``.
+
+        Returns:
+            Output of shape ``(n_samples,)``, in its unit.
+
+        Raises:
+            TraceError: If the number of inputs is not the mapping's.
+        """
+        return self.recursion.simulate(inputs, history or self._rest(inputs))
+
+    def predict(
+        self,
+        inputs: NDArray[np.float64],
+        output: NDArray[np.float64],
+        history: History | None = None,
+        *,
+        steps: int = 1,
+    ) -> NDArray[np.float64]:
+        """Prediction ``steps`` ahead from measured output; one step ahead is the open loop.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the mapping's order and units.
+            output: Measured output, shape ``(n_samples,)``.
+            history: Samples before the first; by default at rest.
+            steps: How far ahead.
+
+        Returns:
+            Predicted output of shape ``(n_samples,)``, in its unit.
+
+        Raises:
+            TraceError: If the number of inputs is not the mapping's.
+        """
+        return self.recursion.predict(inputs, output, history or self._rest(inputs), steps)
+
+    def _rest(self, inputs: NDArray[np.float64]) -> History:
+        return History.at_rest(inputs=np.asarray(inputs, dtype=np.float64)[0], output=self.rest_output)

@@ -1,0 +1,142 @@
+"""History: what a recursion remembers before its first step, and how a trace provides it."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError, TraceError
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class History:
+    """Past inputs and outputs, oldest first, in the channels' units.
+
+    A history may be shorter than a model's longest lag: the oldest sample is then held, so that one
+    sample alone is a system at rest.
+
+    Args:
+        inputs: Shape ``(n_past, n_inputs)``.
+        output: Shape ``(n_past,)``.
+
+    Raises:
+        TraceError: If the two have different lengths, or there is no sample.
+
+    Example:
+        >>> History.at_rest(inputs=[90.0, 90.0], output=0.0).padded(3)[1].tolist()
+        [0.0, 0.0, 0.0]
+    """
+
+    inputs: NDArray[np.float64]
+    output: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        inputs = np.array(self.inputs, dtype=np.float64, ndmin=2)
+        output = np.array(self.output, dtype=np.float64, ndmin=1)
+        if inputs.ndim != 2 or output.ndim != 1 or len(inputs) != len(output) or len(output) == 0:
+            raise TraceError(
+                "the history's inputs and output do not match",
+                expected="inputs of shape (n_past, n_inputs) and an output of shape (n_past,), n_past at least 1",
+                got=f"shapes {inputs.shape} and {output.shape}",
+                remedy="give one row of inputs for each past output",
+            )
+        object.__setattr__(self, "inputs", inputs)
+        object.__setattr__(self, "output", output)
+
+    @classmethod
+    def at_rest(cls, *, inputs: NDArray[np.float64] | list[float], output: float) -> History:
+        """A system that has stood at these values for ever.
+
+        Args:
+            inputs: One value per input.
+            output: The output's value.
+
+        Returns:
+            A history of one sample.
+        """
+        return cls(inputs=np.atleast_2d(np.asarray(inputs, dtype=np.float64)), output=np.array([output]))
+
+    def padded(self, n_past: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The last ``n_past`` samples, the oldest one held where the history is shorter.
+
+        Args:
+            n_past: Samples wanted.
+
+        Returns:
+            Inputs of shape ``(n_past, n_inputs)`` and output of shape ``(n_past,)``.
+        """
+        if n_past == 0:
+            return self.inputs[:0], self.output[:0]
+        missing = max(0, n_past - len(self.output))
+        inputs = np.concatenate([np.repeat(self.inputs[:1], missing, axis=0), self.inputs])[-n_past:]
+        output = np.concatenate([np.repeat(self.output[:1], missing), self.output])[-n_past:]
+        return inputs, output
+
+
+class StartKind(enum.Enum):
+    """Where the samples before a record's first step come from."""
+
+    REST = "rest"
+    FIRST_SAMPLE = "first-sample"
+    MEASURED = "measured"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """How a free run over a trace is started, and from which sample on it is scored.
+
+    * ``rest``: inputs held at their first sample, output at the model's declared rest value; nothing is
+      taken from the measured output, every sample is scored.
+    * ``first-sample``: the same with the first measured output held.
+    * ``measured``: the first ``n_measured`` samples of the record are the history; scoring begins after
+      them, as in the public benchmarks.
+
+    Args:
+        kind: Which of the three.
+        n_measured: Samples used, for ``measured`` alone.
+
+    Raises:
+        ConfigError: If ``n_measured`` does not go with the kind.
+    """
+
+    kind: StartKind = StartKind.REST
+    n_measured: int = 0
+
+    def __post_init__(self) -> None:
+        if (self.kind is StartKind.MEASURED) != (self.n_measured > 0):
+            raise ConfigError(
+                "the number of measured samples does not go with the kind of start",
+                expected="n_measured above 0 for a measured start, and 0 otherwise",
+                got=f"{self.kind.value} with n_measured = {self.n_measured}",
+                remedy="write start: rest, start: first-sample, or start: {measured: 50}",
+            )
+
+    def history(self, inputs: NDArray[np.float64], output: NDArray[np.float64], rest_output: float) -> History:
+        """The history that a record begins with.
+
+        Args:
+            inputs: The record's inputs, shape ``(n_samples, n_inputs)``.
+            output: The record's measured output, shape ``(n_samples,)``; read only as the kind allows.
+            rest_output: The output's declared rest value.
+
+        Returns:
+            The history before sample ``n_measured``.
+
+        Raises:
+            TraceError: If the record is not longer than the measured start.
+        """
+        if self.kind is StartKind.REST:
+            return History.at_rest(inputs=inputs[0], output=rest_output)
+        if self.kind is StartKind.FIRST_SAMPLE:
+            return History.at_rest(inputs=inputs[0], output=float(output[0]))
+        if len(output) <= self.n_measured:
+            raise TraceError(
+                "the record is too short for its start",
+                expected=f"more than {self.n_measured} samples",
+                got=f"{len(output)} samples",
+                remedy="use fewer measured samples, or a longer record",
+            )
+        return History(inputs=inputs[: self.n_measured], output=output[: self.n_measured])

@@ -1,0 +1,100 @@
+"""Lags: which past samples a model looks at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+
+LagSpec = int | str | Iterable[int]
+
+
+def parse_lags(spec: LagSpec, *, first: int, where: str) -> tuple[int, ...]:
+    """Lags from the forms that people write.
+
+    Args:
+        spec: ``4`` for 1 to 4 (as MATLAB's ``1:4``), ``"0:3"`` for a range, or a collection such as
+            ``[1, 2, 4, 8]``.
+        first: The smallest lag allowed: 0 for an input (the direct input x(n)), 1 for the output.
+        where: The field, for the error's text.
+
+    Returns:
+        The lags, strictly increasing.
+
+    Raises:
+        ConfigError: If it is not a set of different whole numbers from ``first`` on.
+
+    Example:
+        >>> parse_lags(4, first=0, where="input_delays"), parse_lags("0:3", first=0, where="input_delays")
+        ((1, 2, 3, 4), (0, 1, 2, 3))
+    """
+    try:
+        if isinstance(spec, str):
+            low, _, high = spec.partition(":")
+            lags = tuple(range(int(low), int(high or low) + 1))
+        elif isinstance(spec, int):
+            lags = tuple(range(1, spec + 1))
+        else:
+            entries = list(spec)
+            lags = tuple(int(lag) for lag in entries)
+            if list(lags) != entries:
+                raise ValueError
+    except (TypeError, ValueError):
+        lags = ()
+    if not lags or min(lags) < first or any(b <= a for a, b in pairwise(lags)):
+        raise ConfigError(
+            "not a set of lags",
+            where=where,
+            expected=f"a number n for 1 to n, a range such as {first}:4, or increasing lags from {first} on",
+            got=repr(spec),
+            remedy="list each lag once, smallest first",
+        )
+    return lags
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lags:
+    """The regressors of a model, in order: input by input, then the past outputs.
+
+    Args:
+        inputs: For each input channel its lags in samples, from 0 on; may be empty for an input.
+        output: Lags of the output in samples, from 1 on; may be empty (a finite impulse response).
+    """
+
+    inputs: tuple[tuple[int, ...], ...]
+    output: tuple[int, ...]
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of input channels."""
+        return len(self.inputs)
+
+    @property
+    def n_regressors(self) -> int:
+        """Number of regressors."""
+        return sum(len(lags) for lags in self.inputs) + len(self.output)
+
+    @property
+    def depth(self) -> int:
+        """Past samples needed before the first step."""
+        return max([0, *self.output, *(lag for lags in self.inputs for lag in lags)])
+
+    @property
+    def input_channel(self) -> NDArray[np.int64]:
+        """Column of the input that each input regressor reads, shape ``(n_input_regressors,)``."""
+        return np.array([i for i, lags in enumerate(self.inputs) for _ in lags], dtype=np.int64)
+
+    @property
+    def input_lag(self) -> NDArray[np.int64]:
+        """Lag of each input regressor, shape ``(n_input_regressors,)``."""
+        return np.array([lag for lags in self.inputs for lag in lags], dtype=np.int64)
+
+    @property
+    def output_lag(self) -> NDArray[np.int64]:
+        """Lag of each output regressor, shape ``(n_output_regressors,)``."""
+        return np.array(self.output, dtype=np.int64)

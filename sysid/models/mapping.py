@@ -1,0 +1,64 @@
+"""Mapping: which channels go in and which one comes out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sysid.errors import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mapping:
+    """Which channels go in, which comes out; written ``BP+AR -> BC``.
+
+    Args:
+        inputs: Names of the input channels, at least one, all different.
+        output: Name of the output channel.
+
+    Raises:
+        ConfigError: If there is no input, or a channel appears twice.
+
+    Example:
+        >>> Mapping.parse("BP + AR -> BC")
+        Mapping(inputs=('BP', 'AR'), output='BC')
+    """
+
+    inputs: tuple[str, ...]
+    output: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inputs", tuple(self.inputs))
+        names = (*self.inputs, self.output)
+        if not self.inputs or not all(names) or len(set(names)) != len(names):
+            raise ConfigError(
+                "not a mapping of input channels to one output channel",
+                expected="different channel names on both sides, as in BP+AR -> BC",
+                got=str(self),
+                remedy="name each channel once; a model's own past output is an input by its structure",
+            )
+
+    def __str__(self) -> str:
+        return f"{'+'.join(self.inputs)} -> {self.output}"
+
+    @classmethod
+    def parse(cls, text: str) -> Mapping:
+        """Read a mapping from text.
+
+        Args:
+            text: Input names joined by ``+``, an arrow, the output name.
+
+        Returns:
+            The mapping.
+
+        Raises:
+            ConfigError: If the text does not have that form.
+        """
+        left, arrow, right = text.partition("->")
+        if not arrow:
+            raise ConfigError(
+                "not a mapping",
+                expected="input channels, an arrow and one output channel, as in BP+AR -> BC",
+                got=text,
+                remedy="write -> between inputs and output",
+            )
+        return cls(inputs=tuple(name.strip() for name in left.split("+")), output=right.strip())

@@ -1,0 +1,218 @@
+"""NARX: one tanh layer, and a linear part beside it, over past inputs and past outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.lags import Lags, LagSpec, parse_lags
+from sysid.models.mapping import Mapping
+from sysid.models.recursion import Recursion
+from sysid.models.scaling import Scaling
+
+CLAMP = 3.0
+"""Bound of the output in scaled numbers. Training data lie within -1 to 1; a free run that leaves three times
+that range is lost, and the bound keeps it finite, in training and wherever the model runs later."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NARX(AbstractStructure):
+    """Delays and neurons of a NARX network, as in MATLAB's ``narxnet``.
+
+    Args:
+        input_delays: Lags of every input: ``4`` for 1 to 4, ``"0:3"`` for a range, ``[0, 1, 2, 4]`` for a set.
+            Lag 0 is the direct input x(n). One such entry per input, in a list of lists, sets them apart.
+        output_delays: Lags of the output, in the same forms, from 1 on.
+        neurons: Number of tanh neurons.
+        feedthrough: A linear part from all regressors to the output beside the neurons.
+
+    Raises:
+        ConfigError: If a set of lags or the number of neurons cannot be used.
+
+    Example:
+        >>> NARX(input_delays=4, output_delays=4, neurons=20).label
+        'NARX 4/4/20'
+        >>> NARX(input_delays=[[0, 1], [1, 2, 4]], output_delays="1:2", neurons=5).lags(2).n_regressors
+        7
+    """
+
+    input_delays: tuple[tuple[int, ...], ...]
+    output_delays: tuple[int, ...]
+    neurons: int
+    feedthrough: bool = True
+
+    kind = "NARX"
+
+    def __init__(
+        self,
+        *,
+        input_delays: LagSpec | Iterable[LagSpec],
+        output_delays: LagSpec,
+        neurons: int,
+        feedthrough: bool = True,
+    ) -> None:
+        object.__setattr__(self, "input_delays", _per_input(input_delays))
+        object.__setattr__(self, "output_delays", parse_lags(output_delays, first=1, where="output_delays"))
+        object.__setattr__(self, "neurons", neurons)
+        object.__setattr__(self, "feedthrough", feedthrough)
+        if not isinstance(neurons, int) or neurons < 0 or (neurons == 0 and not feedthrough):
+            raise ConfigError(
+                "not a number of neurons",
+                where="neurons",
+                expected="a whole number from 1 on, or 0 with feedthrough",
+                got=repr(neurons),
+                remedy="write for example neurons: 20",
+            )
+
+    @property
+    def label(self) -> str:
+        """Delays and neurons as ``NARX 4/4/20``; other lag sets are written out by their ends and number."""
+        distinct = dict.fromkeys(self.input_delays)
+        inputs = ",".join(_short(lags) for lags in distinct)
+        return f"NARX {inputs}/{_short(self.output_delays)}/{self.neurons}"
+
+    def lags(self, n_inputs: int) -> Lags:
+        """The regressors for a number of inputs.
+
+        Args:
+            n_inputs: Inputs of the mapping.
+
+        Returns:
+            The regressors; one set of input delays serves every input.
+
+        Raises:
+            ConfigError: If several sets are given and their number is not that of the inputs.
+        """
+        if len(self.input_delays) not in {1, n_inputs}:
+            raise ConfigError(
+                "the sets of input delays do not match the inputs",
+                where="input_delays",
+                expected=f"one set, or {n_inputs}: one per input",
+                got=f"{len(self.input_delays)} sets",
+                remedy="give each input its own list, or one list for all",
+            )
+        inputs = self.input_delays * n_inputs if len(self.input_delays) == 1 else self.input_delays
+        return Lags(inputs=inputs, output=self.output_delays)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        return {
+            "kind": self.kind,
+            "input_delays": [list(lags) for lags in self.input_delays],
+            "output_delays": list(self.output_delays),
+            "neurons": self.neurons,
+            "feedthrough": self.feedthrough,
+        }
+
+
+def _per_input(spec: LagSpec | Iterable[LagSpec]) -> tuple[tuple[int, ...], ...]:
+    if isinstance(spec, (int, str)):
+        return (parse_lags(spec, first=0, where="input_delays"),)
+    entries = list(spec)
+    if entries and all(isinstance(entry, int) for entry in entries):
+        return (parse_lags([int(entry) for entry in entries if isinstance(entry, int)], first=0, where="input_delays"),)
+    return tuple(parse_lags(entry, first=0, where=f"input_delays, input {i + 1}") for i, entry in enumerate(entries))
+
+
+def _short(lags: tuple[int, ...]) -> str:
+    if lags == tuple(range(1, len(lags) + 1)):
+        return str(len(lags))
+    if lags == tuple(range(lags[0], lags[-1] + 1)):
+        return f"{lags[0]}:{lags[-1]}"
+    return f"{lags[0]}..{lags[-1]}({len(lags)})"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NARXModel(AbstractModel):
+    """A fitted NARX network.
+
+    Args:
+        network: The structure.
+        theta: Flat parameters ``[W | b | v | c | w]`` in scaled numbers (see :class:`Recursion`).
+        scaling: Between units and scaled numbers.
+        mapping: Which channels go in, which comes out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+        clamp: Bound of the output in scaled numbers.
+    """
+
+    network: NARX
+    theta: NDArray[np.float64]
+    scaling: Scaling
+    mapping: Mapping
+    sample_time: float
+    input_units: tuple[str, ...]
+    output_unit: str
+    rest_output: float
+    clamp: float = CLAMP
+
+    def __post_init__(self) -> None:
+        theta = np.array(self.theta, dtype=np.float64)
+        theta.setflags(write=False)
+        object.__setattr__(self, "theta", theta)
+        object.__setattr__(self, "input_units", tuple(self.input_units))
+
+    @property
+    def structure(self) -> NARX:
+        """Delays and neurons."""
+        return self.network
+
+    @property
+    def n_parameters(self) -> int:
+        """Length of ``theta``."""
+        return len(self.theta)
+
+    @property
+    def recursion(self) -> Recursion:
+        """The form that is run and exported."""
+        return Recursion(
+            lags=self.network.lags(len(self.mapping.inputs)),
+            neurons=self.network.neurons,
+            theta=self.theta,
+            scaling=self.scaling,
+            low=-self.clamp,
+            high=self.clamp,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return {
+            "structure": self.network.to_dict(),
+            "mapping": str(self.mapping),
+            "sample_time": self.sample_time,
+            "input_units": list(self.input_units),
+            "output_unit": self.output_unit,
+            "rest_output": self.rest_output,
+            "clamp": self.clamp,
+            "scaling": {
+                "input_offset": list(self.scaling.input_offset),
+                "input_scale": list(self.scaling.input_scale),
+                "output_offset": self.scaling.output_offset,
+                "output_scale": self.scaling.output_scale,
+            },
+            "theta": self.theta.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> NARXModel:
+        """The model that :meth:`to_dict` wrote."""
+        network = {key: value for key, value in fields["structure"].items() if key != "kind"}
+        scaling: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields["scaling"].items()}
+        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output", "clamp")}
+        return cls(
+            network=NARX(**network),
+            theta=np.array(fields["theta"], dtype=np.float64),
+            scaling=Scaling(**scaling),
+            mapping=Mapping.parse(fields["mapping"]),
+            input_units=tuple(fields["input_units"]),
+            **rest,
+        )

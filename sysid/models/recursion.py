@@ -1,0 +1,164 @@
+"""The form that every model with lagged regressors lowers to, run by the compiled kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import TraceError
+from sysid.kernels import recursion as kernel
+from sysid.models.history import History
+from sysid.models.lags import Lags
+from sysid.models.scaling import Scaling
+
+
+def parameter_count(lags: Lags, neurons: int, *, linear: bool) -> int:
+    """Length of the flat parameter vector ``[W | b | v | c | w]``.
+
+    Args:
+        lags: The regressors.
+        neurons: Number of tanh neurons.
+        linear: Whether there is a linear part beside them.
+
+    Returns:
+        Number of parameters.
+    """
+    r = lags.n_regressors
+    return neurons * (r + 2) + 1 + (r if linear else 0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recursion:
+    r"""A tanh layer and a linear part over lagged regressors, scaling included.
+
+    In scaled numbers :math:`\hat y_t = \mathrm{clip}(w^T x_t + c + \sum_k v_k \tanh(W_k x_t + b_k))`; the
+    kernel's docstring has the derivation. Exporters read this form, so that what runs elsewhere is what was
+    fitted.
+
+    Args:
+        lags: The regressors.
+        neurons: Number of tanh neurons; 0 for a linear model.
+        theta: Flat parameters ``[W | b | v | c | w]``, with or without ``w``.
+        scaling: Between units and scaled numbers.
+        low: Lower bound of the output in scaled numbers; ``-inf`` for none.
+        high: Upper bound of the output in scaled numbers; ``inf`` for none.
+    """
+
+    lags: Lags
+    neurons: int
+    theta: NDArray[np.float64]
+    scaling: Scaling
+    low: float = -np.inf
+    high: float = np.inf
+
+    def __post_init__(self) -> None:
+        theta = np.array(self.theta, dtype=np.float64)
+        theta.setflags(write=False)
+        object.__setattr__(self, "theta", theta)
+        sizes = {parameter_count(self.lags, self.neurons, linear=linear) for linear in (True, False)}
+        if theta.ndim != 1 or len(theta) not in sizes:
+            raise TraceError(
+                "the parameter vector does not fit the structure",
+                expected=f"{' or '.join(str(size) for size in sorted(sizes))} parameters",
+                got=f"shape {theta.shape}",
+                remedy="use parameters that were fitted with this structure",
+            )
+
+    @property
+    def hidden_weights(self) -> NDArray[np.float64]:
+        """``W``, shape ``(n_neurons, n_regressors)``."""
+        n = self.neurons * self.lags.n_regressors
+        return self.theta[:n].reshape(self.neurons, self.lags.n_regressors)
+
+    @property
+    def hidden_bias(self) -> NDArray[np.float64]:
+        """``b``, shape ``(n_neurons,)``."""
+        n = self.neurons * self.lags.n_regressors
+        return self.theta[n : n + self.neurons]
+
+    @property
+    def readout(self) -> NDArray[np.float64]:
+        """``v``, shape ``(n_neurons,)``."""
+        n = self.neurons * (self.lags.n_regressors + 1)
+        return self.theta[n : n + self.neurons]
+
+    @property
+    def constant(self) -> float:
+        """``c``."""
+        return float(self.theta[self.neurons * (self.lags.n_regressors + 2)])
+
+    @property
+    def linear(self) -> NDArray[np.float64]:
+        """``w``, shape ``(n_regressors,)``; zeros where the model has no linear part."""
+        w = self.theta[self.neurons * (self.lags.n_regressors + 2) + 1 :]
+        return w if len(w) else np.zeros(self.lags.n_regressors)
+
+    def extended(
+        self, inputs: NDArray[np.float64], history: History
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Scaled inputs with their past, and room for the output after its past.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+            history: The samples before.
+
+        Returns:
+            Inputs of shape ``(depth + n_samples, n_inputs)`` and output of shape ``(depth + n_samples,)``,
+            both scaled; the output's last ``n_samples`` are zero.
+
+        Raises:
+            TraceError: If the number of inputs is not the model's.
+        """
+        inputs = np.asarray(inputs, dtype=np.float64)
+        if inputs.ndim != 2 or inputs.shape[1] != self.lags.n_inputs or history.inputs.shape[1] != self.lags.n_inputs:
+            raise TraceError(
+                "the inputs do not fit the model",
+                expected=f"inputs and history of shape (n, {self.lags.n_inputs})",
+                got=f"shapes {inputs.shape} and {history.inputs.shape}",
+                remedy="give one column per input of the mapping, in its order",
+            )
+        past_inputs, past_output = history.padded(self.lags.depth)
+        u = self.scaling.scale_inputs(np.concatenate([past_inputs, inputs]))
+        y = np.concatenate([self.scaling.scale_output(past_output), np.zeros(len(inputs))])
+        return u, y
+
+    def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
+        """Free run: the model is fed its own past output.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+            history: The samples before.
+
+        Returns:
+            Output of shape ``(n_samples,)``, in its unit.
+        """
+        u, y = self.extended(inputs, history)
+        kernel.free_run(u, y, *self._arguments(len(inputs)))
+        return self.scaling.unscale_output(y[self.lags.depth :])
+
+    def predict(
+        self, inputs: NDArray[np.float64], output: NDArray[np.float64], history: History, steps: int
+    ) -> NDArray[np.float64]:
+        """Prediction ``steps`` ahead: measured output up to ``t - steps``, the model's own after it.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+            output: Measured output, shape ``(n_samples,)``.
+            history: The samples before.
+            steps: How far ahead, at least 1.
+
+        Returns:
+            Predicted output of shape ``(n_samples,)``; its first ``steps`` samples start from the history.
+        """
+        u, y = self.extended(inputs, history)
+        measured = y.copy()
+        measured[self.lags.depth :] = self.scaling.scale_output(np.asarray(output, dtype=np.float64))
+        kernel.predict(u, measured, y, steps, *self._arguments(len(inputs)))
+        return self.scaling.unscale_output(y[self.lags.depth :])
+
+    def _arguments(self, n_steps: int) -> tuple[object, ...]:
+        lags = self.lags
+        tables = (lags.input_channel, lags.input_lag, lags.output_lag)
+        return (lags.depth, n_steps, *tables, self.theta, self.neurons, self.low, self.high)

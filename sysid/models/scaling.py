@@ -1,0 +1,72 @@
+"""Scaling: the affine map between the channels' units and the model's own numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scaling:
+    """``scaled = (value - offset) / scale`` for each input and for the output.
+
+    Args:
+        input_offset: One per input, in its unit.
+        input_scale: One per input, in its unit, positive.
+        output_offset: In the output's unit.
+        output_scale: In the output's unit, positive.
+    """
+
+    input_offset: tuple[float, ...]
+    input_scale: tuple[float, ...]
+    output_offset: float
+    output_scale: float
+
+    @classmethod
+    def identity(cls, n_inputs: int) -> Scaling:
+        """Values as they are.
+
+        Args:
+            n_inputs: Number of inputs.
+
+        Returns:
+            Offsets 0 and scales 1.
+        """
+        return cls(input_offset=(0.0,) * n_inputs, input_scale=(1.0,) * n_inputs, output_offset=0.0, output_scale=1.0)
+
+    @classmethod
+    def to_unit_range(cls, inputs: Sequence[NDArray[np.float64]], outputs: Sequence[NDArray[np.float64]]) -> Scaling:
+        """Map the range seen in the records onto -1 to 1 (MATLAB's ``mapminmax``).
+
+        Args:
+            inputs: Each record's inputs, shape ``(n_samples, n_inputs)``.
+            outputs: Each record's output, shape ``(n_samples,)``.
+
+        Returns:
+            The scaling; a channel that does not vary keeps scale 1.
+        """
+        low = np.min([record.min(axis=0) for record in inputs], axis=0)
+        high = np.max([record.max(axis=0) for record in inputs], axis=0)
+        y_low, y_high = min(y.min() for y in outputs), max(y.max() for y in outputs)
+        half = np.where(high > low, (high - low) / 2.0, 1.0)
+        return cls(
+            input_offset=tuple(float(value) for value in (high + low) / 2.0),
+            input_scale=tuple(float(value) for value in half),
+            output_offset=float(y_high + y_low) / 2.0,
+            output_scale=float(y_high - y_low) / 2.0 if y_high > y_low else 1.0,
+        )
+
+    def scale_inputs(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Inputs in the model's numbers, shape ``(n_samples, n_inputs)``."""
+        return np.ascontiguousarray((inputs - np.array(self.input_offset)) / np.array(self.input_scale))
+
+    def scale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Outputs in the model's numbers, any shape."""
+        return (output - self.output_offset) / self.output_scale
+
+    def unscale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Outputs in the channel's unit, any shape."""
+        return output * self.output_scale + self.output_offset

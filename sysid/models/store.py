@@ -1,0 +1,70 @@
+"""Models from data: the one table that says which kind of structure belongs to which class."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from typing import Any
+
+from sysid.errors import ConfigError
+from sysid.models.arx import ARX, ARXModel
+from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.narx import NARX, NARXModel
+
+_MODELS: dict[str, type[AbstractModel]] = {ARX.kind: ARXModel, NARX.kind: NARXModel}
+_STRUCTURES: dict[str, type[AbstractStructure]] = {ARX.kind: ARX, NARX.kind: NARX}
+
+
+def _check_kind(kind: object) -> str:
+    if not isinstance(kind, str) or kind not in _MODELS:
+        raise ConfigError(
+            "unknown kind of model",
+            expected=f"one of {', '.join(_MODELS)}",
+            got=repr(kind),
+            remedy="correct the kind, or use the version of the workbench that wrote it",
+        )
+    return kind
+
+
+def model_from_dict(fields: Dict[str, Any]) -> AbstractModel:
+    """Build the model that some model's ``to_dict`` wrote.
+
+    Args:
+        fields: What it wrote.
+
+    Returns:
+        The model.
+
+    Raises:
+        ConfigError: If the kind is unknown or a field is missing.
+    """
+    kind = _check_kind(fields.get("structure", {}).get("kind"))
+    try:
+        return _MODELS[kind].from_dict(fields)
+    except KeyError as error:
+        raise ConfigError(
+            f"the stored {kind} model lacks the field {error}", remedy="store the model again; this file is incomplete"
+        ) from error
+
+
+def structure_from_dict(fields: Dict[str, Any]) -> AbstractStructure:
+    """Build a structure from its fields.
+
+    Args:
+        fields: ``kind`` and the structure's own fields.
+
+    Returns:
+        The structure.
+
+    Raises:
+        ConfigError: If the kind is unknown, or the fields are not the structure's.
+    """
+    kind = _check_kind(fields.get("kind"))
+    try:
+        return _STRUCTURES[kind](**{key: value for key, value in fields.items() if key != "kind"})
+    except TypeError as error:
+        raise ConfigError(
+            f"not the fields of the structure {kind}",
+            expected=", ".join(_STRUCTURES[kind].__dataclass_fields__),  # type: ignore[attr-defined]  # all are dataclasses
+            got=", ".join(fields),
+            remedy="correct the field's name",
+        ) from error

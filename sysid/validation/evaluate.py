@@ -1,0 +1,136 @@
+"""A model over every case, in free run and one step ahead, told apart everywhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models import AbstractModel, Start
+from sysid.traces import Role, Trace, TraceSet
+from sysid.validation.metrics import Figures, figures
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseResult:
+    """One model on one case.
+
+    Args:
+        case: Name of the trace.
+        role: What the trace was used for.
+        free_run: Figures of the free run, the one that counts.
+        one_step: Figures of the prediction one step ahead from measured output.
+        run_time_s: Seconds that the free run took: median of repeats, warm.
+        time: Seconds, shape ``(n_samples,)``.
+        target: Measured output, shape ``(n_samples,)``.
+        simulated: Free run, shape ``(n_samples,)``.
+        predicted: One step ahead, shape ``(n_samples,)``.
+    """
+
+    case: str
+    role: Role
+    free_run: Figures
+    one_step: Figures
+    run_time_s: float
+    time: NDArray[np.float64]
+    target: NDArray[np.float64]
+    simulated: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures and run time as JSON values, without the signals."""
+        return {
+            "role": self.role.value,
+            "free_run": self.free_run.to_dict(),
+            "one_step": self.one_step.to_dict(),
+            "run_time_s": self.run_time_s,
+            "n_samples": len(self.target),
+            "simulated_s": float(self.time[-1] - self.time[0]),
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evaluation:
+    """One model on all cases.
+
+    Args:
+        cases: Results by name of the case, in the data set's order.
+    """
+
+    cases: Dict[str, CaseResult]
+
+    def mean_mse(self, *roles: Role) -> float:
+        """Mean over cases of the free run's mean squared error.
+
+        Args:
+            roles: Only cases with one of these roles; all if none is given.
+
+        Returns:
+            The mean in the output's unit squared; NaN if there is no such case.
+        """
+        values = [c.free_run.mse for c in self.cases.values() if not roles or c.role in roles]
+        return float(np.mean(values)) if values else float("nan")
+
+
+def evaluate(model: AbstractModel, traces: TraceSet, start: Start, *, repeats: int = 5) -> Evaluation:
+    """Run a model over every trace of a set.
+
+    Args:
+        model: The model.
+        traces: The cases.
+        start: How each free run begins, and from which sample on it is scored.
+        repeats: Timed repetitions of each free run, after one that warms up.
+
+    Returns:
+        The evaluation.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+    """
+    return Evaluation(
+        cases={trace.name: evaluate_case(model, trace, traces.roles[trace.name], start, repeats) for trace in traces}
+    )
+
+
+def evaluate_case(model: AbstractModel, trace: Trace, role: Role, start: Start, repeats: int) -> CaseResult:
+    """Run a model over one trace.
+
+    Args:
+        model: The model.
+        trace: The case.
+        role: What it was used for.
+        start: How the free run begins, and from which sample on it is scored.
+        repeats: Timed repetitions of the free run.
+
+    Returns:
+        The result.
+
+    Raises:
+        ChannelError: If the trace lacks a channel of the mapping.
+    """
+    inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
+    history = start.history(inputs, target, model.rest_output)
+    scored = slice(start.n_measured, None)
+    inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
+    simulated = model.simulate(inputs, history)
+    seconds = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        model.simulate(inputs, history)
+        seconds.append(time.perf_counter() - began)
+    predicted = model.predict(inputs, target, history)
+    return CaseResult(
+        case=trace.name,
+        role=role,
+        free_run=figures(target, simulated, model.output_unit, counted),
+        one_step=figures(target, predicted, model.output_unit, counted),
+        run_time_s=float(np.median(seconds)),
+        time=trace.time[scored],
+        target=target,
+        simulated=simulated,
+        predicted=predicted,
+    )
