@@ -107,12 +107,14 @@ class LevenbergMarquardt:
         evidence_after: Iterations before the precisions are first updated: while the fit is far from a
             minimum, its residuals say nothing about noise. ``None`` keeps the prior as it is.
         on_iteration: Called after every iteration.
+        should_stop: Asked after every iteration; true ends the fit with the status ``INTERRUPTED``.
     """
 
     termination: Termination = field(default_factory=Termination)
     damping: MarquardtDamping = field(default_factory=MarquardtDamping)
     evidence_after: int | None = 20
     on_iteration: Callable[[Iteration], None] = _ignore
+    should_stop: Callable[[], bool] = lambda: False
 
     def minimise(self, provider: AbstractProvider, theta: NDArray[np.float64], prior: Prior) -> Solution:
         """Fit the parameters.
@@ -145,6 +147,8 @@ class LevenbergMarquardt:
                         losses=list(state.losses),
                         damping=state.damping.factor,
                     )
+                    if status is None and self.should_stop():
+                        status = Status.INTERRUPTED
             except KeyboardInterrupt:
                 status = Status.INTERRUPTED
         if status is Status.STALLED and state.at.loss >= first.at.loss:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -197,7 +197,9 @@ class RecursionProvider(AbstractProvider):
             blocks += [block.copy() for _, block in self._blocks(record, theta, h, c)]
         return np.concatenate(blocks)
 
-    def _blocks(self, record: _Record, theta: NDArray[np.float64], h: NDArray[np.float64], c: NDArray[np.float64]):  # type: ignore[no-untyped-def]  # a generator of (first, rows)
+    def _blocks(
+        self, record: _Record, theta: NDArray[np.float64], h: NDArray[np.float64], c: NDArray[np.float64]
+    ) -> Iterator[tuple[int, NDArray[np.float64]]]:
         lags = self.template.lags
         carry = max(lags.output, default=0) if self.closed else 0
         n = len(record.target)

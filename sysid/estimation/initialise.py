@@ -1,0 +1,104 @@
+"""Where a network's fit starts: random hidden layer, and a linear part that repeats the last output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.regularisation import Group, Prior
+from sysid.models import Lags
+
+READOUT_SPREAD = 1e-2
+"""Standard deviation of the initial readout. Small, so that the first free run is the linear part's: bounded, and
+with gradients that mean something."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """Where each part of the flat parameter vector ``[W | b | v | c | w]`` stands.
+
+    Args:
+        lags: The regressors.
+        neurons: Number of neurons.
+        linear: Whether there is a linear part.
+    """
+
+    lags: Lags
+    neurons: int
+    linear: bool
+
+    @property
+    def hidden(self) -> slice:
+        """Weights and biases of the tanh layer."""
+        return slice(0, self.neurons * (self.lags.n_regressors + 1))
+
+    @property
+    def readout(self) -> slice:
+        """Weights from the neurons to the output."""
+        return slice(self.hidden.stop, self.hidden.stop + self.neurons)
+
+    @property
+    def affine(self) -> slice:
+        """Constant and linear part."""
+        return slice(self.readout.stop, self.readout.stop + 1 + (self.lags.n_regressors if self.linear else 0))
+
+    @property
+    def last_output(self) -> int | None:
+        """Position of the linear weight of ``y(t-1)``; ``None`` if there is none."""
+        if not self.linear or 1 not in self.lags.output:
+            return None
+        return int(self.readout.stop) + 1 + len(self.lags.input_lag) + self.lags.output.index(1)
+
+    def centre(self) -> NDArray[np.float64]:
+        """What the prior draws the parameters to: "the output stays as it is", zero for everything else.
+
+        Sampled fast, a system's next output is close to its last; drawing the weight of ``y(t-1)`` to 1 instead
+        of 0 lets the regularisation shrink towards a model that holds, not one that collapses.
+        """
+        centre = np.zeros(self.affine.stop)
+        if self.last_output is not None:
+            centre[self.last_output] = 1.0
+        return centre
+
+    def prior(self, *, alpha: float, beta: float) -> Prior:
+        """The prior a fit begins with.
+
+        Args:
+            alpha: Precision of every group.
+            beta: Precision of the residuals.
+
+        Returns:
+            Groups ``hidden``, ``readout`` and ``linear`` around :meth:`centre`.
+        """
+        parts = {"hidden": self.hidden, "readout": self.readout, "linear": self.affine}
+        groups = tuple(
+            Group(name=name, members=np.arange(part.start, part.stop))
+            for name, part in parts.items()
+            if part.stop > part.start
+        )
+        return Prior(centre=self.centre(), groups=groups, alphas=np.full(len(groups), alpha), beta=beta)
+
+    def draw(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """A random start after Nguyen and Widrow 1990.
+
+        Directions are random, their length ``0.7 * neurons ** (1 / n_regressors)`` and the biases spread over it,
+        so that the active regions of the neurons tile the unit cube in which scaled data lie.
+
+        Args:
+            rng: Source of randomness.
+
+        Returns:
+            Flat parameters.
+        """
+        r, k = self.lags.n_regressors, self.neurons
+        theta = self.centre()
+        if k:
+            directions = rng.uniform(-1.0, 1.0, (k, r))
+            length = 0.7 * k ** (1.0 / r)
+            weights = length * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+            biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
+            theta[self.hidden] = np.concatenate([weights.ravel(), biases])
+            theta[self.readout] = READOUT_SPREAD * rng.standard_normal(k)
+        return theta
