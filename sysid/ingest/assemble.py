@@ -1,0 +1,372 @@
+"""A raw table to a trace: channels, units, repairs, the time grid, rounding."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError, TraceError, UnitError, UserError
+from sysid.ingest import repairs as repair
+from sysid.ingest.grid import Gridded, fill, grid_places, place, resample
+from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions
+from sysid.ingest.repairs import Record
+from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.timing import Timing, survey
+from sysid.traces import Channel, Trace
+from sysid.units import Reference, convert
+
+T = TypeVar("T", str, Reference)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What a trace shall be.
+
+    Args:
+        name: Name of the case.
+        channels: The channels, with the units and references they shall have.
+        sample_time: Seconds between samples.
+        decimals: Decimals to round to, by channel.
+        start: Seconds, in the file's time: what is before is cut off.
+        stop: Seconds, in the file's time: what is after is cut off.
+    """
+
+    name: str
+    channels: tuple[Channel, ...]
+    sample_time: float
+    decimals: Mapping[str, int] = field(default_factory=dict)
+    start: float | None = None
+    stop: float | None = None
+
+
+def assemble(
+    table: RawTable, wanted: Wanted, *, files: FileOptions, grid: GridOptions, repairs: RepairOptions
+) -> Trace:
+    """Make a trace of a raw table.
+
+    Args:
+        table: The file as columns.
+        wanted: What the trace shall be.
+        files: Where channels and time are in the file, and in which units.
+        grid: How samples come onto the grid.
+        repairs: Which repairs may be made.
+
+    Returns:
+        The trace; its provenance says what was done.
+
+    Raises:
+        ChannelError: If a column is missing.
+        UnitError: If a unit is missing, unknown or of another quantity.
+        TraceError: If something is wrong with the samples and its repair was not asked for.
+        ConfigError: If the options do not fit the file.
+    """
+    record = _select(table, wanted, files)
+    for step in repair.STEPS:
+        record = step(record, repairs)
+    record = _cut(record, wanted)
+    if len(record.stamps) < grid.fewest_samples:
+        raise TraceError(
+            "the record has too few samples",
+            where=table.source,
+            expected=f"at least {grid.fewest_samples}",
+            got=len(record.stamps),
+            remedy="record longer, widen start and stop, or lower grid: {fewest_samples: ...}",
+        )
+    record = repair.missing_values(record, repairs)
+    record = repair.constants(record, repairs)
+    gridded, record = _onto_grid(record, wanted, grid, repairs)
+    values, usable, notes = _close_gaps(gridded, repairs, source=table.source, sample_time=wanted.sample_time)
+    values, rounded = round_channels(values, wanted.channels, wanted.decimals)
+    return Trace(
+        name=wanted.name,
+        sample_time=wanted.sample_time,
+        channels=wanted.channels,
+        values=values,
+        start_time=gridded.start,
+        usable=usable,
+        provenance=(*record.notes, *notes, *rounded),
+    )
+
+
+def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
+    """The channels that are wanted, in their units, and the stamps in seconds."""
+    _check_names(wanted.channels, files, table.source)
+    digest = hashlib.sha256(table.source.read_bytes()).hexdigest()
+    notes = [f"read from {table.source.name} (SHA-256 {digest[:16]})", *table.notes]
+    stamps = _stamps(table, files)
+    columns = []
+    for channel in wanted.channels:
+        given = files.columns.get(channel.name, ColumnOptions(column=channel.name))
+        column = table.find(given.column)
+        values, note = _in_unit(column, channel, given, files, table.source)
+        columns.append(values)
+        notes += [note] if note else []
+    return Record(
+        table=table,
+        rows=np.arange(len(table), dtype=np.intp),
+        stamps=stamps,
+        names=tuple(channel.name for channel in wanted.channels),
+        values=np.column_stack(columns),
+        marked=np.zeros(len(table), dtype=np.bool_),
+        notes=tuple(notes),
+    )
+
+
+def _check_names(channels: Sequence[Channel], files: FileOptions, source: Path) -> None:
+    names = {channel.name for channel in channels}
+    groups = {"columns": files.columns, "units": files.units, "references": files.references}
+    for field_name, group in groups.items():
+        strangers = sorted(set(group) - names) if isinstance(group, Mapping) else []
+        if strangers:
+            raise ConfigError(
+                f"{field_name} names {strangers[0]}, which is not a channel",
+                where=f"the description of {source}, field source.files.{field_name}",
+                expected=f"one of {', '.join(sorted(names))}",
+                got=strangers[0],
+                remedy="write channel names on the left, column names or values on the right",
+            )
+
+
+def _stamps(table: RawTable, files: FileOptions) -> NDArray[np.float64]:
+    if files.time.step is not None:
+        return files.time.step * np.arange(len(table), dtype=np.float64)
+    name = files.time.column or table.time
+    if name is None:
+        raise TraceError(
+            "no time column was recognised",
+            where=table.source,
+            expected="a column named t or time, or one with a unit of time",
+            got=", ".join(table.names),
+            remedy="name it: files: {time: 't [ms]'}, or, for a file without one, files: {time: {step: 0.1}}",
+        )
+    column = table.find(name)
+    unit = column.unit if files.time.unit in {None, "datetime"} else files.time.unit
+    if unit is None:
+        raise UnitError(
+            "the time column has no unit",
+            where=f"{table.source}, column {column.name}",
+            expected="s, ms, min or another unit of time",
+            got="none",
+            remedy=f"write files: {{time: '{column.name} [s]'}}",
+        )
+    return _converted(column.values, unit, "s", where=f"{table.source}, column {column.name}")
+
+
+def _in_unit(
+    column: RawColumn, channel: Channel, given: ColumnOptions, files: FileOptions, source: Path
+) -> tuple[NDArray[np.float64], str | None]:
+    where = f"{source}, channel {channel.name} (column {column.name})"
+    declared = given.unit or _for_channel(files.units, channel.name)
+    unit = declared or column.unit
+    if unit is None:
+        raise UnitError(
+            "a column has no unit",
+            where=where,
+            expected="a unit in the file or in the description",
+            got="none",
+            remedy=f"write files: {{units: {{{channel.name}: {channel.unit}}}}} if it is {channel.unit}",
+        )
+    reference = given.reference or _for_channel(files.references, channel.name) or column.reference
+    if channel.reference is not Reference.NONE and reference is None:
+        raise UnitError(
+            "the file does not say what a pressure is measured from",
+            where=where,
+            expected="gauge or absolute",
+            got="neither",
+            remedy=f"write files: {{references: {{{channel.name}: gauge}}}} or absolute",
+        )
+    if channel.reference is Reference.NONE and isinstance(files.references, Reference):
+        reference = column.reference  # one reference for all pressures is not meant for the others
+    values = _converted(
+        column.values, unit, channel.unit, where=where, reference=reference, to_reference=channel.reference
+    )
+    notes = []
+    if declared and column.unit and declared != column.unit:
+        notes.append(f"taken as {declared} although the file says {column.unit}")
+    origin, target = reference or Reference.NONE, channel.reference
+    if (unit, origin) != (channel.unit, target):
+        notes.append(f"converted from {_label(unit, origin)} to {_label(channel.unit, target)}")
+    return values, f"{channel.name}: {', '.join(notes)}" if notes else None
+
+
+def _for_channel(given: T | Mapping[str, T], name: str) -> T | None:
+    return given.get(name) if isinstance(given, Mapping) else given
+
+
+def _label(unit: str, reference: Reference) -> str:
+    return unit if reference is Reference.NONE else f"{unit} {reference.value}"
+
+
+def _converted(
+    values: NDArray[np.float64],
+    unit: str,
+    to_unit: str,
+    *,
+    where: str,
+    reference: Reference | None = None,
+    to_reference: Reference = Reference.NONE,
+) -> NDArray[np.float64]:
+    reference = reference or Reference.NONE
+    if unit == to_unit and reference is to_reference:
+        return values
+    try:
+        return convert(values, unit, to_unit, reference=reference, to_reference=to_reference)
+    except UnitError as error:
+        raise UnitError(error.what, where=where, expected=error.expected, got=error.got, remedy=error.remedy) from error
+
+
+def _cut(record: Record, wanted: Wanted) -> Record:
+    if wanted.start is None and wanted.stop is None:
+        return record
+    fuzz = 1e-9 * wanted.sample_time + 4.0 * np.spacing(np.abs(record.stamps).max())
+    low = -np.inf if wanted.start is None else wanted.start - fuzz
+    high = np.inf if wanted.stop is None else wanted.stop + fuzz
+    keep = (record.stamps >= low) & (record.stamps <= high)
+    if not keep.any():
+        raise TraceError(
+            "nothing is left between start and stop",
+            where=record.table.source,
+            expected=f"times between {record.stamps[0]:g} s and {record.stamps[-1]:g} s",
+            got=f"start {wanted.start}, stop {wanted.stop}",
+            remedy="correct start and stop; they are seconds in the file's own time",
+        )
+    return record.keep(
+        keep, f"cut to {int(keep.sum())} of {len(keep)} samples by start {wanted.start}, stop {wanted.stop}"
+    )
+
+
+def _onto_grid(record: Record, wanted: Wanted, grid: GridOptions, repairs: RepairOptions) -> tuple[Gridded, Record]:
+    stamps, sample_time = record.stamps, wanted.sample_time
+    start = float(stamps[0])
+    timing = survey(stamps, longest_step=grid.longest_step)
+    if len(timing.gaps) and repairs.gaps is None:
+        raise _gap_error(record, timing)
+    places = grid_places(stamps, sample_time, start=start, tolerance=grid.tolerance)
+    if places is not None and np.array_equal(np.flatnonzero(np.diff(places) > 1), timing.gaps):
+        return place(stamps, record.values, places, record.marked), record
+    uneven = timing.jitter > grid.tolerance * timing.step
+    if uneven and repairs.jitter is None:
+        raise _jitter_error(record, timing, grid)
+    if grid.method is None:
+        raise _step_error(record, timing, wanted, uneven=uneven)
+    if grid.method == "average" and timing.median_step > sample_time * (1.0 + grid.tolerance):
+        raise ConfigError(
+            "there is nothing to average: the record is slower than the sample time",
+            where=record.table.source,
+            expected=f"a step of at most {sample_time:g} s",
+            got=f"{timing.median_step:g} s",
+            remedy="choose grid: {method: linear} or {method: hold}, or a longer sample_time",
+        )
+    longest = grid.longest_step or 1.5 * timing.median_step
+    gridded = resample(
+        stamps,
+        record.values,
+        sample_time=sample_time,
+        method=grid.method,
+        start=start,
+        longest_step=max(longest, sample_time) if grid.method == "average" else longest,
+        marked=record.marked,
+    )
+    told = f"resampled ({grid.method}) from a step of {timing.step:.6g} s to {sample_time:g} s"
+    return gridded, record.noted(f"{told}, jitter {timing.jitter:.3g} s" if uneven else told)
+
+
+def _gap_error(record: Record, timing: Timing) -> TraceError:
+    first = int(timing.gaps[0])
+    return TraceError(
+        f"{timing.missing} samples are missing in {len(timing.gaps)} gaps",
+        where=record.where(first),
+        expected=f"the next sample {timing.median_step:g} s later",
+        got=f"{record.stamps[first + 1] - record.stamps[first]:g} s later",
+        remedy="ask for repairs: {gaps: linear}, {gaps: hold} or {gaps: mask}; for a record whose stamps are "
+        "far apart by nature, say from where on a step is a gap (grid: {longest_step: ...})",
+    )
+
+
+def _jitter_error(record: Record, timing: Timing, grid: GridOptions) -> TraceError:
+    steps = np.diff(record.stamps)
+    steps[timing.gaps] = timing.median_step  # gaps are dealt with by themselves
+    worst = int(np.argmax(np.abs(steps - timing.median_step)))
+    return TraceError(
+        "the time stamps are uneven (jitter)",
+        where=record.where(worst),
+        expected=f"steps of {timing.step:g} s to within {100 * grid.tolerance:g} % of one",
+        got=f"stamps up to {timing.jitter:g} s off, steps from {steps.min():g} s to {steps.max():g} s",
+        remedy="ask for repairs: {jitter: resample} with grid: {method: linear} or {method: hold}, "
+        "or allow more (grid: {tolerance: ...})",
+    )
+
+
+def _step_error(record: Record, timing: Timing, wanted: Wanted, *, uneven: bool) -> UserError:
+    if uneven:
+        return ConfigError(
+            "repairs: {jitter: resample} needs a method",
+            where=f"the description of {record.table.source}",
+            expected="grid: {method: linear}, {method: hold} or {method: average}",
+            got="no method",
+            remedy="add grid: {method: linear} to source",
+        )
+    return TraceError(
+        "the record has another sample time than the data set",
+        where=record.table.source,
+        expected=f"{wanted.sample_time:g} s between samples",
+        got=f"{timing.step:.9g} s",
+        remedy=f"write sample_time: {timing.step:.6g}, or ask for a resampling: grid: {{method: average}} to "
+        "decimate, {method: linear} or {method: hold} to interpolate; check the unit of time too",
+    )
+
+
+def _empty_error(gridded: Gridded, source: Path, sample_time: float) -> TraceError:
+    first = int(np.flatnonzero(gridded.empty)[0])
+    return TraceError(
+        f"{int(gridded.empty.sum())} intervals of the grid hold no sample",
+        where=f"{source}, at {gridded.start + first * sample_time:g} s",
+        expected=f"at least one sample in every {sample_time:g} s",
+        got="none",
+        remedy="ask for repairs: {gaps: linear}, {gaps: hold} or {gaps: mask}, or choose a longer sample_time",
+    )
+
+
+def _close_gaps(
+    gridded: Gridded, repairs: RepairOptions, *, source: Path, sample_time: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_] | None, list[str]]:
+    """Values without holes, the mask where one is needed, and what was done."""
+    notes = []
+    values, usable = gridded.values, ~gridded.tainted
+    if gridded.empty.any():
+        count, method = int(gridded.empty.sum()), repairs.gaps
+        if method is None:
+            raise _empty_error(gridded, source, sample_time)
+        values = fill(gridded, "hold" if method == "hold" else "linear")
+        if method == "mask":
+            usable = usable & ~gridded.empty
+        notes.append(f"{count} missing samples {'masked' if method == 'mask' else f'filled ({method})'}")
+    return values, None if usable.all() else usable, notes
+
+
+def round_channels(
+    values: NDArray[np.float64], channels: Sequence[Channel], decimals: Mapping[str, int]
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Round channels to decimals.
+
+    Args:
+        values: Shape ``(n_samples, n_channels)``.
+        channels: What the columns are.
+        decimals: Decimals by channel; those not named are left as they are.
+
+    Returns:
+        The values, and one sentence per channel that was rounded.
+    """
+    rounded = np.array(values, dtype=np.float64)
+    notes = []
+    for index, channel in enumerate(channels):
+        if channel.name in decimals:
+            rounded[:, index] = np.round(rounded[:, index], decimals[channel.name])
+            notes.append(f"{channel.name}: rounded to {decimals[channel.name]} decimals")
+    return rounded, notes

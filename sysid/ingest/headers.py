@@ -1,0 +1,110 @@
+"""What a column header says: name, unit, and what a pressure is measured from."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from sysid.errors import UnitError
+from sysid.units import Reference, check_unit
+
+_BRACKETS = re.compile(r"^(?P<name>.*?\S)\s*\[(?P<unit>[^\[\]]*)\]\s*$", re.DOTALL)
+_PARENTHESES = re.compile(r"^(?P<name>.*?\S)\s*\((?P<unit>[^()]*(?:\([ag]\))?)\)\s*$", re.DOTALL)
+_REFERENCE_WORD = re.compile(r"^(?P<unit>.*?\S)\s*(?:\b|\()(?P<word>gauge|absolute|abs|[ga](?=\)$))\)?$", re.IGNORECASE)
+_FUSED = {
+    "barg": ("bar", Reference.GAUGE),
+    "bara": ("bar", Reference.ABSOLUTE),
+    "psig": ("psi", Reference.GAUGE),
+    "psia": ("psi", Reference.ABSOLUTE),
+}
+_ALIASES = {"-": "1", "–": "1", "°c": "degC", "°f": "degF", "%": "percent", "sec": "s", "seconds": "s"}
+# pint evaluates the exponents of a unit: 9**9**9**9 in a header would keep it busy for ever.
+_TOWER = re.compile(r"(?:\*\*|\^)[^*/^]*(?:\*\*|\^)|\d{5,}")
+_LONGEST_UNIT = 40
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """A column header taken apart.
+
+    Args:
+        name: The name without the unit.
+        unit: The unit as text that pint can be asked about, or ``None`` if the header names none.
+        reference: What a pressure is measured from, if the header says so.
+    """
+
+    name: str
+    unit: str | None = None
+    reference: Reference | None = None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that is known, with or without a reference.
+
+    Args:
+        text: For example ``"kPa"``, ``"psi gauge"``, ``"-"``.
+
+    Returns:
+        True if it is.
+    """
+    unit, _ = split_reference(text)
+    if not unit or len(unit) > _LONGEST_UNIT or _TOWER.search(unit):
+        return False
+    try:
+        check_unit(unit)
+    except UnitError:
+        return False
+    return True
+
+
+def split_reference(text: str) -> tuple[str, Reference | None]:
+    """Take a unit and its reference apart, and write the unit as pint does.
+
+    Args:
+        text: For example ``"barg"``, ``"psi gauge"``, ``"kPa abs"``, ``"bar(a)"``, ``"%"``.
+
+    Returns:
+        The unit, and the reference if the text names one.
+
+    Example:
+        >>> split_reference("kPa abs")
+        ('kPa', <Reference.ABSOLUTE: 'absolute'>)
+    """
+    text = text.strip()
+    if text.lower() in _FUSED:
+        return _FUSED[text.lower()]
+    match = _REFERENCE_WORD.match(text)
+    reference = None
+    if match:
+        reference = Reference.GAUGE if match["word"].lower().startswith("g") else Reference.ABSOLUTE
+        text = match["unit"].strip()
+    return _ALIASES.get(text.lower(), text), reference
+
+
+def parse_header(text: str) -> Header:
+    """Take a column header apart.
+
+    Square brackets always hold a unit, unless they hold a number, as in ``p[0]``; round ones do only
+    if the unit is known, since ``Test (1)`` or ``BP (wagon)`` are names.
+
+    Args:
+        text: For example ``"BP [kPa]"``, ``"Tijd (s)"``, ``"BP [psi gauge]"``, ``"STP"``.
+
+    Returns:
+        Name, unit and reference.
+
+    Example:
+        >>> parse_header("BP [psi gauge]")
+        Header(name='BP', unit='psi', reference=<Reference.GAUGE: 'gauge'>)
+        >>> parse_header("Test (1)")
+        Header(name='Test (1)', unit=None, reference=None)
+    """
+    match = _BRACKETS.match(text)
+    if match and not match["unit"].strip().isdigit():
+        unit, reference = split_reference(match["unit"])
+        return Header(name=match["name"].strip(), unit=unit or None, reference=reference)
+    match = _PARENTHESES.match(text)
+    if match and not match["unit"].strip().isdigit() and is_unit(match["unit"]):
+        unit, reference = split_reference(match["unit"])
+        return Header(name=match["name"].strip(), unit=unit, reference=reference)
+    return Header(name=text.strip())

@@ -1,0 +1,111 @@
+"""Cells of text to float64: decimal comma, thousands separators, and nothing guessed.
+
+A cell is a number or it is refused. ``1.5`` in a file whose thousands separator is the point is
+refused, not read as 15: groups of thousands have three digits.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+MISSING = ("", "nan")
+"""Texts that stand for a missing value in every file, whatever their case."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NumberFormat:
+    """How numbers are written in a file.
+
+    Args:
+        decimal: ``"."`` or ``","``.
+        thousands: What separates groups of three digits, or ``None``. If it equals ``decimal``, the
+            last one in a number is the decimal one: some loggers write 1003 ms as ``1.003.000``.
+        missing: Further texts that stand for a missing value.
+    """
+
+    decimal: str = "."
+    thousands: str | None = None
+    missing: tuple[str, ...] = ()
+
+    def parse(self, cell: str) -> float | None:
+        """One cell.
+
+        Args:
+            cell: Its text.
+
+        Returns:
+            The number, NaN for a missing value, or ``None`` if the cell is not a number.
+
+        Example:
+            >>> NumberFormat(decimal=".", thousands=".").parse("1.003.000")
+            1003.0
+            >>> NumberFormat(decimal=",", thousands=".").parse("1.5") is None
+            True
+        """
+        text = cell.strip()
+        if text.lower() in MISSING or text in self.missing:
+            return float("nan")
+        if not _pattern(self.decimal, self.thousands).fullmatch(text):
+            return None
+        if self.thousands == self.decimal:
+            head, _, tail = text.rpartition(self.decimal)
+            text = f"{head.replace(self.decimal, '')}.{tail}" if head or tail != text else text
+            return float(text)
+        if self.thousands:
+            text = text.replace(self.thousands, "")
+        return float(text.replace(self.decimal, "."))
+
+    def column(self, cells: Sequence[str]) -> NDArray[np.float64] | int:
+        """A whole column.
+
+        Args:
+            cells: Texts.
+
+        Returns:
+            Shape ``(len(cells),)``, or the index of the first cell that is not a number.
+        """
+        fast = self._fast(cells)
+        if fast is not None:
+            return fast
+        values = np.empty(len(cells))
+        for index, cell in enumerate(cells):
+            value = self.parse(cell)
+            if value is None:
+                return index
+            values[index] = value
+        return values
+
+    def _fast(self, cells: Sequence[str]) -> NDArray[np.float64] | None:
+        # float() knows more than the pattern does (1_0, 1.5 with a decimal comma, other scripts'
+        # digits); a column without such characters can go through it at once.
+        if self.thousands is not None:
+            return None
+        joined = "\n".join(cells)
+        foreign = ("_", "." if self.decimal == "," else ",", "n", "N")
+        if not joined.isascii() or any(mark in joined for mark in foreign):
+            return None
+        try:
+            return np.array([float(cell) for cell in joined.replace(self.decimal, ".").split("\n")])
+        except ValueError:
+            return None
+
+
+@cache
+def _pattern(decimal: str, thousands: str | None) -> re.Pattern[str]:
+    point = re.escape(decimal)
+    exponent = r"(?:[eE][+-]?[0-9]+)?"
+    infinite = r"[+-]?inf(?:inity)?"
+    if thousands is None:
+        body = rf"(?:[0-9]+(?:{point}[0-9]*)?|{point}[0-9]+)"
+    elif thousands == decimal:
+        body = rf"(?:[0-9]+|(?:[0-9]{{1,3}}(?:{point}[0-9]{{3}})*|[0-9]+){point}[0-9]*)"
+    else:
+        group = re.escape(thousands)
+        body = rf"(?:[0-9]{{1,3}}(?:{group}[0-9]{{3}})+|[0-9]+)(?:{point}[0-9]*)?"
+    return re.compile(rf"[+-]?{body}{exponent}|(?i:{infinite})")

@@ -1,0 +1,176 @@
+"""The options of a data set on disk, as they stand in ``dataset.yaml`` under ``source``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from sysid.ingest.headers import parse_header
+from sysid.units import Reference
+from sysid.yaml_files import FieldError
+
+
+class Options(BaseModel):
+    """A group of options: frozen, and a field that is not known is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ColumnOptions(Options):
+    """A column of the file; the short form is its header, ``P_pipe`` or ``P_pipe [kPa]``.
+
+    Args:
+        column: Its name in the file.
+        unit: Its unit, where the file says none or a wrong one.
+        reference: ``gauge`` or ``absolute``, where the file does not say.
+    """
+
+    column: str
+    unit: str | None = None
+    reference: Reference | None = None
+
+
+class TimeOptions(Options):
+    """The time column; the short form is its header, ``t [ms]``.
+
+    Args:
+        column: Its name in the file; ``None`` is the column that is recognised as time.
+        unit: ``s``, ``ms``, ``min``, ``ds`` ..., or ``datetime`` for calendar time.
+        format: For ``datetime``: as for ``datetime.strptime``; ``None`` is ISO 8601.
+        step: For a file without time stamps: seconds between its rows.
+    """
+
+    column: str | None = None
+    unit: str | None = None
+    format: str | None = None
+    step: Annotated[float, Field(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> TimeOptions:
+        if self.step is not None and (self.column is not None or self.unit is not None):
+            raise FieldError(
+                "time.step and a time column exclude each other",
+                expected="step for a file without time stamps, column and unit for one with them",
+                got=f"step: {self.step}, column: {self.column}, unit: {self.unit}",
+                remedy="remove one of them",
+            )
+        if self.format is not None and self.unit != "datetime":
+            raise FieldError(
+                "time.format is for calendar time",
+                expected="unit: datetime beside it",
+                got=f"unit: {self.unit}",
+                remedy="write unit: datetime, or remove format",
+            )
+        return self
+
+
+def _column_short(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    header = parse_header(value)
+    return {"column": header.name, "unit": header.unit, "reference": header.reference}
+
+
+def _time_short(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    header = parse_header(value)
+    return {"column": header.name, "unit": header.unit}
+
+
+class FileOptions(Options):
+    """How the files of a data set are read. What is not given is recognised from the file.
+
+    Args:
+        reader: Name of the reader, where the suffix does not tell.
+        time: The time column.
+        columns: Column of each channel, where its name in the file is another.
+        units: Unit of each column that has none in the file: one for all, or by channel.
+        references: ``gauge`` or ``absolute``: one for all pressures, or by channel.
+        separator: CSV: ``,``, ``;`` or a tab.
+        decimal: CSV: ``.`` or ``,``.
+        thousands: CSV: what separates groups of three digits. Equal to ``decimal``, the last one in a
+            number is the decimal one (``1.003.000`` is 1003).
+        comment: CSV: what a comment line begins with.
+        encoding: CSV: for example ``utf-8``, ``cp1252``.
+        skip_lines: CSV: lines before the header.
+        header: CSV: whether there is a header line.
+        units_line: CSV: whether a line of units follows the header.
+        names: CSV: names of all columns, instead of the header's.
+        missing: CSV: texts that stand for a missing value, besides empty cells and ``nan``.
+        group: HDF5, MDF4, TDMS: the group that holds the columns; MATLAB: the structure.
+    """
+
+    reader: str | None = None
+    time: Annotated[TimeOptions, BeforeValidator(_time_short)] = TimeOptions()
+    columns: dict[str, Annotated[ColumnOptions, BeforeValidator(_column_short)]] = {}
+    units: str | dict[str, str] = {}
+    references: Reference | dict[str, Reference] = {}
+    separator: Literal[",", ";", "\t"] | None = None
+    decimal: Literal[".", ","] | None = None
+    thousands: Literal[".", ",", "'", " "] | None = None
+    comment: Annotated[str, Field(min_length=1)] = "#"
+    encoding: str | None = None
+    skip_lines: Annotated[int, Field(ge=0)] = 0
+    header: bool | None = None
+    units_line: bool | None = None
+    names: tuple[str, ...] | None = None
+    missing: tuple[str, ...] = ()
+    group: str | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> FileOptions:
+        if self.separator is not None and self.separator == self.decimal:
+            raise FieldError(
+                "separator and decimal are the same",
+                expected="two different characters",
+                got=repr(self.separator),
+                remedy="a decimal comma goes with separator: ';' or a tab",
+            )
+        return self
+
+
+class GridOptions(Options):
+    """How samples come onto the uniform grid of the data set's sample time.
+
+    Without ``method``, stamps must lie on that grid already.
+
+    Args:
+        method: ``linear`` (between neighbours), ``hold`` (the last value), or ``average`` (the mean
+            of the samples in each interval, which is how a fast recording is decimated).
+        tolerance: How far a stamp may lie from its place on the grid and still be taken as lying on
+            it, as a fraction of the sample time.
+        longest_step: Seconds between two stamps above which samples are missing; ``None`` is one and a
+            half times the median step.
+        fewest_samples: A record with fewer is refused.
+    """
+
+    method: Literal["linear", "hold", "average"] | None = None
+    tolerance: Annotated[float, Field(ge=0, lt=0.5)] = 0.01
+    longest_step: Annotated[float, Field(gt=0)] | None = None
+    fewest_samples: Annotated[int, Field(ge=2)] = 10
+
+
+class RepairOptions(Options):
+    """The repairs that are asked for; each one that is made is recorded in the trace's provenance.
+
+    Args:
+        ragged: ``drop`` the rows of a CSV that have too many or too few cells.
+        stamps: ``drop`` the samples whose time stamp is empty.
+        backward: ``sort`` the samples by time, or ``drop`` those that step back.
+        duplicates: ``drop`` all but the first sample of a time stamp, or ``average`` them.
+        gaps: Fill by ``linear`` or ``hold``; ``mask`` fills and marks the samples as not usable.
+        nan: ``interpolate`` missing values, or ``mask`` their samples as not usable.
+        jitter: ``resample`` uneven time stamps by ``grid.method``.
+        constant: ``accept`` channels that never change.
+    """
+
+    ragged: Literal["drop"] | None = None
+    stamps: Literal["drop"] | None = None
+    backward: Literal["sort", "drop"] | None = None
+    duplicates: Literal["drop", "average"] | None = None
+    gaps: Literal["linear", "hold", "mask"] | None = None
+    nan: Literal["interpolate", "mask"] | None = None
+    jitter: Literal["resample"] | None = None
+    constant: Literal["accept"] | None = None

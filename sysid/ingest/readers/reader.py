@@ -1,0 +1,135 @@
+"""What a reader is, and how one is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sysid.errors import ConfigError, ReaderError
+from sysid.ingest.options import FileOptions, RepairOptions
+from sysid.ingest.table import RawTable
+
+_COMMON = {"reader", "time", "columns", "units", "references"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reader:
+    """A file format.
+
+    Args:
+        name: What the format is called in options and messages.
+        suffixes: Endings of file names, lower case, with the dot.
+        read: Reads a file; raises :class:`~sysid.errors.ReaderError` if it is not of this format.
+        options: The fields of :class:`~sysid.ingest.options.FileOptions` that mean something to it,
+            besides those that mean something to all.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    read: Callable[[Path, FileOptions, RepairOptions], RawTable]
+    options: frozenset[str] = frozenset()
+
+
+def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None) -> Reader:
+    """The reader for a file.
+
+    Args:
+        path: The file.
+        readers: The readers to choose from.
+        name: Name of the reader, if the suffix is not to decide.
+
+    Returns:
+        The reader.
+
+    Raises:
+        ReaderError: If no reader claims the suffix.
+        ConfigError: If there is no reader of that name.
+    """
+    if name is not None:
+        for reader in readers:
+            if reader.name == name:
+                return reader
+        raise ConfigError(
+            f"no reader named {name}",
+            where=path,
+            expected=f"one of {', '.join(reader.name for reader in readers)}",
+            got=name,
+            remedy="correct reader",
+        )
+    for reader in readers:
+        if path.suffix.lower() in reader.suffixes:
+            return reader
+    raise ReaderError(
+        "no reader knows this kind of file",
+        where=path,
+        expected=f"a name that ends in {', '.join(suffix for reader in readers for suffix in reader.suffixes)}",
+        got=path.suffix or "a name without an ending",
+        remedy="export the traces to one of these, or name the reader (reader: csv)",
+    )
+
+
+def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOptions) -> RawTable:
+    """Read a file, refusing options that mean nothing to its reader.
+
+    Args:
+        reader: The reader.
+        path: The file.
+        files: How to read it.
+        repairs: Which repairs the reader may make (``ragged``).
+
+    Returns:
+        The file as columns of numbers.
+
+    Raises:
+        ConfigError: If an option is given that the reader does not have.
+        ReaderError: If the file is missing or cannot be read as what it claims to be.
+    """
+    strangers = sorted(files.model_fields_set - _COMMON - reader.options)
+    if strangers:
+        raise ConfigError(
+            f"the option {', '.join(strangers)} means nothing for a {reader.name} file",
+            where=path,
+            expected=f"options among {', '.join(sorted(_COMMON | reader.options))}",
+            got=", ".join(strangers),
+            remedy="remove it",
+        )
+    if not path.is_file():
+        raise ReaderError(
+            "there is no such file",
+            where=path,
+            expected=f"a {reader.name} file",
+            got="a folder" if path.is_dir() else "nothing at this path",
+            remedy="check the path; in a dataset.yaml it is relative to that file",
+        )
+    try:
+        return reader.read(path, files, repairs)
+    except OSError as error:
+        raise ReaderError(
+            f"the file cannot be read as {reader.name}",
+            where=path,
+            expected=f"a readable, whole {reader.name} file",
+            got=str(error).splitlines()[0] if str(error) else type(error).__name__,
+            remedy="check permissions, that the copy is complete, and that the ending tells the format",
+        ) from error
+
+
+def damaged(path: Path, kind: str, error: BaseException) -> ReaderError:
+    """The error for a file that a library cannot make sense of.
+
+    Args:
+        path: The file.
+        kind: What the file claims to be.
+        error: What the library raised.
+
+    Returns:
+        The error to raise.
+    """
+    message = str(error).strip().splitlines()
+    return ReaderError(
+        f"the file is not a whole {kind} file",
+        where=path,
+        expected=f"a {kind} file",
+        got=f"{type(error).__name__}: {message[0][:200]}" if message else type(error).__name__,
+        remedy="check that the copy is complete and that the ending tells the format",
+    )

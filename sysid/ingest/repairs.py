@@ -1,0 +1,262 @@
+"""What can be wrong with the samples of a record: refused, or repaired where that repair was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import TraceError
+from sysid.ingest.options import RepairOptions
+from sysid.ingest.table import RawTable
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """The samples of one file on their way to a trace.
+
+    Args:
+        table: The file they came from.
+        rows: Shape ``(n,)``: row of the file that each sample was.
+        stamps: Shape ``(n,)``, seconds.
+        names: Channel names.
+        values: Shape ``(n, n_channels)``.
+        marked: Shape ``(n,)``: samples that must not count.
+        notes: What was done, one sentence each.
+    """
+
+    table: RawTable
+    rows: NDArray[np.intp]
+    stamps: NDArray[np.float64]
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+    marked: NDArray[np.bool_]
+    notes: tuple[str, ...] = field(default=())
+
+    def at(self, index: int) -> str:
+        """Where a sample is in the file, for messages."""
+        return self.table.place(int(self.rows[index]))
+
+    def where(self, index: int, channel: str | None = None) -> str:
+        """File, channel and sample, for messages."""
+        middle = "" if channel is None else f", channel {channel}"
+        return f"{self.table.source}{middle}, {self.at(index)}"
+
+    def keep(self, chosen: NDArray[np.intp] | NDArray[np.bool_], note: str | None = None) -> Record:
+        """Some of the samples, in the order given."""
+        return replace(
+            self,
+            rows=self.rows[chosen],
+            stamps=self.stamps[chosen],
+            values=self.values[chosen],
+            marked=self.marked[chosen],
+            notes=self.notes if note is None else (*self.notes, note),
+        )
+
+    def noted(self, note: str) -> Record:
+        """The same samples with a sentence added."""
+        return replace(self, notes=(*self.notes, note))
+
+
+def empty_stamps(record: Record, repairs: RepairOptions) -> Record:
+    """Samples without a time stamp.
+
+    Args:
+        record: The samples.
+        repairs: ``stamps: drop`` drops them.
+
+    Returns:
+        The samples that have one.
+
+    Raises:
+        TraceError: If there are such samples and no repair was asked for, or nothing else is left.
+    """
+    bad = ~np.isfinite(record.stamps)
+    if not bad.any():
+        return record
+    first = int(np.flatnonzero(bad)[0])
+    if repairs.stamps is None or bad.all():
+        raise TraceError(
+            f"{int(bad.sum())} samples have no time stamp",
+            where=record.where(first, record.table.time),
+            expected="a number in each row of the time column",
+            got=record.stamps[first],
+            remedy="correct the file, or ask for repairs: {stamps: drop}",
+        )
+    return record.keep(~bad, f"{int(bad.sum())} samples without a time stamp dropped, first at {record.at(first)}")
+
+
+def backward(record: Record, repairs: RepairOptions) -> Record:
+    """Time stamps that step back.
+
+    Args:
+        record: The samples.
+        repairs: ``backward: sort`` sorts by time, ``backward: drop`` drops those that step back.
+
+    Returns:
+        Samples whose stamps never fall.
+
+    Raises:
+        TraceError: If a stamp steps back and no repair was asked for.
+    """
+    late = record.stamps[1:] < np.maximum.accumulate(record.stamps)[:-1]
+    bad = np.flatnonzero(late) + 1
+    if not len(bad):
+        return record
+    first = int(bad[0])
+    if repairs.backward is None:
+        raise TraceError(
+            f"{len(bad)} time stamps step back",
+            where=record.where(first),
+            expected=f"a time after {record.stamps[first - 1]:g} s",
+            got=f"{record.stamps[first]:g} s",
+            remedy="split the file where a new recording starts, or ask for "
+            "repairs: {backward: sort} or {backward: drop}",
+        )
+    told = f"{len(bad)} backward time stamps, first at {record.at(first)}"
+    if repairs.backward == "sort":
+        return record.keep(np.argsort(record.stamps, kind="stable"), f"sorted by time: {told}")
+    keep = np.ones(len(record.stamps), dtype=np.bool_)
+    keep[bad] = False
+    return record.keep(keep, f"dropped: {told}")
+
+
+def duplicates(record: Record, repairs: RepairOptions) -> Record:
+    """Time stamps that stand more than once.
+
+    Args:
+        record: Samples whose stamps never fall.
+        repairs: ``duplicates: drop`` keeps the first, ``duplicates: average`` their mean.
+
+    Returns:
+        Samples whose stamps rise.
+
+    Raises:
+        TraceError: If a stamp stands twice and no repair was asked for.
+    """
+    bad = np.flatnonzero(np.diff(record.stamps) == 0.0) + 1
+    if not len(bad):
+        return record
+    first = int(bad[0])
+    if repairs.duplicates is None:
+        raise TraceError(
+            f"{len(bad)} time stamps are duplicates",
+            where=record.where(first),
+            expected=f"a time after {record.stamps[first]:g} s",
+            got=f"{record.stamps[first]:g} s again",
+            remedy="ask for repairs: {duplicates: drop} or {duplicates: average}",
+        )
+    keep = np.ones(len(record.stamps), dtype=np.bool_)
+    keep[bad] = False
+    told = f"{len(bad)} duplicate time stamps, first at {record.at(first)}"
+    if repairs.duplicates == "drop":
+        return record.keep(keep, f"dropped: {told}")
+    group = np.cumsum(keep) - 1
+    with np.errstate(invalid="ignore"):
+        sums = np.column_stack([np.bincount(group, weights=column) for column in record.values.T])
+    means = sums / np.bincount(group)[:, None]
+    return replace(record.keep(keep, f"averaged: {told}"), values=means)
+
+
+def missing_values(record: Record, repairs: RepairOptions) -> Record:
+    """Values that are empty, NaN or infinite.
+
+    Args:
+        record: Samples whose stamps rise.
+        repairs: ``nan: interpolate`` puts them on the line between their neighbours in time;
+            ``nan: mask`` does so too (or holds, at the ends) and marks the samples as not usable.
+
+    Returns:
+        Samples with finite values.
+
+    Raises:
+        TraceError: If there are such values and no repair was asked for, if a channel has no other,
+            or if one to be interpolated has a neighbour on one side only.
+    """
+    bad = ~np.isfinite(record.values)
+    if not bad.any():
+        return record
+    values = record.values.copy()
+    for column, name in enumerate(record.names):
+        missing = bad[:, column]
+        if missing.any():
+            _check_missing(record, missing, name, repairs)
+            values[missing, column] = np.interp(
+                record.stamps[missing], record.stamps[~missing], values[~missing, column]
+            )
+            first = int(np.flatnonzero(missing)[0])
+            done = "interpolated" if repairs.nan == "interpolate" else "filled and masked"
+            record = record.noted(
+                f"{name}: {int(missing.sum())} missing values {done}, first at {record.at(first)}, "
+                f"longest run {_longest_run(missing)}"
+            )
+    marked = record.marked | bad.any(axis=1) if repairs.nan == "mask" else record.marked
+    return replace(record, values=values, marked=marked)
+
+
+def _check_missing(record: Record, missing: NDArray[np.bool_], name: str, repairs: RepairOptions) -> None:
+    first = int(np.flatnonzero(missing)[0])
+    got = record.values[first, record.names.index(name)]
+    if missing.all():
+        raise TraceError(
+            "a channel has no values at all",
+            where=f"{record.table.source}, channel {name}",
+            expected="numbers",
+            got="only empty cells or NaN",
+            remedy="choose another column, or leave the channel out",
+        )
+    if repairs.nan is None:
+        raise TraceError(
+            f"{int(missing.sum())} values are missing",
+            where=record.where(first, name),
+            expected="a finite number in each sample",
+            got=got,
+            remedy="ask for repairs: {nan: interpolate} or {nan: mask}",
+        )
+    if repairs.nan == "interpolate" and (missing[0] or missing[-1]):
+        at = 0 if missing[0] else len(missing) - 1
+        raise TraceError(
+            "a value at the end of a record cannot be interpolated",
+            where=record.where(at, name),
+            expected="a finite number in the first and the last sample",
+            got=record.values[at, record.names.index(name)],
+            remedy="cut the record by start and stop, or ask for repairs: {nan: mask}",
+        )
+
+
+def _longest_run(flags: NDArray[np.bool_]) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max())
+
+
+def constants(record: Record, repairs: RepairOptions) -> Record:
+    """Channels that never change.
+
+    Args:
+        record: Samples with finite values.
+        repairs: ``constant: accept`` accepts them.
+
+    Returns:
+        The same samples.
+
+    Raises:
+        TraceError: If a channel is constant and that was not accepted.
+    """
+    still = [name for name, column in zip(record.names, record.values.T, strict=True) if np.ptp(column) == 0.0]
+    if not still:
+        return record
+    if repairs.constant is None:
+        raise TraceError(
+            f"channel {', '.join(still)} never changes",
+            where=f"{record.table.source}, channel {still[0]}",
+            expected="a channel with information in it",
+            got=f"{record.values[0, record.names.index(still[0])]:g} in all {len(record.values)} samples",
+            remedy="check the sensor, leave the channel out, or ask for repairs: {constant: accept}",
+        )
+    return record.noted(f"constant and accepted: {', '.join(still)}")
+
+
+STEPS: tuple[Callable[[Record, RepairOptions], Record], ...] = (empty_stamps, backward, duplicates)
+"""The repairs of time stamps, in the order in which they are made."""

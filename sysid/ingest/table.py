@@ -1,0 +1,254 @@
+"""RawTable: what every reader returns, before units, time grid and repairs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ChannelError, ReaderError
+from sysid.ingest.headers import parse_header, split_reference
+from sysid.units import Reference
+
+_TIME_NAMES = {
+    "t", "time", "zeit", "tijd", "temps", "tiempo", "tempo", "tid", "timestamp", "timestamps", "time stamp",
+    "elapsed time", "elapsed", "seconds", "tout",
+}  # fmt: skip
+_EXACT_INTEGERS = 2**53
+_TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RawColumn:
+    """A column as it stands in the file.
+
+    Args:
+        name: Name without the unit.
+        values: Shape ``(n_rows,)``, float64; NaN where the file has nothing.
+        unit: As found in the file, or ``None``.
+        reference: As found in the file, or ``None``.
+        description: As found in the file.
+        problem: Why the column cannot be used; raised only when it is asked for, so that a column of
+            remarks beside the measurements does no harm. Its values are NaN then.
+    """
+
+    name: str
+    values: NDArray[np.float64]
+    unit: str | None = None
+    reference: Reference | None = None
+    description: str = ""
+    problem: ReaderError | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RawTable:
+    """A file as columns of numbers.
+
+    Args:
+        source: The file.
+        reader: Name of the reader.
+        columns: All of one length, names unique.
+        time: Name of the column recognised as time, or ``None``.
+        lines: Line in the file of each row, shape ``(n_rows,)``, where the format has lines.
+        notes: What the reader recognised or repaired, one sentence each.
+        metadata: What else the file carries, as text.
+        settings: Reader options as they were recognised (``separator``, ``decimal`` ...), so that a
+            data-set description can write them down.
+    """
+
+    source: Path
+    reader: str
+    columns: tuple[RawColumn, ...]
+    time: str | None = None
+    lines: NDArray[np.int64] | None = None
+    notes: tuple[str, ...] = ()
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.columns or len(self.columns[0].values) == 0:
+            raise ReaderError(
+                "the file holds no samples",
+                where=self.source,
+                expected="at least one column of numbers",
+                got="no rows" if self.columns else "no columns",
+                remedy="check that the recording was saved, and that the options point at it",
+            )
+        unusable = [column.problem for column in self.columns if column.problem is not None]
+        if len(unusable) == len(self.columns):
+            raise unusable[0]
+        names = self.names
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise ReaderError(
+                f"two columns are named {', '.join(repeated)}",
+                where=self.source,
+                expected="a different name for each column",
+                got=", ".join(names),
+                remedy="rename one in the file, or give names: [...] for all columns",
+            )
+
+    def __len__(self) -> int:
+        return len(self.columns[0].values)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns, in file order."""
+        return tuple(column.name for column in self.columns)
+
+    def find(self, name: str) -> RawColumn:
+        """The column of that name, written with its unit or without.
+
+        Args:
+            name: For example ``"BP"`` or ``"BP [kPa]"``.
+
+        Returns:
+            The column.
+
+        Raises:
+            ChannelError: If there is none; close names are suggested.
+            ReaderError: If the column is there and cannot be used.
+        """
+        for wanted in (name, parse_header(name).name):
+            for column in self.columns:
+                if column.name == wanted:
+                    if column.problem is not None:
+                        raise column.problem
+                    return column
+        raise ChannelError([name], self.names, where=self.source)
+
+    def place(self, row: int) -> str:
+        """Where a row is, for messages.
+
+        Args:
+            row: Index of the row, from 0.
+
+        Returns:
+            For example ``"sample 12 (line 14)"``.
+        """
+        return f"sample {row}" if self.lines is None else f"sample {row} (line {int(self.lines[row])})"
+
+
+def recognise_time(columns: Sequence[RawColumn]) -> str | None:
+    """The column that holds time, by its name, else by its unit.
+
+    Args:
+        columns: The columns of a file.
+
+    Returns:
+        Its name, or ``None`` if no column is plainly one.
+    """
+    for column in columns:
+        plain = column.name.casefold().strip()
+        # "t_ms", "time.s": the unit at the end of the name
+        stem = next((plain[: -len(u) - 1] for u in _TIME_UNITS if plain.endswith((f"_{u}", f".{u}"))), plain)
+        if plain in _TIME_NAMES or stem in _TIME_NAMES:
+            return column.name
+    timed = [column.name for column in columns if column.unit in _TIME_UNITS]
+    return timed[0] if timed else None
+
+
+def array_column(
+    name: str,
+    array: NDArray[Any],
+    *,
+    where: str,
+    unit: str | None = None,
+    reference: Reference | None = None,
+    description: str = "",
+) -> RawColumn:
+    """A column from an array of whatever type a file holds.
+
+    Args:
+        name: Name without the unit.
+        array: One-dimensional; calendar time becomes seconds since its first value.
+        where: The file, for errors.
+        unit: As found in the file; psig, barg and the like are taken apart.
+        reference: As found in the file.
+        description: As found in the file.
+
+    Returns:
+        The column; one that is not numeric carries its ``problem``.
+    """
+    unit, found = split_reference(unit) if unit else (None, None)
+    try:
+        if array.dtype.kind == "M":
+            array, unit = _seconds(array), "s"
+        values, problem = _as_float64(array, where=f"{where}, column {name}"), None
+    except ReaderError as error:
+        values, problem = np.full(len(array), np.nan), error
+    return RawColumn(
+        name=name,
+        values=values,
+        unit=unit or None,
+        reference=reference or found,
+        description=description,
+        problem=problem,
+    )
+
+
+def of_one_length(columns: Sequence[RawColumn], *, where: str) -> tuple[RawColumn, ...]:
+    """Columns of the length of the time column, or else of the commonest length.
+
+    Args:
+        columns: Columns of any lengths.
+        where: The file, for errors.
+
+    Returns:
+        As many columns; those of another length carry their ``problem``.
+    """
+    if not columns:
+        return ()
+    time = recognise_time(columns)
+    lengths = [len(column.values) for column in columns]
+    by_time = [len(column.values) for column in columns if column.name == time]
+    usual = by_time[0] if by_time else max(set(lengths), key=lambda length: (lengths.count(length), length))
+    return tuple(
+        column if len(column.values) == usual else _other_length(column, usual, where=where) for column in columns
+    )
+
+
+def _other_length(column: RawColumn, usual: int, *, where: str) -> RawColumn:
+    problem = ReaderError(
+        "a column has another length than the rest",
+        where=f"{where}, column {column.name}",
+        expected=f"{usual} samples",
+        got=f"{len(column.values)} samples",
+        remedy="export it with the others' time base, or name the group that holds what belongs together",
+    )
+    return replace(column, values=np.full(usual, np.nan), problem=problem)
+
+
+def _seconds(stamps: NDArray[np.datetime64]) -> NDArray[np.float64]:
+    known = stamps[~np.isnat(stamps)]
+    if not len(known):
+        return np.full(len(stamps), np.nan)
+    nanoseconds = (stamps - known[0]).astype("timedelta64[ns]")
+    seconds: NDArray[np.float64] = nanoseconds.astype(np.int64) / 1e9
+    seconds[np.isnat(nanoseconds)] = np.nan
+    return seconds
+
+
+def _as_float64(array: NDArray[Any], *, where: str) -> NDArray[np.float64]:
+    if array.dtype.kind not in "buif":
+        raise ReaderError(
+            "a column is not numeric",
+            where=where,
+            expected="real numbers",
+            got=f"values of type {array.dtype}",
+            remedy="choose other columns, or export this one as plain real numbers",
+        )
+    converted = array.astype(np.float64)
+    if array.dtype.kind in "ui" and (np.abs(converted) > _EXACT_INTEGERS).any():
+        raise ReaderError(
+            "integers are too large for float64",
+            where=where,
+            expected="integers of at most 53 bits",
+            got=f"values up to {array.max()}",
+            remedy="subtract the first value (a time origin, for example) before the export",
+        )
+    return converted

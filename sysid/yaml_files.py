@@ -1,0 +1,244 @@
+"""YAML files in, checked objects out, with errors that name the file and the field.
+
+The loader is safe (plain data only), follows YAML 1.2 in what is a number and what is a truth value
+(``no`` and ``on`` stay text, ``1e-3`` is a number), and refuses a key that stands twice.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import typing
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from sysid.errors import ConfigError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class _Loader(yaml.SafeLoader):
+    """Plain data only, YAML 1.2 scalars, no key twice."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[object] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, str | int | float | bool | None):
+                raise yaml.constructor.ConstructorError(None, None, "a key must be plain text", key_node.start_mark)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key {key!r} stands twice", key_node.start_mark
+                )
+            seen.add(key)
+        return super().construct_mapping(node, deep=deep)
+
+    def construct_core_int(self, node: yaml.ScalarNode) -> int:
+        return int(self.construct_scalar(node), 0)
+
+    def construct_core_float(self, node: yaml.ScalarNode) -> float:
+        text = self.construct_scalar(node).lower()
+        return float(text.replace(".inf", "inf").replace(".nan", "nan"))
+
+
+# An empty table of its own: YAML 1.1's notions of numbers and truth values are not inherited.
+_Loader.yaml_implicit_resolvers = {}
+_RESOLVERS = {
+    "bool": (r"^(?:true|True|TRUE|false|False|FALSE)$", "tTfF"),
+    "int": (r"^(?:[-+]?(?:0|[1-9][0-9]*)|0o[0-7]+|0x[0-9a-fA-F]+)$", "-+0123456789"),
+    "float": (
+        r"^(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$",
+        "-+.0123456789",
+    ),
+    "null": (r"^(?:~|null|Null|NULL|)$", "~nN\0"),
+}
+for _kind, (_pattern, _first) in _RESOLVERS.items():
+    # The empty first character stands for an empty scalar, which is null.
+    _letters = [letter if letter != "\0" else "" for letter in _first]
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(_pattern), _letters)
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_core_int)
+_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.construct_core_float)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read a YAML file whose top level is a mapping.
+
+    Args:
+        path: The file, UTF-8.
+
+    Returns:
+        Plain data.
+
+    Raises:
+        ConfigError: If the file cannot be read, is not YAML, repeats a key, or is not a mapping.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            "the file cannot be read",
+            where=path,
+            expected="a readable YAML file in UTF-8",
+            got=error,
+            remedy="check the path, the permissions and the encoding",
+        ) from error
+    return parse_yaml(text, where=path)
+
+
+def parse_yaml(text: str, *, where: object) -> dict[str, Any]:
+    r"""Parse YAML text whose top level is a mapping.
+
+    Args:
+        text: The YAML.
+        where: Named in errors: the file it came from.
+
+    Returns:
+        Plain data.
+
+    Raises:
+        ConfigError: If it is not YAML, repeats a key, or is not a mapping.
+
+    Example:
+        >>> parse_yaml("sample_time: 1e-3\nanswer: no", where="example")
+        {'sample_time': 0.001, 'answer': 'no'}
+    """
+    try:
+        data = yaml.load(text, Loader=_Loader)  # noqa: S506 - _Loader is a SafeLoader
+    except (yaml.YAMLError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"{where}, line {mark.line + 1}, column {mark.column + 1}" if mark else where
+        raise ConfigError(
+            "the file is not valid YAML",
+            where=place,
+            expected="YAML: 'key: value' lines, indented by spaces",
+            got=getattr(error, "problem", None) or str(error).splitlines()[0],
+            remedy="correct the line that is named",
+        ) from error
+    if not isinstance(data, dict):
+        raise ConfigError(
+            "the file does not hold a mapping",
+            where=where,
+            expected="'key: value' lines at the top level",
+            got="an empty file" if data is None else f"a {type(data).__name__}",
+            remedy="start from an example, such as one of the built-in data sets",
+        )
+    return data
+
+
+def check(model: type[Model], data: Mapping[str, Any], *, where: object) -> Model:
+    """Check plain data against a model.
+
+    Args:
+        model: The pydantic model.
+        data: Plain data, as from :func:`read_yaml`.
+        where: Named in errors: the file the data came from.
+
+    Returns:
+        The checked object.
+
+    Raises:
+        ConfigError: Naming the first field at fault, what was expected, what came and, for a
+            misspelt field, what was probably meant; further fields at fault are named too.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise _config_error(error, model, where) from None
+
+
+def _config_error(error: ValidationError, model: type[BaseModel], where: object) -> ConfigError:
+    # A misspelt field usually causes the "missing" beside it: name the cause first.
+    found = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
+    first, others = found[0], found[1:]
+    loc = first["loc"]
+    what: str
+    expected: object
+    got: object
+    remedy = "correct the value"
+    if first["type"] == "extra_forbidden":
+        known = _fields_at(model, loc[:-1])
+        near = difflib.get_close_matches(str(loc[-1]), known, n=1)
+        what, expected, got = f"unknown field {loc[-1]!r}", f"one of {', '.join(known)}", str(loc[-1])
+        remedy = f"did you mean {near[0]}?" if near else "remove it, or use one of the fields that are known"
+    elif first["type"] == "missing":
+        what, expected, got = f"the field {loc[-1]!r} is missing", f"a value for {loc[-1]}", "nothing"
+        remedy = f"add {loc[-1]}: ..."
+    elif first["type"] == "value_error":
+        cause = first.get("ctx", {}).get("error")
+        what, expected, got = str(cause), None, None
+        if isinstance(cause, FieldError):
+            what, expected, got, remedy = cause.what, cause.expected, cause.got, cause.remedy
+    else:
+        what, expected, got = "a value cannot be used", first["msg"], _short(first["input"])
+    if others:
+        remedy += f" (also at fault: {', '.join(sorted({path_text(item['loc']) for item in others}))})"
+    return ConfigError(what, where=f"{where}, field {path_text(loc)}", expected=expected, got=got, remedy=remedy)
+
+
+class FieldError(ValueError):
+    """Raised inside a pydantic validator to say what, expected, got and remedy.
+
+    Args:
+        what: What is wrong.
+        expected: What would have been accepted.
+        got: What came.
+        remedy: What to do.
+    """
+
+    def __init__(self, what: str, *, expected: object = None, got: object = None, remedy: str) -> None:
+        super().__init__(what)
+        self.what = what
+        self.expected = expected
+        self.got = got
+        self.remedy = remedy
+
+
+def path_text(loc: Sequence[str | int]) -> str:
+    """A pydantic location as an engineer writes it.
+
+    Args:
+        loc: Keys and indices.
+
+    Returns:
+        For example ``channels[0].unit``.
+
+    Example:
+        >>> path_text(("channels", 0, "unit"))
+        'channels[0].unit'
+    """
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc)
+    return text.removeprefix(".") or "(top level)"
+
+
+def _short(value: object, limit: int = 80) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def _fields_at(model: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
+    """Names of the fields of the model that stands at a location inside another."""
+    current: Any = model
+    for part in loc:
+        current = _model_in(current)
+        if current is None:
+            return []
+        # An index, or a key of a free mapping, stays at the model that the container holds.
+        if isinstance(part, str) and part in current.model_fields:
+            current = current.model_fields[part].annotation
+    current = _model_in(current)
+    return [] if current is None else list(current.model_fields)
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The first pydantic model inside an annotation such as ``tuple[Model, ...] | None``."""
+    if not typing.get_args(annotation):
+        return annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else None
+    for argument in typing.get_args(annotation):
+        inner = _model_in(argument)
+        if inner is not None:
+            return inner
+    return None
