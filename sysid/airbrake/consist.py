@@ -1,0 +1,212 @@
+"""What a train is made of: pipe, head valve, brake valves and cylinders, with the constants of Appendix C.
+
+All constants are SI and those of the dissertation's Appendix C ("Run_Freio_V01") unless a line says
+otherwise. Pressures measured from the atmosphere say so; differences of pressure need no reference.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from sysid.errors import ConfigError
+from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
+
+TEMPERATURE = 298.0
+"""Temperature of all air in K; the model is isothermal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pipe:
+    """The brake pipe of one vehicle.
+
+    Args:
+        radius: Radius in m as the listing writes it; it squares twice the radius, so this is the diameter's half
+            of a 2 1/2 in bore on paper, and the volume is kept as printed.
+        length: Length per vehicle in m (Legvag).
+        area: Area between two vehicles in m2 (AEG).
+        vehicle_length: Distance from one vehicle to the next in m (Lvag + Lcti).
+    """
+
+    radius: float = 0.015875
+    length: float = 10.5
+    area: float = 8e-4
+    vehicle_length: float = 9.75 + 0.08
+
+    @property
+    def volume(self) -> float:
+        """Volume per vehicle in m3 (Veg = pi (2 r)^2 / 4 L)."""
+        return math.pi * (2.0 * self.radius) ** 2 / 4.0 * self.length
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeadValve:
+    """The 26-L brake valve of a locomotive.
+
+    Args:
+        feed_area: Area into the pipe in m2 (AlocoI).
+        exhaust_area: Area out of the pipe in m2 (AlocoO); twice that in an emergency.
+    """
+
+    feed_area: float = 9.5e-5
+    exhaust_area: float = 8e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrakeValve:
+    """The ABDX valve of a wagon pair: areas in m2, thresholds in Pa, and the volumes it connects in m3.
+
+    Args:
+        auxiliary_volume: Auxiliary reservoir (Vaux).
+        emergency_volume: Emergency reservoir (Vemg).
+        action_volume: Quick-action chamber, which remembers the pipe's pressure (Vpsr).
+        charge_auxiliary: Pipe to auxiliary reservoir (AegAX).
+        charge_emergency: Pipe to emergency reservoir (AegEM).
+        charge_action: Pipe to quick-action chamber, and the command-driven quick service (AegPSR).
+        apply: Either reservoir to brake cylinder (AEGCF).
+        release: Brake cylinder to atmosphere (Ascf).
+        accelerate_service: Emergency reservoir to pipe on a service release (Aesr).
+        accelerate_emergency: Brake cylinder to pipe on a release after an emergency (ACFEG).
+        bleed_action: Quick-action chamber to atmosphere (APSRatm).
+        quick_service: Pipe to atmosphere while the pipe falls (AEGatmPSR).
+        emergency_vent: Pipe to atmosphere in an emergency (AegaATMEM).
+        apply_drop: Auxiliary above pipe that applies (DAC).
+        release_rise: Pipe above auxiliary that releases (DAL); 1.45 psi.
+        service_drop: Action chamber above pipe that counts as a falling pipe (DSR).
+        emergency_drop: Action chamber above pipe that trips the emergency (DPE); 26.1 psi.
+        lap_band: Band about the command in which the listing stops a release (DPcEG).
+        command_drop: Pipe above command that opens the listing's quick service (7000 in the text).
+        empty_pipe: Absolute pipe pressure below which the listing stops a release (11E4 in the text).
+    """
+
+    auxiliary_volume: float = 0.041
+    emergency_volume: float = 0.057
+    action_volume: float = 0.015
+    charge_auxiliary: float = 2e-6
+    charge_emergency: float = 2e-6
+    charge_action: float = 1e-6
+    apply: float = 3.5e-6
+    release: float = 3e-6
+    accelerate_service: float = 8.5e-6
+    accelerate_emergency: float = 8.5e-6
+    bleed_action: float = 9e-7
+    quick_service: float = 2e-7
+    emergency_vent: float = 8e-4
+    apply_drop: float = 7_000.0
+    release_rise: float = 10_000.0
+    service_drop: float = 1_000.0
+    emergency_drop: float = 180_000.0
+    lap_band: float = 20_000.0
+    command_drop: float = 7_000.0
+    empty_pipe: float = 110_000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder:
+    """The brake cylinder of a wagon pair.
+
+    Appendix C declares a piston (area, stroke, a pressure PFmin of 10 psi) and then uses the full volume from
+    the start. The travel at which the shoes touch, and the pressure that stretches the rigging to the full stroke,
+    are ours: they are chosen so that a reduction of 16 psi gives 40 psi, the textbook's 2.5 psi per psi, while full
+    service still equalises at the full volume.
+
+    Args:
+        area: Piston area in m2 (ACF).
+        stroke: Full travel in m (Xst).
+        contact_travel: Travel in m at which the shoes touch the wheels (ours).
+        contact_pressure: Gauge pressure in Pa that takes the piston there against its spring (PFmin).
+        stroke_pressure: Gauge pressure in Pa at which the travel is full (ours).
+    """
+
+    area: float = 0.06477
+    stroke: float = 0.2122
+    contact_travel: float = 0.1444
+    contact_pressure: float = 10.0 * PSI_IN_PA
+    stroke_pressure: float = 60.0 * PSI_IN_PA
+
+    @property
+    def volume(self) -> float:
+        """Volume at full stroke in m3 (VOLCF)."""
+        return self.area * self.stroke
+
+    @property
+    def contact_volume(self) -> float:
+        """Volume in m3 when the shoes touch."""
+        return self.area * self.contact_travel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Consist:
+    """One leading locomotive and wagon pairs behind it, one brake valve per pair.
+
+    Nodes are numbered as in the listing: 1 is the leading locomotive, 2 the first wagon (pipe only), 3 the
+    second, which carries the first pair's valve, and so on.
+
+    Args:
+        pairs: Number of wagon pairs.
+        locomotives: Further locomotives, each given by the number of pairs ahead of it (1 to ``pairs``).
+        running_pressure: Setting of the feed valve in psi gauge (Peq).
+        pipe: The brake pipe.
+        head: The locomotive's brake valve.
+        valve: The wagon pair's brake valve.
+        cylinder: The wagon pair's brake cylinder.
+
+    Raises:
+        ConfigError: If a number is out of its range.
+
+    Example:
+        >>> Consist(pairs=50).vehicles, Consist(pairs=2).valve_nodes
+        (101, (3, 5))
+    """
+
+    pairs: int = 50
+    locomotives: tuple[int, ...] = ()
+    running_pressure: float = 90.0
+    pipe: Pipe = field(default_factory=Pipe)
+    head: HeadValve = field(default_factory=HeadValve)
+    valve: BrakeValve = field(default_factory=BrakeValve)
+    cylinder: Cylinder = field(default_factory=Cylinder)
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.pairs, int) and self.pairs >= 1):
+            raise ConfigError(
+                "a train needs wagons", where="pairs", expected="an integer of at least 1", got=self.pairs
+            )
+        object.__setattr__(self, "locomotives", tuple(sorted(self.locomotives)))
+        for ahead in self.locomotives:
+            if not 1 <= ahead <= self.pairs:
+                raise ConfigError(
+                    "a locomotive stands outside the train",
+                    where="locomotives",
+                    expected=f"numbers of pairs ahead of it, from 1 to {self.pairs}",
+                    got=ahead,
+                )
+        if not 50.0 <= self.running_pressure <= 150.0:
+            raise ConfigError(
+                "this is no running pressure",
+                where="running_pressure",
+                expected="psi gauge, from 50 to 150 (70 to 110 are in use)",
+                got=self.running_pressure,
+                remedy="give it in psi gauge",
+            )
+
+    @property
+    def vehicles(self) -> int:
+        """Number of vehicles, that is of pipe nodes."""
+        return 1 + 2 * self.pairs + len(self.locomotives)
+
+    @property
+    def valve_nodes(self) -> tuple[int, ...]:
+        """Node number (from 1) of each pair's valve, front to rear."""
+        ahead = [sum(1 for place in self.locomotives if place < pair) for pair in range(1, self.pairs + 1)]
+        return tuple(1 + 2 * pair + extra for pair, extra in zip(range(1, self.pairs + 1), ahead, strict=True))
+
+    @property
+    def port_nodes(self) -> tuple[int, ...]:
+        """Node number (from 1) of each further locomotive."""
+        return tuple(2 + 2 * place + index for index, place in enumerate(self.locomotives))
+
+    @property
+    def charged(self) -> float:
+        """Running pressure in Pa absolute."""
+        return self.running_pressure * PSI_IN_PA + STANDARD_ATMOSPHERE_PA

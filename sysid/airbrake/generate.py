@@ -1,0 +1,208 @@
+"""The door between data sets and the reference physics: a case's recipe in, a trace out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from sysid.airbrake.command import Command
+from sysid.airbrake.consist import Consist
+from sysid.airbrake.sequences import RandomCommand
+from sysid.airbrake.simulate import QUANTITIES, AirBrakeRecord, Probe, simulate
+from sysid.airbrake.variant import VARIANTS, Variant
+from sysid.errors import ConfigError
+from sysid.traces import Channel, Trace
+from sysid.units import Reference, convert
+
+COMMAND = "command"
+"""The quantity that is the driver's handle."""
+
+USUAL_NAMES: Mapping[str, str | dict[str, int]] = {
+    "STP": COMMAND,
+    "BP": "pipe",
+    "AR": "auxiliary",
+    "ER": "emergency",
+    "BC": "cylinder",
+    "PS": "action",
+}
+"""What a channel of this name is, unless ``quantities`` says otherwise."""
+
+
+_M = TypeVar("_M", bound=BaseModel)
+
+
+class _Random(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    seed: int = Field(ge=0)
+    duration: float = Field(gt=0)
+    minimum_reduction: float = 5.8
+    full_reduction: float = 25.8
+    steps: int = 4
+    hold: tuple[float, float] = (10.0, 90.0)
+    recharge: tuple[float, float] = (30.0, 300.0)
+    partial_release: float = 0.15
+    emergency: float = 0.0
+
+
+class _Recipe(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    command: list[tuple[float, float]] | None = None
+    time_unit: Literal["s", "ds"] = "s"
+    duration: float | None = Field(default=None, gt=0)
+    random: _Random | None = None
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> _Recipe:
+        if (self.command is None) == (self.random is None):
+            raise ValueError("give either command or random")
+        if self.random is not None and self.duration is not None:
+            raise ValueError("the duration of a random command stands beside its seed")
+        return self
+
+
+class _Options(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    variant: str = "physical"
+    switches: dict[str, bool | float | str | None] = Field(default_factory=dict)
+    pairs: int = Field(default=50, ge=1, le=200)
+    locomotives: tuple[int, ...] = ()
+    running_pressure: float = 90.0
+    speed: float = Field(default=1.0, ge=0)
+    time_step: float = Field(default=1e-3, gt=0)
+    node: int = 3
+    quantities: dict[str, str | dict[str, int]] = Field(default_factory=dict)
+
+
+def _checked(model: type[_M], values: Mapping[str, Any], where: str) -> _M:
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or "the whole"
+        raise ConfigError(
+            f"{where} cannot be used: {first['msg']}",
+            where=f"{where}, {place}",
+            expected=f"fields {', '.join(model.model_fields)}",
+            got=first["input"],
+            remedy="correct it in dataset.yaml",
+        ) from error
+
+
+def _command(recipe: _Recipe, running_pressure: float) -> Command:
+    if recipe.random is not None:
+        limits = recipe.random.model_dump(exclude={"seed"})
+        return RandomCommand(running_pressure=running_pressure, **limits).draw(recipe.random.seed)
+    rows = [list(row) for row in recipe.command or ()]
+    return Command.from_rows(rows, time_unit=recipe.time_unit, duration=recipe.duration)
+
+
+def _probe(channel: str, options: _Options) -> Probe | None:
+    """What a channel records; ``None`` for the handle."""
+    known = {**USUAL_NAMES, **options.quantities}
+    expected = f"{COMMAND}, one of {', '.join(QUANTITIES)}, or one of these with a node, such as {{pipe: 3}}"
+    if channel not in known:
+        raise ConfigError(
+            f"the generator does not know what channel {channel} is",
+            where="options, quantities",
+            expected=expected,
+            got=f"no entry for {channel}",
+            remedy=f"add {channel} to quantities",
+        )
+    meant = known[channel]
+    if meant == COMMAND:
+        return None
+    pair = (meant, options.node) if isinstance(meant, str) else next(iter(meant.items()), ("nothing", 0))
+    if pair[0] not in QUANTITIES or (isinstance(meant, dict) and len(meant) != 1):
+        raise ConfigError("unknown quantity", where=f"options, quantities, {channel}", expected=expected, got=meant)
+    return Probe(quantity=pair[0], node=pair[1])
+
+
+def _variant(options: _Options) -> Variant:
+    if options.variant not in VARIANTS:
+        raise ConfigError(
+            "unknown variant",
+            where="options, variant",
+            expected=f"one of {', '.join(VARIANTS)}",
+            got=options.variant,
+        )
+    return VARIANTS[options.variant].with_options(options.switches)
+
+
+def _column(channel: Channel, probe: Probe | None, record: AirBrakeRecord) -> np.ndarray[Any, np.dtype[np.float64]]:
+    psi = record.command if probe is None else record.gauge_psi(probe.quantity, probe.node)
+    # The model's own psi (six digits) is kept for psi; everything else is converted from it.
+    if channel.unit == "psi" and channel.reference is Reference.GAUGE:
+        return psi
+    return convert(psi, "psi", channel.unit, reference=Reference.GAUGE, to_reference=channel.reference)
+
+
+def generate(
+    *,
+    case: str,
+    recipe: Mapping[str, Any],
+    options: Mapping[str, Any],
+    channels: tuple[Channel, ...],
+    sample_time: float,
+) -> Trace:
+    """Simulate one case of a data set.
+
+    Args:
+        case: Its name.
+        recipe: ``{command: [[time, psi gauge], ...], time_unit: s | ds, duration: s}`` or
+            ``{random: {seed: 7, duration: 900, ...}}`` (limits: :class:`sysid.airbrake.sequences.RandomCommand`).
+        options: ``variant``, ``switches`` (fields of :class:`sysid.airbrake.variant.Variant`), ``pairs``,
+            ``locomotives``, ``running_pressure`` in psi gauge, ``speed`` in m/s, ``time_step`` in s, ``node``, and
+            ``quantities``: what each channel is, ``command``, a quantity at ``node``, or ``{quantity: node}``.
+        channels: Channels wanted, in their units.
+        sample_time: Seconds between samples; each is the mean over its time steps.
+
+    Returns:
+        The trace, not rounded.
+
+    Raises:
+        ConfigError: If recipe or options cannot be used.
+        StabilityError: If the time step is too large.
+
+    Example:
+        >>> trace = generate(
+        ...     case="minimum",
+        ...     recipe={"command": [[0, 90], [10, 84.2], [20, 84.2]]},
+        ...     options={"pairs": 1},
+        ...     channels=(Channel(name="BC", unit="psi", reference=Reference.GAUGE),),
+        ...     sample_time=0.1,
+        ... )
+        >>> len(trace), float(trace["BC"][0])
+        (200, 0.0)
+    """
+    recipe_ = _checked(_Recipe, recipe, f"the recipe of case {case}")
+    options_ = _checked(_Options, options, "the options of the generator")
+    variant = _variant(options_)
+    consist = Consist(
+        pairs=options_.pairs, locomotives=options_.locomotives, running_pressure=options_.running_pressure
+    )
+    probes = [_probe(channel.name, options_) for channel in channels]
+    record = simulate(
+        _command(recipe_, options_.running_pressure),
+        consist=consist,
+        variant=variant,
+        probes=tuple(dict.fromkeys(probe for probe in probes if probe is not None)),
+        time_step=options_.time_step,
+        sample_time=sample_time,
+        speed=options_.speed,
+    )
+    columns = [_column(channel, probe, record) for channel, probe in zip(channels, probes, strict=True)]
+    switches = "".join(f", {name}={value}" for name, value in options_.switches.items())
+    return Trace(
+        name=case,
+        sample_time=sample_time,
+        channels=channels,
+        values=np.column_stack(columns),
+        provenance=(
+            f"simulated: variant {options_.variant}{switches}, {consist.vehicles} vehicles, "
+            f"step {options_.time_step:g} s",
+            f"each sample is the mean over its {round(sample_time / options_.time_step)} steps",
+        ),
+    )

@@ -1,0 +1,347 @@
+"""The compiled explicit scheme: one step of every vehicle per millisecond, averaged to the output's samples.
+
+The equations are those of the dissertation's Appendix C ("Freio_V02"), written as flows: all right-hand
+sides use the pressures of the previous step. ``sysid.airbrake.reference`` is the same step written plainly;
+tests hold the two together for every switch. Tables and areas arrive multiplied by 1 / sqrt(T).
+
+State is a set of arrays changed in place, so that a caller may advance in chunks.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Constants(NamedTuple):
+    """What the kernel needs to know; built by ``sysid.airbrake.simulate`` from consist and variant. SI, absolute."""
+
+    atmosphere: float
+    running: float
+    pipe_area: float
+    feed_area: float
+    exhaust_area: float
+    charge_auxiliary: float
+    charge_emergency: float
+    charge_action: float
+    apply: float
+    release: float
+    accelerate_service: float
+    accelerate_emergency: float
+    bleed_action: float
+    quick_service_area: float
+    emergency_vent: float
+    apply_drop: float
+    release_rise: float
+    service_drop: float
+    emergency_drop: float
+    lap_band: float
+    command_drop: float
+    empty_pipe: float
+    per_pipe: float  # R T dt / V of each volume, in Pa per (kg/s)
+    per_auxiliary: float
+    per_emergency: float
+    per_action: float
+    gas_step: float  # R T dt, in J per (kg/s)
+    cylinder_volume: float
+    contact_volume: float
+    contact_pressure: float
+    stroke_pressure: float
+    from_upstream: bool
+    check_valve: bool
+    quick_service: int  # 0 none, 1 command, 2 local
+    quick_service_pressure: float
+    latched_release: bool
+    feed_closed_in_lap: bool
+    graduating_lap: bool
+    blowback_after_emergency: bool
+    release_blocks_application: bool
+    piston: bool
+    relay: bool
+    relay_band: float
+    equalising_step: float
+    speed_gates: bool
+    accelerated_service: bool
+    accelerated_emergency: bool
+
+
+class Table(NamedTuple):
+    """Flow coefficient over sqrt(T), uniform in ``sqrt(1 - r)``; see ``sysid.airbrake.flow``."""
+
+    values: Array
+    slopes: Array
+    intervals: float
+
+
+class State(NamedTuple):
+    """Everything that has a memory. Arrays of length nodes, valves or ports, in place.
+
+    ``pressures`` holds node pressures, then auxiliary, emergency, cylinder and action chamber of each valve.
+    """
+
+    pressures: Array
+    content: Array  # P V of the cylinder in J
+    port: Array  # head pressure of each further locomotive
+    releasing: NDArray[np.bool_]
+    applying: NDArray[np.bool_]
+    tripped: NDArray[np.bool_]
+    history: Array  # (delay steps, valves): pipe pressures of the past
+    cursor: Integers  # (1,): row of the oldest
+
+
+class Layout(NamedTuple):
+    """Where the valves and the further locomotives sit: node indices from 0."""
+
+    valve_nodes: Integers
+    port_nodes: Integers
+
+
+class Drive(NamedTuple):
+    """What is done to the train, one value per output sample."""
+
+    command: Array  # Pa absolute
+    speed: Array  # m/s
+    tail_area: Array  # m2 open to the atmosphere behind the last vehicle
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _coefficient(low, high, table):
+    """Cq Cm / sqrt(T) at a ratio of pressures."""
+    position = sqrt(1.0 - low / high) * table.intervals
+    index = int(position)
+    return table.values[index] + (position - index) * table.slopes[index]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _flow(area, p, q, table):
+    """Mass flow in kg/s through an area from p to q, negative if q is the higher."""
+    if p > q:
+        return area * _coefficient(q, p, table) * p
+    return -area * _coefficient(p, q, table) * q
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _charge(area, p, q, c, table):
+    """Charging flow from p to the lower q; the print multiplies by the wrong one of the two."""
+    return area * _coefficient(q, p, table) * (p if c.from_upstream else q)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _head_flow(head, local, emergency, c, table):
+    """Flow from a head valve into the pipe beside it."""
+    if c.relay:
+        if emergency:
+            return -_flow(2.0 * c.exhaust_area, local, c.atmosphere, table)
+        if head > local:
+            return _flow(c.feed_area, head, local, table)
+        opening = min(1.0, (local - head) / c.relay_band)
+        return -_flow(opening * c.exhaust_area, local, c.atmosphere, table)
+    if head > local:
+        return _flow(c.feed_area, head, local, table)
+    return _flow(2.0 * c.exhaust_area if emergency else c.exhaust_area, head, local, table)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _head_pressure(head, sensed, command, moving, c):
+    """Pressure that a head valve holds after this step."""
+    if command > c.running or not moving:
+        return c.running
+    if c.relay:
+        if command <= c.atmosphere:
+            return c.atmosphere
+        return max(command, head - c.equalising_step) if command < head else command
+    return c.atmosphere if sensed > command else command
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _vent(p, pc, ps, emergency, command, moving, c, table):
+    """Pipe to atmosphere at one valve: emergency vent or quick service."""
+    if emergency:
+        return _flow(c.emergency_vent, p, c.atmosphere, table) if moving else 0.0
+    if c.quick_service == 2:
+        if ps - p >= 2.0 * c.service_drop and pc < c.quick_service_pressure:
+            return _flow(c.quick_service_area, p, c.atmosphere, table)
+        return 0.0
+    if p <= c.atmosphere and command < c.running and moving:
+        return _flow(c.emergency_vent, p, c.atmosphere, table)
+    if c.quick_service == 1 and p - command > c.command_drop and moving:
+        return _flow(c.charge_action, p, c.atmosphere, table)
+    return 0.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cylinder_open(p, before, releasing, command, moving, c):
+    """Whether the cylinder is open to the atmosphere."""
+    if releasing or c.latched_release:
+        return releasing
+    if moving and p < before:
+        return False
+    return not (command - c.lap_band <= p <= command + 2.0 * c.lap_band or p <= c.empty_pipe)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cylinder_pressure(content, c):
+    """Pressure of a cylinder from its content P V."""
+    if not c.piston or content >= c.stroke_pressure * c.cylinder_volume:
+        return content / c.cylinder_volume
+    if content < c.contact_pressure * c.contact_volume:
+        # V = k (P - Patm): a quadratic in P.
+        k = c.contact_volume / (c.contact_pressure - c.atmosphere)
+        return 0.5 * (c.atmosphere + sqrt(c.atmosphere * c.atmosphere + 4.0 * content / k))
+    k = (c.cylinder_volume - c.contact_volume) / (c.stroke_pressure - c.contact_pressure)
+    b = c.contact_volume - k * c.contact_pressure
+    return (sqrt(b * b + 4.0 * k * content) - b) / (2.0 * k)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _valve(j, p, before, command, moving, state, nodes, valves, c, table):
+    """Advance valve j; returns (flow into the pipe, flow to the atmosphere other than from the pipe vent)."""
+    x = state.pressures
+    at_a, at_e = nodes + j, nodes + valves + j
+    at_c, at_s = at_e + valves, at_e + 2 * valves
+    pa, pe, pc, ps = x[at_a], x[at_e], x[at_c], x[at_s]
+    emergency = ps - p > c.emergency_drop
+    accelerated = p - pa >= c.release_rise
+    if accelerated:
+        state.releasing[j] = True
+    elif not c.latched_release or pa - p > c.apply_drop:
+        state.releasing[j] = False
+    graduating = c.graduating_lap and not state.releasing[j]
+    if pa - p > (c.service_drop if graduating else c.apply_drop):
+        state.applying[j] = True
+    elif not c.graduating_lap or pa <= p:
+        state.applying[j] = False
+    if emergency:
+        state.tripped[j] = True
+    elif accelerated:
+        state.tripped[j] = False
+    feed = state.releasing[j] or not c.feed_closed_in_lap
+    to_a = _charge(c.charge_auxiliary, p, pa, c, table) if feed and p > pa else 0.0
+    to_e = 0.0
+    if feed and pa > pe and (p > pe or not c.check_valve):
+        to_e = _charge(c.charge_emergency, pa, pe, c, table)
+    to_s = _charge(c.charge_action, p, ps, c, table) if p >= ps else 0.0
+    bleed = 0.0
+    if (emergency and moving) or (not emergency and ps - p >= c.service_drop):
+        bleed = _flow(c.bleed_action, ps, c.atmosphere, table)
+    vent = _vent(p, pc, ps, emergency, command, moving, c, table)
+    opened = _cylinder_open(p, before, state.releasing[j], command, moving, c)
+    exhaust = _flow(c.release, pc, c.atmosphere, table) if opened else 0.0
+    back_to_pipe = 0.0
+    if accelerated and pe >= p and c.accelerated_service:
+        back_to_pipe = _flow(c.accelerate_service, pe, p, table)
+    armed = (state.tripped[j] and not emergency) or not c.blowback_after_emergency
+    blow = 0.0
+    if armed and c.accelerated_emergency and pc > p and p > ps:
+        blow = _flow(c.accelerate_emergency, pc, p, table)
+    blocked = c.release_blocks_application and (opened or (state.tripped[j] and not emergency and p > ps))
+    from_a = _flow(c.apply, pa, pc, table) if state.applying[j] and not blocked else 0.0
+    from_e = _flow(c.apply, pe, pc, table) if emergency else 0.0
+    x[at_a] = pa + c.per_auxiliary * (to_a - from_a)
+    x[at_e] = pe + c.per_emergency * (to_e - from_e - back_to_pipe)
+    x[at_s] = ps + c.per_action * (to_s - bleed)
+    change = from_a + from_e - exhaust - blow
+    if change != 0.0:
+        state.content[j] += c.gas_step * change
+        x[at_c] = _cylinder_pressure(state.content[j], c)
+    return back_to_pipe + blow - to_a - to_e - to_s - vent, vent + bleed + exhaust
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _pipe_flows(x, nodes, flows, c, table):
+    """Flow from each node to the next, from the second on (the first is the head valve's)."""
+    for i in range(1, nodes - 1):
+        p, q = x[i], x[i + 1]
+        high, low = max(p, q), min(p, q)
+        flow = c.pipe_area * _coefficient(low, high, table) * high
+        flows[i] = flow if p > q else -flow
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _step(command, moving, tail_area, state, layout, flows, net, c, table):
+    """Advance everything by one step; returns the mass flow into the train in kg/s."""
+    x = state.pressures
+    valves = len(layout.valve_nodes)
+    nodes = len(flows)
+    emergency = command <= c.atmosphere
+    _pipe_flows(x, nodes, flows, c, table)
+    flows[0] = _head_flow(x[0], x[1], emergency, c, table)
+    flows[nodes - 1] = _flow(tail_area, x[nodes - 1], c.atmosphere, table) if tail_area > 0.0 else 0.0
+    gained = flows[0] - flows[nodes - 1]
+    for i in range(1, nodes):
+        net[i] = flows[i - 1] - flows[i]
+    for k in range(len(layout.port_nodes)):
+        at = layout.port_nodes[k]
+        flow = _head_flow(state.port[k], x[at], emergency, c, table)
+        sensed = x[at] if c.relay or at + 1 == nodes else x[at + 1]
+        state.port[k] = _head_pressure(state.port[k], sensed, command, moving, c)
+        net[at] += flow
+        gained += flow
+    row = state.cursor[0]
+    delayed = not c.latched_release
+    for j in range(valves):
+        at = layout.valve_nodes[j]
+        p = x[at]
+        before = state.history[row, j] if delayed else p
+        inflow, lost = _valve(j, p, before, command, moving, state, nodes, valves, c, table)
+        net[at] += inflow
+        gained -= lost
+        if delayed:
+            state.history[row, j] = p
+    if delayed:
+        state.cursor[0] = (row + 1) % len(state.history)
+    head = _head_pressure(x[0], x[1], command, moving, c)
+    for i in range(1, nodes):
+        x[i] += c.per_pipe * net[i]
+    x[0] = head
+    return gained
+
+
+@numba.njit(cache=True, error_model="numpy")
+def advance(
+    state: State,
+    layout: Layout,
+    drive: Drive,
+    steps: int,
+    watch: Integers,
+    output: Array,
+    c: Constants,
+    table: Table,
+) -> float:
+    """Advance the train over all samples of a drive.
+
+    Args:
+        state: Changed in place.
+        layout: Where valves and locomotives sit.
+        drive: Command, speed and tail vent, one value per sample, held within it.
+        steps: Steps per sample.
+        watch: Indices into ``state.pressures`` to record, shape ``(w,)``.
+        output: Receives the mean of each over the steps of each sample, Pa, shape ``(n_samples, w)``.
+        c: Constants, those with ``dt`` in them for the step of this call.
+        table: Flow table over sqrt(T).
+
+    Returns:
+        Air gained by the train through head valves and vents, as P V in J.
+    """
+    nodes = len(state.pressures) - 4 * len(layout.valve_nodes)
+    flows = np.zeros(nodes)
+    net = np.zeros(nodes)
+    sums = np.zeros(len(watch))
+    gained = 0.0
+    for k in range(len(drive.command)):
+        sums[:] = 0.0
+        moving = drive.speed[k] > 0.01 or not c.speed_gates
+        for _ in range(steps):
+            gained += _step(drive.command[k], moving, drive.tail_area[k], state, layout, flows, net, c, table)
+            for w in range(len(watch)):
+                sums[w] += state.pressures[watch[w]]
+        for w in range(len(watch)):
+            output[k, w] = sums[w] / steps
+    return gained * c.gas_step

@@ -1,0 +1,176 @@
+"""Variants of the brake model: Appendix C as printed, and what a real ABDX valve does instead.
+
+Every difference is a field of its own and can be switched alone. ``LISTING`` is the print (with the
+reading that the fields describe where the print cannot be read in one way), ``PHYSICAL`` has every repair.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sysid.errors import ConfigError
+from sysid.units import PSI_IN_PA
+
+
+class QuickService(enum.Enum):
+    """What opens the vent that carries an application from car to car."""
+
+    COMMAND = "command"
+    """The handle's position, known to every car at once (as printed: the front runs at 3,400 ft/s)."""
+    LOCAL = "local"
+    """A pipe that falls below the quick-action chamber, until the cylinder has its limit (as in the valve)."""
+    NONE = "none"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variant:
+    """One reading of the model. Defaults are those of the printed listing.
+
+    Args:
+        charge_from_upstream: Charging flows take the upstream pressure as their factor, like all other flows.
+            The print takes the downstream pressure, which slows the charging of an empty reservoir.
+        emergency_check_valve: The emergency reservoir charges only from a pipe above it. The print compares
+            it with the auxiliary reservoir alone and can push air uphill out of an empty pipe.
+        quick_service: What opens the local vent. The print's gate on the quick-action chamber is
+            overwritten by one on the command, which is news that no car can have.
+        quick_service_limit: Cylinder pressure in Pa gauge that closes the local vent (``LOCAL`` only).
+        rising_delay: Age in s of the pipe pressure ``P3i`` with which the printed release compares; the
+            print leaves it undefined. Not used by a latched release.
+        latched_release: Once the pipe is ``release_rise`` above the auxiliary reservoir, the cylinder is
+            open until the next application. The print closes it when the auxiliary has caught up, which
+            traps up to 5 psi.
+        feed_closed_in_lap: The reservoirs charge in release only, as through the slide valve's feed
+            groove. Without it the auxiliary follows a slowly rising pipe at the tail of a train, and the
+            release threshold is never reached. Needs ``latched_release``.
+        graduating_lap: An application ends when the auxiliary has come down to the pipe, and, the slide valve
+            being moved already, goes on at a further drop of ``service_drop``. The print ends it ``apply_drop``
+            earlier, and with the empty cylinder a full service stops 4 psi short of equalisation. Needs
+            ``latched_release``.
+        blowback_after_emergency: The cylinder empties into the pipe only after an emergency. The print
+            does so in full service too, where the cylinder ends above the pipe.
+        release_blocks_application: Auxiliary to cylinder is shut while the cylinder is open. The print
+            drains the auxiliary through the open cylinder after an emergency.
+        piston: The cylinder's volume follows the piston, which starts empty, and its air is conserved. The print
+            starts with the full volume at atmospheric pressure, which adds 3.7 psi in full service.
+        relay_band: Pipe above the equalising reservoir in Pa that opens the head valve's exhaust fully, in
+            proportion below. ``None`` is the printed on-off valve, which chatters by 0.1 psi.
+        equalising_rate: Rate in Pa/s at which the equalising reservoir follows a reduction (ours: some 4 psi/s,
+            so that a service reduction on a short train does not trip the emergency). Needs ``relay_band``.
+        laminar_ratio: Pressure ratio above which flow is linear, which removes the chatter between equal
+            pressures. ISO 6358 implementations use 0.995 to 0.999; 0.995 is stable at a step of 1 ms.
+        speed_gates: A train at rest vents nothing, releases its brakes and is recharged, as printed.
+        accelerated_service: Emergency reservoir to pipe on a service release (ABD and later; not AB).
+        accelerated_emergency: Cylinder to pipe on a release after an emergency (ABD and later; not AB).
+
+    Raises:
+        ConfigError: If a field needs another that is not set, or a number is out of range.
+    """
+
+    charge_from_upstream: bool = False
+    emergency_check_valve: bool = False
+    quick_service: QuickService = QuickService.COMMAND
+    quick_service_limit: float = 10.0 * PSI_IN_PA
+    rising_delay: float = 0.1
+    latched_release: bool = False
+    feed_closed_in_lap: bool = False
+    graduating_lap: bool = False
+    blowback_after_emergency: bool = False
+    release_blocks_application: bool = False
+    piston: bool = False
+    relay_band: float | None = None
+    equalising_rate: float | None = None
+    laminar_ratio: float | None = None
+    speed_gates: bool = True
+    accelerated_service: bool = True
+    accelerated_emergency: bool = True
+
+    def __post_init__(self) -> None:
+        needs = {
+            "feed_closed_in_lap": "latched_release",
+            "graduating_lap": "latched_release",
+            "equalising_rate": "relay_band",
+        }
+        for name, other in needs.items():
+            if getattr(self, name) and not getattr(self, other):
+                raise ConfigError(
+                    f"{name} needs {other}",
+                    where="variant",
+                    expected=f"{other} beside it",
+                    got=f"{name} alone",
+                    remedy=f"set {other} too, or leave {name} out",
+                )
+        for name in ("relay_band", "equalising_rate", "rising_delay", "quick_service_limit"):
+            value = getattr(self, name)
+            if value is not None and not value > 0.0:
+                raise ConfigError(f"{name} is not positive", where="variant", expected="a number above 0", got=value)
+
+    def with_options(self, options: Mapping[str, Any]) -> Variant:
+        """The same variant with some fields changed, by name.
+
+        Args:
+            options: Field names and values; ``quick_service`` as text.
+
+        Returns:
+            The changed variant.
+
+        Raises:
+            ConfigError: If a name is unknown or a value does not fit.
+
+        Example:
+            >>> PHYSICAL.with_options({"quick_service": "none"}).quick_service.name
+            'NONE'
+        """
+        fields = {f.name: f for f in dataclasses.fields(self)}
+        changes: dict[str, Any] = {}
+        for name, value in options.items():
+            if name not in fields:
+                raise ConfigError(
+                    f"unknown switch {name}", where="variant", expected=f"one of {', '.join(fields)}", got=name
+                )
+            changes[name] = self._checked(name, value)
+        return dataclasses.replace(self, **changes)
+
+    def _checked(self, name: str, value: Any) -> Any:
+        if name == "quick_service":
+            try:
+                return QuickService(value)
+            except ValueError:
+                choices = ", ".join(choice.value for choice in QuickService)
+                raise ConfigError(
+                    "unknown quick service", where="variant", expected=f"one of {choices}", got=value
+                ) from None
+        if isinstance(getattr(LISTING, name), bool) != isinstance(value, bool):
+            raise ConfigError("the switch has the wrong type", where=f"variant, {name}", got=value)
+        if isinstance(value, bool) or value is None:
+            return value
+        if not isinstance(value, int | float):
+            raise ConfigError("the switch has the wrong type", where=f"variant, {name}", expected="a number", got=value)
+        return float(value)
+
+
+LISTING = Variant()
+"""Appendix C as printed."""
+
+PHYSICAL = Variant(
+    charge_from_upstream=True,
+    emergency_check_valve=True,
+    quick_service=QuickService.LOCAL,
+    latched_release=True,
+    feed_closed_in_lap=True,
+    graduating_lap=True,
+    blowback_after_emergency=True,
+    release_blocks_application=True,
+    piston=True,
+    relay_band=1.0 * PSI_IN_PA,
+    equalising_rate=4.0 * PSI_IN_PA,
+    laminar_ratio=0.995,
+    speed_gates=False,
+)
+"""What a real ABDX valve does; the default of every shipped data set."""
+
+VARIANTS: Mapping[str, Variant] = {"listing": LISTING, "physical": PHYSICAL}
+"""The presets by name."""
