@@ -1,0 +1,87 @@
+"""The stored signals of a fit: target, free run and one-step prediction of every case."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+
+SIGNALS_FILE: Final = "signals.npz"
+_PARTS: Final = ("time", "target", "simulated", "predicted")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseSignals:
+    """One fit on one case, sample by sample.
+
+    Args:
+        time: Seconds, shape ``(n_samples,)``.
+        target: Measured output, shape ``(n_samples,)``.
+        simulated: Free run, shape ``(n_samples,)``.
+        predicted: One step ahead, shape ``(n_samples,)``.
+    """
+
+    time: NDArray[np.float64]
+    target: NDArray[np.float64]
+    simulated: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+
+    @property
+    def error(self) -> NDArray[np.float64]:
+        """Free run minus target, shape ``(n_samples,)``; NaN where the free run is not finite."""
+        simulated = np.where(np.isfinite(self.simulated), self.simulated, np.nan)
+        return np.asarray(simulated - self.target)
+
+
+def read_signals(folder: Path, cases: list[str]) -> dict[str, CaseSignals]:
+    """Read the signals of one fit.
+
+    Args:
+        folder: The fit's folder.
+        cases: Names of the cases that are wanted.
+
+    Returns:
+        The signals by case, in the order asked for.
+
+    Raises:
+        ConfigError: If the file is missing or damaged, or a case is not in it.
+    """
+    path = Path(folder) / SIGNALS_FILE
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {case: _case(stored, case, path) for case in cases}
+    except FileNotFoundError as error:
+        raise _damaged(path, "the signals of the fit", "no such file") from error
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise _damaged(path, "a NumPy .npz archive of plain arrays", error) from error
+
+
+def _case(stored: np.lib.npyio.NpzFile, case: str, path: Path) -> CaseSignals:
+    missing = [f"{case}/{part}" for part in _PARTS if f"{case}/{part}" not in stored.files]
+    if missing:
+        raise _damaged(path, ", ".join(missing), f"arrays of {_present(stored)}")
+    parts = {part: np.asarray(stored[f"{case}/{part}"], dtype=np.float64) for part in _PARTS}
+    shapes = {array.shape for array in parts.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
+        raise _damaged(path, f"arrays of case {case} with one and the same length", sorted(shapes))
+    return CaseSignals(**parts)
+
+
+def _present(stored: np.lib.npyio.NpzFile) -> str:
+    return ", ".join(dict.fromkeys(name.partition("/")[0] for name in stored.files)) or "no case"
+
+
+def _damaged(path: Path, expected: object, got: object) -> ConfigError:
+    return ConfigError(
+        "the stored signals cannot be read",
+        where=path,
+        expected=expected,
+        got=got,
+        remedy="run the pipeline again; it resumes from what is finished",
+    )
