@@ -77,7 +77,6 @@ class Table(NamedTuple):
 
     values: Array
     slopes: Array
-    intervals: float
 
 
 class State(NamedTuple):
@@ -90,7 +89,6 @@ class State(NamedTuple):
     content: Array  # P V of the cylinder in J
     port: Array  # head pressure of each further locomotive
     releasing: NDArray[np.bool_]
-    applying: NDArray[np.bool_]
     tripped: NDArray[np.bool_]
     history: Array  # (delay steps, valves): pipe pressures of the past
     cursor: Integers  # (1,): row of the oldest
@@ -103,6 +101,14 @@ class Layout(NamedTuple):
     port_nodes: Integers
 
 
+class Work(NamedTuple):
+    """Scratch space: flows out of each node, net flow into it, sums of the watched pressures."""
+
+    flows: Array
+    net: Array
+    sums: Array
+
+
 class Drive(NamedTuple):
     """What is done to the train, one value per output sample."""
 
@@ -111,44 +117,44 @@ class Drive(NamedTuple):
     tail_area: Array  # m2 open to the atmosphere behind the last vehicle
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _coefficient(low, high, table):
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _coefficient(low, high, values, slopes):
     """Cq Cm / sqrt(T) at a ratio of pressures."""
-    position = sqrt(1.0 - low / high) * table.intervals
+    position = sqrt(1.0 - low / high) * (len(values) - 1)
     index = int(position)
-    return table.values[index] + (position - index) * table.slopes[index]
+    return values[index] + (position - index) * slopes[index]
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _flow(area, p, q, table):
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _flow(area, p, q, values, slopes):
     """Mass flow in kg/s through an area from p to q, negative if q is the higher."""
     if p > q:
-        return area * _coefficient(q, p, table) * p
-    return -area * _coefficient(p, q, table) * q
+        return area * _coefficient(q, p, values, slopes) * p
+    return -area * _coefficient(p, q, values, slopes) * q
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _charge(area, p, q, c, table):
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _charge(area, p, q, c, values, slopes):
     """Charging flow from p to the lower q; the print multiplies by the wrong one of the two."""
-    return area * _coefficient(q, p, table) * (p if c.from_upstream else q)
+    return area * _coefficient(q, p, values, slopes) * (p if c.from_upstream else q)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _head_flow(head, local, emergency, c, table):
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _head_flow(head, local, emergency, c, values, slopes):
     """Flow from a head valve into the pipe beside it."""
     if c.relay:
         if emergency:
-            return -_flow(2.0 * c.exhaust_area, local, c.atmosphere, table)
+            return -_flow(2.0 * c.exhaust_area, local, c.atmosphere, values, slopes)
         if head > local:
-            return _flow(c.feed_area, head, local, table)
+            return _flow(c.feed_area, head, local, values, slopes)
         opening = min(1.0, (local - head) / c.relay_band)
-        return -_flow(opening * c.exhaust_area, local, c.atmosphere, table)
+        return -_flow(opening * c.exhaust_area, local, c.atmosphere, values, slopes)
     if head > local:
-        return _flow(c.feed_area, head, local, table)
-    return _flow(2.0 * c.exhaust_area if emergency else c.exhaust_area, head, local, table)
+        return _flow(c.feed_area, head, local, values, slopes)
+    return _flow(2.0 * c.exhaust_area if emergency else c.exhaust_area, head, local, values, slopes)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
 def _head_pressure(head, sensed, command, moving, c):
     """Pressure that a head valve holds after this step."""
     if command > c.running or not moving:
@@ -160,23 +166,33 @@ def _head_pressure(head, sensed, command, moving, c):
     return c.atmosphere if sensed > command else command
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _vent(p, pc, ps, emergency, command, moving, c, table):
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _vent(p, pc, ps, emergency, command, moving, c, values, slopes):
     """Pipe to atmosphere at one valve: emergency vent or quick service."""
     if emergency:
-        return _flow(c.emergency_vent, p, c.atmosphere, table) if moving else 0.0
+        return _flow(c.emergency_vent, p, c.atmosphere, values, slopes) if moving else 0.0
     if c.quick_service == 2:
         if ps - p >= 2.0 * c.service_drop and pc < c.quick_service_pressure:
-            return _flow(c.quick_service_area, p, c.atmosphere, table)
+            return _flow(c.quick_service_area, p, c.atmosphere, values, slopes)
         return 0.0
     if p <= c.atmosphere and command < c.running and moving:
-        return _flow(c.emergency_vent, p, c.atmosphere, table)
+        return _flow(c.emergency_vent, p, c.atmosphere, values, slopes)
     if c.quick_service == 1 and p - command > c.command_drop and moving:
-        return _flow(c.charge_action, p, c.atmosphere, table)
+        return _flow(c.charge_action, p, c.atmosphere, values, slopes)
     return 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _service_opening(drop, releasing, c):
+    """Share of the passage from auxiliary to cylinder that is open."""
+    if not c.graduating_lap:
+        return 1.0 if drop > c.apply_drop else 0.0
+    if releasing or drop <= 0.0:
+        return 0.0
+    return min(1.0, drop / c.service_drop)
+
+
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
 def _cylinder_open(p, before, releasing, command, moving, c):
     """Whether the cylinder is open to the atmosphere."""
     if releasing or c.latched_release:
@@ -186,7 +202,7 @@ def _cylinder_open(p, before, releasing, command, moving, c):
     return not (command - c.lap_band <= p <= command + 2.0 * c.lap_band or p <= c.empty_pipe)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
 def _cylinder_pressure(content, c):
     """Pressure of a cylinder from its content P V."""
     if not c.piston or content >= c.stroke_pressure * c.cylinder_volume:
@@ -200,103 +216,109 @@ def _cylinder_pressure(content, c):
     return (sqrt(b * b + 4.0 * k * content) - b) / (2.0 * k)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _valve(j, p, before, command, moving, state, nodes, valves, c, table):
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _valve(j, p, before, command, moving, x, content, releasing, tripped, nodes, valves, c, values, slopes):
     """Advance valve j; returns (flow into the pipe, flow to the atmosphere other than from the pipe vent)."""
-    x = state.pressures
     at_a, at_e = nodes + j, nodes + valves + j
     at_c, at_s = at_e + valves, at_e + 2 * valves
     pa, pe, pc, ps = x[at_a], x[at_e], x[at_c], x[at_s]
     emergency = ps - p > c.emergency_drop
     accelerated = p - pa >= c.release_rise
     if accelerated:
-        state.releasing[j] = True
+        releasing[j] = True
     elif not c.latched_release or pa - p > c.apply_drop:
-        state.releasing[j] = False
-    graduating = c.graduating_lap and not state.releasing[j]
-    if pa - p > (c.service_drop if graduating else c.apply_drop):
-        state.applying[j] = True
-    elif not c.graduating_lap or pa <= p:
-        state.applying[j] = False
+        releasing[j] = False
     if emergency:
-        state.tripped[j] = True
+        tripped[j] = True
     elif accelerated:
-        state.tripped[j] = False
-    feed = state.releasing[j] or not c.feed_closed_in_lap
-    to_a = _charge(c.charge_auxiliary, p, pa, c, table) if feed and p > pa else 0.0
+        tripped[j] = False
+    feed = releasing[j] or not c.feed_closed_in_lap
+    to_a = _charge(c.charge_auxiliary, p, pa, c, values, slopes) if feed and p > pa else 0.0
     to_e = 0.0
     if feed and pa > pe and (p > pe or not c.check_valve):
-        to_e = _charge(c.charge_emergency, pa, pe, c, table)
-    to_s = _charge(c.charge_action, p, ps, c, table) if p >= ps else 0.0
+        to_e = _charge(c.charge_emergency, pa, pe, c, values, slopes)
+    to_s = _charge(c.charge_action, p, ps, c, values, slopes) if p >= ps else 0.0
     bleed = 0.0
     if (emergency and moving) or (not emergency and ps - p >= c.service_drop):
-        bleed = _flow(c.bleed_action, ps, c.atmosphere, table)
-    vent = _vent(p, pc, ps, emergency, command, moving, c, table)
-    opened = _cylinder_open(p, before, state.releasing[j], command, moving, c)
-    exhaust = _flow(c.release, pc, c.atmosphere, table) if opened else 0.0
+        bleed = _flow(c.bleed_action, ps, c.atmosphere, values, slopes)
+    vent = _vent(p, pc, ps, emergency, command, moving, c, values, slopes)
+    opened = _cylinder_open(p, before, releasing[j], command, moving, c)
+    exhaust = _flow(c.release, pc, c.atmosphere, values, slopes) if opened else 0.0
     back_to_pipe = 0.0
     if accelerated and pe >= p and c.accelerated_service:
-        back_to_pipe = _flow(c.accelerate_service, pe, p, table)
-    armed = (state.tripped[j] and not emergency) or not c.blowback_after_emergency
+        back_to_pipe = _flow(c.accelerate_service, pe, p, values, slopes)
+    armed = (tripped[j] and not emergency) or not c.blowback_after_emergency
     blow = 0.0
     if armed and c.accelerated_emergency and pc > p and p > ps:
-        blow = _flow(c.accelerate_emergency, pc, p, table)
-    blocked = c.release_blocks_application and (opened or (state.tripped[j] and not emergency and p > ps))
-    from_a = _flow(c.apply, pa, pc, table) if state.applying[j] and not blocked else 0.0
-    from_e = _flow(c.apply, pe, pc, table) if emergency else 0.0
+        blow = _flow(c.accelerate_emergency, pc, p, values, slopes)
+    blocked = c.release_blocks_application and (opened or (tripped[j] and not emergency and p > ps))
+    opening = _service_opening(pa - p, releasing[j], c)
+    from_a = _flow(opening * c.apply, pa, pc, values, slopes) if opening > 0.0 and not blocked else 0.0
+    from_e = _flow(c.apply, pe, pc, values, slopes) if emergency else 0.0
     x[at_a] = pa + c.per_auxiliary * (to_a - from_a)
     x[at_e] = pe + c.per_emergency * (to_e - from_e - back_to_pipe)
     x[at_s] = ps + c.per_action * (to_s - bleed)
     change = from_a + from_e - exhaust - blow
     if change != 0.0:
-        state.content[j] += c.gas_step * change
-        x[at_c] = _cylinder_pressure(state.content[j], c)
+        content[j] += c.gas_step * change
+        x[at_c] = _cylinder_pressure(content[j], c)
     return back_to_pipe + blow - to_a - to_e - to_s - vent, vent + bleed + exhaust
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _pipe_flows(x, nodes, flows, c, table):
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _pipe_flows(x, nodes, flows, c, values, slopes):
     """Flow from each node to the next, from the second on (the first is the head valve's)."""
     for i in range(1, nodes - 1):
         p, q = x[i], x[i + 1]
         high, low = max(p, q), min(p, q)
-        flow = c.pipe_area * _coefficient(low, high, table) * high
+        flow = c.pipe_area * _coefficient(low, high, values, slopes) * high
         flows[i] = flow if p > q else -flow
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _step(command, moving, tail_area, state, layout, flows, net, c, table):
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _ports(x, port, port_nodes, net, command, moving, c, values, slopes):
+    """Feed or exhaust at the further locomotives; returns the flow into the pipe."""
+    gained = 0.0
+    for k in range(len(port_nodes)):
+        at = port_nodes[k]
+        flow = _head_flow(port[k], x[at], command <= c.atmosphere, c, values, slopes)
+        sensed = x[at] if c.relay or at + 1 == len(net) else x[at + 1]
+        port[k] = _head_pressure(port[k], sensed, command, moving, c)
+        net[at] += flow
+        gained += flow
+    return gained
+
+
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _step(
+    command, moving, tail_area, x, content, port, releasing, tripped, history, cursor,
+    valve_nodes, port_nodes, flows, net, c, values, slopes,
+):  # fmt: skip
     """Advance everything by one step; returns the mass flow into the train in kg/s."""
-    x = state.pressures
-    valves = len(layout.valve_nodes)
-    nodes = len(flows)
-    emergency = command <= c.atmosphere
-    _pipe_flows(x, nodes, flows, c, table)
-    flows[0] = _head_flow(x[0], x[1], emergency, c, table)
-    flows[nodes - 1] = _flow(tail_area, x[nodes - 1], c.atmosphere, table) if tail_area > 0.0 else 0.0
+    nodes, valves = len(flows), len(valve_nodes)
+    _pipe_flows(x, nodes, flows, c, values, slopes)
+    flows[0] = _head_flow(x[0], x[1], command <= c.atmosphere, c, values, slopes)
+    flows[nodes - 1] = 0.0
+    if tail_area > 0.0:
+        flows[nodes - 1] = _flow(tail_area, x[nodes - 1], c.atmosphere, values, slopes)
     gained = flows[0] - flows[nodes - 1]
     for i in range(1, nodes):
         net[i] = flows[i - 1] - flows[i]
-    for k in range(len(layout.port_nodes)):
-        at = layout.port_nodes[k]
-        flow = _head_flow(state.port[k], x[at], emergency, c, table)
-        sensed = x[at] if c.relay or at + 1 == nodes else x[at + 1]
-        state.port[k] = _head_pressure(state.port[k], sensed, command, moving, c)
-        net[at] += flow
-        gained += flow
-    row = state.cursor[0]
-    delayed = not c.latched_release
+    gained += _ports(x, port, port_nodes, net, command, moving, c, values, slopes)
+    row = cursor[0]
     for j in range(valves):
-        at = layout.valve_nodes[j]
+        at = valve_nodes[j]
         p = x[at]
-        before = state.history[row, j] if delayed else p
-        inflow, lost = _valve(j, p, before, command, moving, state, nodes, valves, c, table)
+        before = p
+        if not c.latched_release:
+            before = history[row, j]
+            history[row, j] = p
+        inflow, lost = _valve(
+            j, p, before, command, moving, x, content, releasing, tripped, nodes, valves, c, values, slopes
+        )
         net[at] += inflow
         gained -= lost
-        if delayed:
-            state.history[row, j] = p
-    if delayed:
-        state.cursor[0] = (row + 1) % len(state.history)
+    cursor[0] = row + 1 if row + 1 < len(history) else 0
     head = _head_pressure(x[0], x[1], command, moving, c)
     for i in range(1, nodes):
         x[i] += c.per_pipe * net[i]
@@ -304,7 +326,7 @@ def _step(command, moving, tail_area, state, layout, flows, net, c, table):
     return gained
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", _nrt=False)
 def advance(
     state: State,
     layout: Layout,
@@ -314,6 +336,7 @@ def advance(
     output: Array,
     c: Constants,
     table: Table,
+    work: Work,
 ) -> float:
     """Advance the train over all samples of a drive.
 
@@ -326,22 +349,30 @@ def advance(
         output: Receives the mean of each over the steps of each sample, Pa, shape ``(n_samples, w)``.
         c: Constants, those with ``dt`` in them for the step of this call.
         table: Flow table over sqrt(T).
+        work: Scratch space.
 
     Returns:
         Air gained by the train through head valves and vents, as P V in J.
     """
-    nodes = len(state.pressures) - 4 * len(layout.valve_nodes)
-    flows = np.zeros(nodes)
-    net = np.zeros(nodes)
-    sums = np.zeros(len(watch))
+    # Arrays are taken out of their tuples once, and _nrt=False above: numba otherwise counts references at
+    # every opening and call, which took nine tenths of the run time. Hence no array is made in here.
+    x, content, port, history, cursor = state.pressures, state.content, state.port, state.history, state.cursor
+    releasing, tripped = state.releasing, state.tripped
+    valve_nodes, port_nodes, values, slopes = layout.valve_nodes, layout.port_nodes, table.values, table.slopes
+    commands, speeds, tail_areas = drive.command, drive.speed, drive.tail_area
+    flows, net, sums = work.flows, work.net, work.sums
     gained = 0.0
-    for k in range(len(drive.command)):
-        sums[:] = 0.0
-        moving = drive.speed[k] > 0.01 or not c.speed_gates
+    for k in range(len(commands)):
+        for w in range(len(watch)):
+            sums[w] = 0.0
+        moving = speeds[k] > 0.01 or not c.speed_gates
         for _ in range(steps):
-            gained += _step(drive.command[k], moving, drive.tail_area[k], state, layout, flows, net, c, table)
+            gained += _step(
+                commands[k], moving, tail_areas[k], x, content, port, releasing, tripped, history, cursor,
+                valve_nodes, port_nodes, flows, net, c, values, slopes,
+            )  # fmt: skip
             for w in range(len(watch)):
-                sums[w] += state.pressures[watch[w]]
+                sums[w] += x[watch[w]]
         for w in range(len(watch)):
             output[k, w] = sums[w] / steps
     return gained * c.gas_step

@@ -208,7 +208,6 @@ def _charged_state(consist: Consist, variant: Variant, dt: float) -> kernel.Stat
         content=np.full(valves, content),
         port=np.full(len(consist.port_nodes), consist.charged),
         releasing=np.full(valves, variant.latched_release),
-        applying=np.zeros(valves, dtype=np.bool_),
         tripped=np.zeros(valves, dtype=np.bool_),
         history=np.full((delay, valves), consist.charged),
         cursor=np.zeros(1, dtype=np.int64),
@@ -321,15 +320,14 @@ def simulate(
         port_nodes=np.array(consist.port_nodes, dtype=np.int64) - 1,
     )
     root = math.sqrt(TEMPERATURE)
-    compiled_table = kernel.Table(
-        values=table.values / root, slopes=table.slopes / root, intervals=float(len(table.values) - 1)
-    )
+    compiled_table = kernel.Table(values=table.values / root, slopes=table.slopes / root)
     state = _charged_state(consist, variant, time_step)
     watch = _watch(probes, consist)
     output = np.empty((len(handle), len(watch)))
     before = _stored(state, consist)
     constants = _constants(consist, variant, time_step)
-    gained = kernel.advance(state, layout, drive, steps, watch, output, constants, compiled_table)
+    work = kernel.Work(flows=np.zeros(consist.vehicles), net=np.zeros(consist.vehicles), sums=np.zeros(len(watch)))
+    gained = kernel.advance(state, layout, drive, steps, watch, output, constants, compiled_table, work)
     return AirBrakeRecord(
         sample_time=sample_time,
         probes=probes,

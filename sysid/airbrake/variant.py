@@ -46,10 +46,10 @@ class Variant:
         feed_closed_in_lap: The reservoirs charge in release only, as through the slide valve's feed
             groove. Without it the auxiliary follows a slowly rising pipe at the tail of a train, and the
             release threshold is never reached. Needs ``latched_release``.
-        graduating_lap: An application ends when the auxiliary has come down to the pipe, and, the slide valve
-            being moved already, goes on at a further drop of ``service_drop``. The print ends it ``apply_drop``
-            earlier, and with the empty cylinder a full service stops 4 psi short of equalisation. Needs
-            ``latched_release``.
+        graduating_lap: Once ``apply_drop`` has moved the slide valve, its graduating stem keeps the auxiliary at
+            the pipe's pressure: the passage to the cylinder is open in proportion to the difference, fully at
+            ``service_drop``. The print is open above ``apply_drop`` and shut below, and with the empty cylinder a
+            full service stops 4 psi short of equalisation. Needs ``latched_release``.
         blowback_after_emergency: The cylinder empties into the pipe only after an emergency. The print
             does so in full service too, where the cylinder ends above the pipe.
         release_blocks_application: Auxiliary to cylinder is shut while the cylinder is open. The print
