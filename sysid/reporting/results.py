@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping as Dict
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
 
+from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.estimation import Loop, Status
 from sysid.traces import Role
@@ -27,18 +27,18 @@ def _nan_for_null(value: object) -> object:
     return math.nan if value is None else value
 
 
-# JSON has no word for these: a figure that is not finite is written as one of three strings.
+# JSON has no word for infinity and NaN: a figure that is not finite is written as null, and read as NaN.
 Number = Annotated[
     float,
     BeforeValidator(_nan_for_null),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]}),
+    WithJsonSchema({"type": ["number", "null"]}),
 ]
 
 
 class _Record(BaseModel):
     """Frozen; keys from a later release are kept, so that a copy loses nothing."""
 
-    model_config = ConfigDict(frozen=True, extra="allow", ser_json_inf_nan="strings", protected_namespaces=())
+    model_config = ConfigDict(frozen=True, extra="allow", protected_namespaces=())
 
 
 class FiguresRecord(_Record):
@@ -260,27 +260,9 @@ def write_results(folder: Path, results: Results) -> Path:
     Returns:
         The file.
     """
-    text = json.dumps(json.loads(results.model_dump_json(exclude_none=False)), indent=1, allow_nan=False)
-    return write_atomically(Path(folder) / RESULTS_FILE, text + "\n")
-
-
-def write_atomically(path: Path, text: str) -> Path:
-    """Write text so that a reader sees the old file or the whole new one.
-
-    Args:
-        path: The file; its folder is made if missing.
-        text: What it shall hold, written in UTF-8.
-
-    Returns:
-        The file.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    path = Path(folder) / RESULTS_FILE
+    with replacing(path) as draft:
+        draft.write_text(results.model_dump_json(indent=1) + "\n", encoding="utf-8")
     return path
 
 

@@ -1,0 +1,89 @@
+"""The worst moments of a free run: where to look first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.reporting.signals import CaseSignals
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moment:
+    """A sample with a large error, and the window around it.
+
+    Args:
+        case: Name of the case.
+        sample: Number of the sample.
+        time: Seconds.
+        target: Measured output there.
+        simulated: Free run there; not finite where it diverged.
+        first: First sample of the window.
+        last: Last sample of the window.
+    """
+
+    case: str
+    sample: int
+    time: float
+    target: float
+    simulated: float
+    first: int
+    last: int
+
+    @property
+    def error(self) -> float:
+        """Free run minus target."""
+        return self.simulated - self.target
+
+
+def worst_moments(signals: Dict[str, CaseSignals], count: int, *, share: float = 0.02) -> list[Moment]:
+    """The samples with the largest errors, no two of them in one window.
+
+    Args:
+        signals: By case.
+        count: How many at most.
+        share: Half the length of a window, as a share of its case; it is at least 20 samples.
+
+    Returns:
+        The moments, worst first; a sample where the free run is not finite is worse than any other.
+    """
+    candidates = [moment for case, signal in signals.items() for moment in _moments_of_case(case, signal, count, share)]
+    return sorted(candidates, key=lambda moment: _badness(moment.error), reverse=True)[:count]
+
+
+def _badness(error: float) -> float:
+    return abs(error) if np.isfinite(error) else np.inf
+
+
+def _moments_of_case(case: str, signal: CaseSignals, count: int, share: float) -> list[Moment]:
+    size = np.abs(signal.simulated - signal.target)
+    size[~np.isfinite(size)] = np.inf
+    half = max(20, round(share * len(size)))
+    found = []
+    for _ in range(count):
+        sample = int(np.argmax(size))
+        if size[sample] <= 0.0:
+            break
+        first, last = max(0, sample - half), min(len(size) - 1, sample + half)
+        found.append(_moment(case, signal, sample, (first, last)))
+        _blank(size, max(0, sample - 2 * half), sample + 2 * half)
+    return found
+
+
+def _blank(size: NDArray[np.float64], first: int, last: int) -> None:
+    size[first : last + 1] = -1.0
+
+
+def _moment(case: str, signal: CaseSignals, sample: int, window: tuple[int, int]) -> Moment:
+    return Moment(
+        case=case,
+        sample=sample,
+        time=float(signal.time[sample]),
+        target=float(signal.target[sample]),
+        simulated=float(signal.simulated[sample]),
+        first=window[0],
+        last=window[1],
+    )

@@ -1,0 +1,75 @@
+"""Numbers as engineers read them: three significant digits, powers of ten, words for what is not a number."""
+
+from __future__ import annotations
+
+import math
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number(value: float, *, digits: int = 3, missing: str = "not defined") -> str:
+    """A number with a few significant digits.
+
+    Args:
+        value: The number.
+        digits: Significant digits.
+        missing: What to say for NaN.
+
+    Returns:
+        The text; ``infinite`` for an infinity.
+
+    Example:
+        >>> number(0.0041493), number(2.2391e-5), number(-1234.5), number(float("nan"))
+        ('0.00415', '2.24 × 10⁻⁵', '−1230', 'not defined')
+    """
+    if math.isnan(value):
+        return missing
+    if math.isinf(value):
+        return "infinite" if value > 0 else "minus infinite"
+    if value == 0.0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = int(exponent)
+    if -4 < power < 6:
+        rounded = round(value, digits - 1 - power)
+        text = f"{rounded:.{max(0, digits - 1 - power)}f}"
+    else:
+        text = f"{mantissa} × 10{str(power).translate(_SUPERSCRIPT)}"
+    return text.replace("-", "−")
+
+
+def seconds(value: float) -> str:
+    """A duration in the unit that suits it.
+
+    Args:
+        value: Seconds.
+
+    Returns:
+        The duration with its unit.
+
+    Example:
+        >>> seconds(0.00123), seconds(41.7), seconds(4500.0)
+        ('1.23 ms', '41.7 s', '75.0 min')
+    """
+    if not math.isfinite(value):
+        return "not measured"
+    for limit, factor, unit in ((1e-3, 1e6, "µs"), (1.0, 1e3, "ms"), (120.0, 1.0, "s"), (7200.0, 1 / 60, "min")):
+        if value < limit:
+            return f"{number(value * factor)} {unit}"
+    return f"{number(value / 3600)} h"
+
+
+def times(value: float) -> str:
+    """A ratio.
+
+    Args:
+        value: The ratio.
+
+    Returns:
+        The ratio with a multiplication sign.
+
+    Example:
+        >>> times(0.0312), times(1234.0)
+        ('0.031 ×', '1200 ×')
+    """
+    return f"{number(value, digits=2)} ×" if math.isfinite(value) else "not defined"

@@ -1,0 +1,354 @@
+"""Tables: rows of cells that carry the exact number beside its printed form; the template only lays them out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sysid.reporting.numbers import number, seconds, times
+from sysid.reporting.results import CaseRecord, FitRecord, PublishedRecord, Results
+from sysid.traces import Role
+
+SCORED = (Role.VALIDATION, Role.TEST)
+"""Roles of the cases that a verdict rests on: nothing was fitted to them or chosen on them."""
+
+DIVERGED = "diverged"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One cell.
+
+    Args:
+        text: As printed.
+        value: The exact number, where it is one.
+        below: A second, smaller line.
+        header: Whether it names its row.
+        mark: A class for emphasis: ``best``, ``published``, ``number`` or nothing.
+    """
+
+    text: str
+    value: float | None = None
+    below: str = ""
+    header: bool = False
+    mark: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table.
+
+    Args:
+        caption: What it shows, units included.
+        head: Names of the columns, each with a second line (may be empty).
+        rows: The rows.
+        note: A sentence below it.
+    """
+
+    caption: str
+    head: tuple[tuple[str, str], ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+
+
+def figure_cell(value: float, *, missing: str = "not defined", below: str = "", mark: str = "number") -> Cell:
+    """A cell with a number in three significant digits."""
+    return Cell(text=number(value, missing=missing), value=value, below=below, mark=mark)
+
+
+def case_columns(fits: Sequence[FitRecord]) -> dict[str, Role]:
+    """The cases of some fits with their roles, in the order of the file."""
+    return {name: case.role for fit in fits for name, case in fit.cases.items()}
+
+
+def scored_cases(fit: FitRecord) -> dict[str, CaseRecord]:
+    """The cases of a fit that a verdict may rest on."""
+    return {name: case for name, case in fit.cases.items() if case.role in SCORED}
+
+
+def mean_mse(fit: FitRecord, kind: str) -> float:
+    """Mean over the scored cases of ``free_run`` or ``one_step`` mse; NaN without such cases."""
+    values = [getattr(case, kind).mse for case in scored_cases(fit).values()]
+    return sum(values) / len(values) if values else float("nan")
+
+
+def accuracy_table(fits: Sequence[FitRecord], kind: str, best: str | None) -> Table:
+    """Mean squared errors of the fits of one mapping by case, of one kind only, with the published figures below.
+
+    Args:
+        fits: The fits.
+        kind: ``free_run`` or ``one_step``.
+        best: Name of the chosen fit.
+
+    Returns:
+        The table.
+    """
+    columns = case_columns(fits)
+    rows = []
+    for fit in fits:
+        cells = [_name_cell(fit, best)]
+        for name in columns:
+            case = fit.cases.get(name)
+            cells.append(Cell(text="not run") if case is None else _mse_cell(case, kind))
+        cells.append(figure_cell(mean_mse(fit, kind), missing=_missing_mean(fit)))
+        rows.append(tuple(cells))
+    published = _published_row(fits, kind, list(columns), lambda figure: figure_cell(figure.value, mark="published"))
+    rows.extend(published)
+    words = {"free_run": "Free run", "one_step": "One step ahead"}[kind]
+    note = {
+        "free_run": "The model runs on its own past output: the figure that counts.",
+        "one_step": "Each step starts from measured output: this says little about a free run.",
+    }[kind]
+    return Table(
+        caption=f"{words}: mean squared error [{fits[0].unit}²] by case. {fits[0].mapping}.",
+        head=(
+            ("fit", ""),
+            *((name, role.value) for name, role in columns.items()),
+            ("mean", "not fitted or chosen on"),
+        ),
+        rows=tuple(rows),
+        note=note + (" Small figures: ours divided by the published one; below 1 is better." if published else ""),
+    )
+
+
+def run_time_table(fits: Sequence[FitRecord], best: str | None) -> Table:
+    """Run time of the free run by case, with how many times faster than real time it is.
+
+    Args:
+        fits: The fits of one mapping.
+        best: Name of the chosen fit.
+
+    Returns:
+        The table.
+    """
+    columns = case_columns(fits)
+    rows = []
+    for fit in fits:
+        cells = [_name_cell(fit, best)]
+        for name in columns:
+            case = fit.cases.get(name)
+            if case is None:
+                cells.append(Cell(text="not run"))
+                continue
+            faster = f"{number(real_time_factor(case), digits=2)} × real time"
+            cells.append(figure_cell(1e3 * case.run_time_s, missing="not measured", below=faster))
+        rows.append(tuple(cells))
+    rows.extend(
+        _published_row(
+            fits, "run_time", list(columns), lambda figure: figure_cell(1e3 * figure.value, mark="published")
+        )
+    )
+    return Table(
+        caption=f"Run time of the free run [ms] by case. {fits[0].mapping}.",
+        head=(("fit", ""), *((name, f"{number(_simulated(fits, name))} s simulated") for name in columns)),
+        rows=tuple(rows),
+    )
+
+
+def real_time_factor(case: CaseRecord) -> float:
+    """Simulated seconds for each second of run time."""
+    return case.simulated_s / case.run_time_s if case.run_time_s > 0.0 else float("nan")
+
+
+def quality_table(fit: FitRecord, kind: str) -> Table:
+    """All figures of merit of one fit by case.
+
+    Args:
+        fit: The fit.
+        kind: ``free_run`` or ``one_step``.
+
+    Returns:
+        The table.
+    """
+    rows = []
+    for name, case in fit.cases.items():
+        figures = getattr(case, kind)
+        rows.append(
+            (
+                Cell(text=name, header=True),
+                Cell(text=case.role.value),
+                figure_cell(figures.mse, missing=DIVERGED),
+                figure_cell(figures.nrmse_fit, missing=DIVERGED if math.isnan(figures.mse) else "not defined"),
+                figure_cell(figures.max_abs_error, missing=DIVERGED),
+                Cell(text=_correlation(figures.r), value=figures.r, mark="number"),
+            )
+        )
+    words = {"free_run": "free run", "one_step": "one step ahead"}[kind]
+    unit = fit.unit
+    return Table(
+        caption=f"{fit.name}, {words}: all figures by case.",
+        head=(
+            ("case", ""),
+            ("role", ""),
+            ("mse", f"{unit}²"),
+            ("fit", "%"),
+            ("largest error", unit),
+            ("R", "correlation"),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def ranking_table(results: Results) -> Table:
+    """What was tried, best first on the traces that chose."""
+    ranked = sorted(results.fits, key=lambda fit: (math.isnan(fit.selection_mse), fit.selection_mse))
+    best = None if results.best is None else results.best.name
+    rows = []
+    for fit in ranked:
+        effective = None if fit.evidence is None else sum(fit.evidence.effective_parameters.values())
+        count = Cell(text="unknown") if fit.n_parameters is None else _count_cell(fit.n_parameters, effective)
+        rows.append(
+            (
+                _name_cell(fit, best),
+                Cell(text=fit.mapping),
+                Cell(text=fit.label),
+                Cell(text=fit.loop.value),
+                count,
+                Cell(text=seconds(fit.train_time_s), value=fit.train_time_s, mark="number"),
+                figure_cell(fit.selection_mse, missing="none"),
+                Cell(text=fit.status_sentence),
+            )
+        )
+    return Table(
+        caption="Every fit of this run, best first on the traces that choose between fits.",
+        head=(
+            ("fit", ""),
+            ("mapping", ""),
+            ("structure", ""),
+            ("trained", "loop"),
+            ("parameters", ""),
+            ("training", ""),
+            ("selection mse", "free run"),
+            ("how it ended", ""),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def export_table(results: Results) -> Table | None:
+    """The exported files and how they compare with their models; ``None`` without any."""
+    rows = [
+        (
+            Cell(text=export.format, header=True),
+            Cell(text=fit.name),
+            Cell(text=export.file),
+            figure_cell(export.largest_difference, missing="not finite"),
+            figure_cell(export.tolerance),
+            Cell(text="within tolerance" if export.largest_difference <= export.tolerance else "OVER TOLERANCE"),
+        )
+        for fit in results.fits
+        for export in fit.exports
+    ]
+    if not rows:
+        return None
+    unit = next(fit.unit for fit in results.fits if fit.exports)
+    return Table(
+        caption="Exported files, each run against its model on every case.",
+        head=(
+            ("format", ""),
+            ("fit", ""),
+            ("file", ""),
+            ("largest difference", unit),
+            ("tolerance", unit),
+            ("verdict", ""),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def data_table(results: Results) -> Table:
+    """The traces: what each was used for, how long it is, and where it comes from."""
+    return Table(
+        caption=f"Data set {results.data.name}, sample time {number(results.data.sample_time)} s.",
+        head=(("case", ""), ("role", ""), ("samples", ""), ("length", "s"), ("provenance", "")),
+        rows=tuple(
+            (
+                Cell(text=name, header=True),
+                Cell(text=case.role.value),
+                Cell(text=str(case.samples), value=case.samples, mark="number"),
+                Cell(text=f"{case.duration_s:g}", value=case.duration_s, mark="number"),
+                Cell(text=" ".join(_sentence(text) for text in case.provenance) or "not recorded"),
+            )
+            for name, case in results.data.cases.items()
+        ),
+    )
+
+
+def facts(fields: dict[str, Any]) -> list[tuple[str, str]]:
+    """Plain data as names and texts, nested names joined.
+
+    Args:
+        fields: Plain data.
+
+    Returns:
+        Pairs, in order.
+
+    Example:
+        >>> facts({"cores": 2, "packages": {"numpy": "2.2", "scipy": "1.15"}, "commit": None})
+        [('cores', '2'), ('packages', 'numpy 2.2, scipy 1.15')]
+    """
+    return [(key.replace("_", " "), _words(value)) for key, value in fields.items() if value is not None]
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_words(entry)}" for key, entry in value.items() if entry is not None)
+    if isinstance(value, list | tuple):
+        return ", ".join(_words(entry) for entry in value)
+    return number(value) if isinstance(value, float) else str(value)
+
+
+def _sentence(text: str) -> str:
+    text = text.strip()
+    return text if text.endswith((".", "!", "?")) else text + "."
+
+
+def _name_cell(fit: FitRecord, best: str | None) -> Cell:
+    chosen = fit.name == best
+    below = f"{fit.label}, trained {fit.loop.value} loop" + ("; chosen" if chosen else "")
+    return Cell(text=fit.name, below=below, header=True, mark="best" if chosen else "")
+
+
+def _mse_cell(case: CaseRecord, kind: str) -> Cell:
+    published = (case.published or {}).get(kind)
+    below = times(published.ratio) if published is not None and math.isfinite(published.ratio) else ""
+    return figure_cell(getattr(case, kind).mse, missing=DIVERGED, below=below)
+
+
+def _missing_mean(fit: FitRecord) -> str:
+    return DIVERGED if scored_cases(fit) else "no such case"
+
+
+def _count_cell(parameters: int, effective: float | None) -> Cell:
+    below = "" if effective is None or math.isnan(effective) else f"{number(effective)} effective"
+    return Cell(text=str(parameters), value=parameters, below=below, mark="number")
+
+
+def _published_row(
+    fits: Sequence[FitRecord], kind: str, columns: list[str], cell: Callable[[PublishedRecord], Cell]
+) -> list[tuple[Cell, ...]]:
+    """The yardsticks as a row of their own; no row where nothing was published."""
+    by_case: dict[str, PublishedRecord] = {}
+    for fit in fits:
+        for name, case in fit.cases.items():
+            if case.published and kind in case.published:
+                by_case.setdefault(name, case.published[kind])
+    if not by_case:
+        return []
+    sources = ", ".join(dict.fromkeys(figure.source for figure in by_case.values()))
+    labels = ", ".join(dict.fromkeys(figure.label for figure in by_case.values()))
+    title = Cell(text="published", below=f"{sources}: {labels}", header=True, mark="published")
+    cells = [cell(by_case[case]) if case in by_case else Cell(text="none", mark="published") for case in columns]
+    mean = [] if kind == "run_time" else [Cell(text="", mark="published")]
+    return [(title, *cells, *mean)]
+
+
+def _simulated(fits: Sequence[FitRecord], name: str) -> float:
+    return next(fit.cases[name].simulated_s for fit in fits if name in fit.cases)
+
+
+def _correlation(r: float) -> str:
+    # R lies close to 1 for any useful model: three digits would print 1.00 for all of them.
+    return f"{r:.6f}".replace("-", "−") if math.isfinite(r) else "not defined"

@@ -1,0 +1,194 @@
+"""The verdict: which model, how good, how fast, where it is weak, in sentences made from stored figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping as Dict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sysid.estimation import Status
+from sysid.reporting.moments import Moment
+from sysid.reporting.numbers import number, seconds, times
+from sysid.reporting.results import CaseRecord, FitRecord, Results
+from sysid.reporting.tables import mean_mse, real_time_factor, scored_cases
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tile:
+    """One figure that stands out.
+
+    Args:
+        figure: With its unit.
+        words: What it is.
+    """
+
+    figure: str
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What a reader with one minute should know.
+
+    Args:
+        headline: One sentence.
+        tiles: The figures that stand out.
+        points: Pairs of a keyword and a sentence.
+        warnings: What makes the verdict weaker than it looks.
+    """
+
+    headline: str
+    tiles: tuple[Tile, ...]
+    points: tuple[tuple[str, str], ...]
+    warnings: tuple[str, ...]
+
+
+def verdict(results: Results, moments: Sequence[Moment], comparability: str) -> Verdict:
+    """Say which model was chosen and what it is worth.
+
+    Args:
+        results: The results, with published figures where there are some.
+        moments: The worst moments of the chosen fit, worst first.
+        comparability: What a comparison with the published figures can and cannot say.
+
+    Returns:
+        The verdict.
+    """
+    best = results.best_fit
+    if best is None or results.best is None:
+        return Verdict(
+            headline="No fit was chosen.",
+            tiles=(),
+            points=(("Fits", f"{len(results.fits)} fits are compared below; none was marked as the best."),),
+            warnings=_warnings(results, None),
+        )
+    cases = _judged(best)
+    points = [("Accuracy", _accuracy(best, cases))]
+    published = _published(cases, comparability)
+    points += [("Published", published)] if published else []
+    points += [("Speed", _speed(cases, results)), ("Weakness", _weakness(best, cases, moments))]
+    points += [("Choice", results.best.chosen_by), ("Export", _export(best))]
+    count = "" if best.n_parameters is None else f", {best.n_parameters} parameters"
+    return Verdict(
+        headline=f"{best.name} ({best.label}, trained {best.loop.value} loop{count}) models {best.mapping}.",
+        tiles=_tiles(best, cases),
+        points=tuple(points),
+        warnings=_warnings(results, best),
+    )
+
+
+def _judged(fit: FitRecord) -> Dict[str, CaseRecord]:
+    return scored_cases(fit) or fit.cases
+
+
+def _tiles(fit: FitRecord, cases: Dict[str, CaseRecord]) -> tuple[Tile, ...]:
+    mean = sum(case.free_run.mse for case in cases.values()) / len(cases)
+    fits = [case.free_run.nrmse_fit for case in cases.values() if math.isfinite(case.free_run.nrmse_fit)]
+    errors = [case.free_run.max_abs_error for case in cases.values()]
+    factor = min(real_time_factor(case) for case in cases.values())
+    return (
+        Tile(figure=f"{number(mean, missing='diverged')} {fit.unit}²", words="mean mse, free run"),
+        Tile(figure=f"{number(min(fits), digits=4)} %" if fits else "not defined", words="lowest fit, free run"),
+        Tile(figure=f"{number(_largest(errors), missing='diverged')} {fit.unit}", words="largest error of any sample"),
+        Tile(figure=f"{number(factor, digits=2)} ×", words="faster than real time, at least"),
+    )
+
+
+def _largest(values: Sequence[float]) -> float:
+    return math.nan if any(math.isnan(value) for value in values) else max(values)
+
+
+def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord]) -> str:
+    unit = fit.unit
+    kind = "that it was neither fitted to nor chosen on" if scored_cases(fit) else "of this run"
+    finite = {name: case for name, case in cases.items() if math.isfinite(case.free_run.mse)}
+    if not finite:
+        return f"The free run diverges on every one of the {_count(len(cases), 'case')} {kind}."
+    low = min(finite, key=lambda name: finite[name].free_run.mse)
+    high = max(finite, key=lambda name: finite[name].free_run.mse)
+    text = (
+        f"In free run on the {_count(len(cases), 'case')} {kind}, the mse lies between "
+        f"{number(finite[low].free_run.mse)} {unit}² ({low}) and {number(finite[high].free_run.mse)} {unit}² ({high})"
+    )
+    if len(finite) < len(cases):
+        return f"{text}; on {', '.join(sorted(set(cases) - set(finite)))} it diverges."
+    text += f", on average {number(mean_mse(fit, 'free_run'))} {unit}²" if scored_cases(fit) else ""
+    return f"{text}. The root mean square error of the worst case is {number(math.sqrt(finite[high].free_run.mse))} {unit}."
+
+
+def _published(cases: Dict[str, CaseRecord], comparability: str) -> str:
+    ratios = {
+        name: case.published["free_run"].ratio
+        for name, case in cases.items()
+        if case.published and "free_run" in case.published and math.isfinite(case.published["free_run"].ratio)
+    }
+    if not ratios:
+        return ""
+    better = sum(ratio <= 1.0 for ratio in ratios.values())
+    low, high = min(ratios, key=lambda name: ratios[name]), max(ratios, key=lambda name: ratios[name])
+    return (
+        f"At or below the published free-run mse on {better} of {_count(len(ratios), 'case')}: from "
+        f"{times(ratios[low])} ({low}) to {times(ratios[high])} ({high}) of it. {comparability}".strip()
+    )
+
+
+def _speed(cases: Dict[str, CaseRecord], results: Results) -> str:
+    slow = min(cases, key=lambda name: real_time_factor(cases[name]))
+    case = cases[slow]
+    machine = results.environment.get("cpu") or "the machine named below"
+    return (
+        f"A free run of {number(case.simulated_s)} s ({slow}) takes {seconds(case.run_time_s)}: "
+        f"{number(real_time_factor(case), digits=2)} times faster than real time on {machine}."
+    )
+
+
+def _weakness(fit: FitRecord, cases: Dict[str, CaseRecord], moments: Sequence[Moment]) -> str:
+    diverging = [name for name, case in cases.items() if not math.isfinite(case.free_run.mse)]
+    if diverging:
+        return f"The free run diverges on {', '.join(diverging)}: do not use this model there."
+    worst = max(cases, key=lambda name: cases[name].free_run.mse)
+    text = f"Weakest on {worst} (mse {number(cases[worst].free_run.mse)} {fit.unit}²)."
+    if moments:
+        moment = moments[0]
+        text += (
+            f" The largest error, {number(moment.error)} {fit.unit}, occurs in {moment.case} at {moment.time:g} s, "
+            f"where the target is {number(moment.target)} {fit.unit} and the free run {number(moment.simulated)} {fit.unit}."
+        )
+    return text
+
+
+def _export(fit: FitRecord) -> str:
+    if not fit.exports:
+        return "Not exported."
+    worst = max(fit.exports, key=lambda export: export.largest_difference)
+    formats = ", ".join(dict.fromkeys(export.format for export in fit.exports))
+    return (
+        f"Frozen as {formats}; the files differ from the model by at most "
+        f"{number(worst.largest_difference)} {fit.unit} on any case (allowed: {number(worst.tolerance)})."
+    )
+
+
+def _warnings(results: Results, best: FitRecord | None) -> tuple[str, ...]:
+    found = []
+    if best is not None:
+        if not scored_cases(best):
+            found.append(
+                "There is no validation or test case: the figures are those of traces that the model has seen."
+            )
+        if best.status in Status.__members__ and not Status[best.status].usable:
+            found.append(f"{best.name}: {best.status_sentence}")
+        found += [
+            f"{export.file} differs from its model by more than the tolerance: do not use it."
+            for export in best.exports
+            if not export.largest_difference <= export.tolerance
+        ]
+    for fit in results.fits:
+        diverging = [name for name, case in fit.cases.items() if not math.isfinite(case.free_run.mse)]
+        if diverging and fit is not best:
+            found.append(f"{fit.name}: the free run diverges on {', '.join(diverging)}.")
+    return tuple(found)
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
