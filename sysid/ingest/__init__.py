@@ -1,1 +1,56 @@
-"""Files on disk in, a TraceSet in the units that were asked for out."""
+"""Files on disk in, a TraceSet in the units that were asked for out.
+
+The way of a file: a reader (``readers/``) makes a :class:`RawTable` of it, ``assemble`` selects the
+channels, converts units, makes the repairs that were asked for (and refuses what was not), and brings
+the samples onto a uniform time grid; ``dataset`` does so for every case of a ``dataset.yaml``, or has
+a generator make the traces and keeps them in a cache.
+"""
+
+from sysid.ingest.assemble import Wanted, assemble
+from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
+from sysid.ingest.dataset import Progress, find_dataset, load_dataset
+from sysid.ingest.description import DatasetDescription, read_description
+from sysid.ingest.generators import Generator, find_generator
+from sysid.ingest.inspection import ColumnFinding, FileFinding, inspect_file
+from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
+from sysid.ingest.proposal import propose_dataset
+from sysid.ingest.readers import READERS, Reader
+from sysid.ingest.reading import read_table, read_trace
+from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.timing import Timing, survey
+from sysid.ingest.writers import write_csv, write_parquet, write_trace
+
+__all__ = [
+    "READERS",
+    "ColumnFinding",
+    "ColumnOptions",
+    "DatasetDescription",
+    "FileFinding",
+    "FileOptions",
+    "Generator",
+    "GridOptions",
+    "Progress",
+    "RawColumn",
+    "RawTable",
+    "Reader",
+    "RepairOptions",
+    "TimeOptions",
+    "Timing",
+    "TraceCache",
+    "Wanted",
+    "assemble",
+    "content_key",
+    "default_cache_folder",
+    "find_dataset",
+    "find_generator",
+    "inspect_file",
+    "load_dataset",
+    "propose_dataset",
+    "read_description",
+    "read_table",
+    "read_trace",
+    "survey",
+    "write_csv",
+    "write_parquet",
+    "write_trace",
+]

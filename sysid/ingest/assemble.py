@@ -99,7 +99,7 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
     _check_names(wanted.channels, files, table.source)
     digest = hashlib.sha256(table.source.read_bytes()).hexdigest()
     notes = [f"read from {table.source.name} (SHA-256 {digest[:16]})", *table.notes]
-    stamps = _stamps(table, files)
+    stamps = stamps_in_seconds(table, files)
     columns = []
     for channel in wanted.channels:
         given = files.columns.get(channel.name, ColumnOptions(column=channel.name))
@@ -113,9 +113,17 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
         stamps=stamps,
         names=tuple(channel.name for channel in wanted.channels),
         values=np.column_stack(columns),
-        marked=np.zeros(len(table), dtype=np.bool_),
+        marked=_marked(table),
         notes=tuple(notes),
     )
+
+
+def _marked(table: RawTable) -> NDArray[np.bool_]:
+    # A file that we wrote carries the mask of its trace as a column.
+    if "sysid" not in table.metadata or "usable" not in table.names:
+        return np.zeros(len(table), dtype=np.bool_)
+    marked: NDArray[np.bool_] = table.find("usable").values == 0.0
+    return marked
 
 
 def _check_names(channels: Sequence[Channel], files: FileOptions, source: Path) -> None:
@@ -133,7 +141,20 @@ def _check_names(channels: Sequence[Channel], files: FileOptions, source: Path) 
             )
 
 
-def _stamps(table: RawTable, files: FileOptions) -> NDArray[np.float64]:
+def stamps_in_seconds(table: RawTable, files: FileOptions) -> NDArray[np.float64]:
+    """The time stamps of a table.
+
+    Args:
+        table: The file as columns.
+        files: Which column holds time, and in which unit.
+
+    Returns:
+        Shape ``(n_rows,)``, seconds; NaN where the file has none.
+
+    Raises:
+        TraceError: If no time column is named or recognised.
+        UnitError: If its unit is missing or not one of time.
+    """
     if files.time.step is not None:
         return files.time.step * np.arange(len(table), dtype=np.float64)
     name = files.time.column or table.time

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from sysid.errors import UnitError
 from sysid.units import Reference, check_unit
 
+# "p [1]" is a pure number, "p[1]" an element of p.
+_INDEX = re.compile(r"^.*?(?:\S\[\s*\d*\s*\]|\[\s*(?!1\s*\])\d*\s*\])\s*$", re.DOTALL)
 _BRACKETS = re.compile(r"^(?P<name>.*?\S)\s*\[(?P<unit>[^\[\]]*)\]\s*$", re.DOTALL)
 _PARENTHESES = re.compile(r"^(?P<name>.*?\S)\s*\((?P<unit>[^()]*(?:\([ag]\))?)\)\s*$", re.DOTALL)
 _REFERENCE_WORD = re.compile(r"^(?P<unit>.*?\S)\s*(?:\b|\()(?P<word>gauge|absolute|abs|[ga](?=\)$))\)?$", re.IGNORECASE)
@@ -84,8 +86,8 @@ def split_reference(text: str) -> tuple[str, Reference | None]:
 def parse_header(text: str) -> Header:
     """Take a column header apart.
 
-    Square brackets always hold a unit, unless they hold a number, as in ``p[0]``; round ones do only
-    if the unit is known, since ``Test (1)`` or ``BP (wagon)`` are names.
+    Square brackets always hold a unit, unless they hold an index, as in ``p[0]``; round ones do only
+    if the unit is known, since ``Test (1)`` or ``BP (wagon)`` are names. ``p [1]`` is a pure number.
 
     Args:
         text: For example ``"BP [kPa]"``, ``"Tijd (s)"``, ``"BP [psi gauge]"``, ``"STP"``.
@@ -100,7 +102,7 @@ def parse_header(text: str) -> Header:
         Header(name='Test (1)', unit=None, reference=None)
     """
     match = _BRACKETS.match(text)
-    if match and not match["unit"].strip().isdigit():
+    if match and not _INDEX.match(text):
         unit, reference = split_reference(match["unit"])
         return Header(name=match["name"].strip(), unit=unit or None, reference=reference)
     match = _PARENTHESES.match(text)

@@ -97,25 +97,25 @@ def _line(slots: NDArray[np.float64], stamps: NDArray[np.float64]) -> tuple[floa
     return slope, float(np.abs(y - slope * x).max())
 
 
-def round_step(step: float, *, samples: int) -> float:
+def round_step(step: float, *, samples: int, even: bool) -> float:
     """A measured step as a person would write it.
 
     Args:
         step: Seconds between samples, as fitted.
         samples: How many samples it was fitted over.
+        even: Whether the stamps are even. If so, the result keeps the last stamp within a thousandth
+            of a step of its place; if not (they will be resampled) it is within 0.5 % of the step.
 
     Returns:
-        The number of fewest digits (at most six) that is within 0.5 % of the step; exact steps stay
-        what they are.
+        The number of fewest digits that does so.
 
     Example:
-        >>> round_step(0.10029, samples=1500), round_step(0.008333333, samples=100)
-        (0.1, 0.00833333)
+        >>> round_step(0.10029, samples=1500, even=False), round_step(1 / 120, samples=100, even=True)
+        (0.1, 0.0083333)
     """
-    drift = 0.005 if samples < 3 else min(0.005, 0.5 / samples)
-    for tolerance in (drift, 0.005):
-        for digits in range(1, 4):
-            rounded = float(f"{step:.{digits}g}")
-            if abs(rounded - step) <= tolerance * step:
-                return rounded
-    return float(f"{step:.6g}")
+    tolerance = 1e-3 / samples if even else 5e-3
+    for digits in range(1, 15):
+        rounded = float(f"{step:.{digits}g}")
+        if abs(rounded - step) <= tolerance * step:
+            return rounded
+    return step

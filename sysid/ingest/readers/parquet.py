@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid.ingest.headers import parse_header
+from sysid.ingest.headers import Header, parse_header
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.table import RawTable, array_column, recognise_time
@@ -23,8 +23,9 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
         raise damaged(path, "Parquet", error) from error
     columns = []
     for field, chunks in zip(table.schema, table.columns, strict=True):
-        header = parse_header(field.name)
         meta = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+        unit = meta.get("unit", meta.get("units"))
+        header = parse_header(field.name) if unit is None else Header(name=field.name, unit=unit)
         # A null becomes NaN by itself, in float columns and in integer ones; text stays text.
         array = np.asarray(chunks.to_numpy())
         if array.dtype.kind == "O" and pa.types.is_decimal(field.type):
@@ -35,7 +36,7 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
                 header.name,
                 array,
                 where=str(path),
-                unit=meta.get("unit", meta.get("units", header.unit)),
+                unit=header.unit,
                 reference=Reference(reference) if reference in {r.value for r in Reference} else header.reference,
                 description=meta.get("description", ""),
             )

@@ -1,0 +1,184 @@
+"""A data set by name or path: find its description, make or read its traces."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from sysid.content import content_folders, unique_folders
+from sysid.errors import ConfigError
+from sysid.ingest.assemble import Wanted, assemble, round_channels
+from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
+from sysid.ingest.description import DatasetDescription, read_description
+from sysid.ingest.generators import Generator, find_generator
+from sysid.ingest.options import FileOptions
+from sysid.ingest.reading import read_table
+from sysid.traces import Trace, TraceSet
+
+DESCRIPTION_FILE = "dataset.yaml"
+Progress = Callable[[str, int, int], None]
+"""Called as ``progress(case, index, count)`` before case ``index`` (from 0) of ``count`` is made."""
+
+
+def find_dataset(name_or_path: str | Path, *, search: Sequence[Path] | None = None) -> Path:
+    """The description of a data set.
+
+    Args:
+        name_or_path: A name, a folder that holds a ``dataset.yaml``, or a YAML file.
+        search: Folders to look in for names; ``None`` is the workspace's ``datasets``, then the
+            built-in ones.
+
+    Returns:
+        Path of the YAML file.
+
+    Raises:
+        ConfigError: If there is no such data set; names that are known are listed.
+    """
+    path = Path(name_or_path)
+    for candidate in (path / DESCRIPTION_FILE, path):
+        if candidate.is_file():
+            return candidate
+    folders = content_folders("datasets") if search is None else unique_folders(search)
+    for folder in folders:
+        candidate = folder / path / DESCRIPTION_FILE
+        if candidate.is_file():
+            return candidate
+    known = sorted({file.parent.name for folder in folders for file in folder.glob(f"*/{DESCRIPTION_FILE}")})
+    near = difflib.get_close_matches(str(name_or_path), known, n=1)
+    raise ConfigError(
+        f"there is no data set {name_or_path}",
+        where=", ".join(str(folder) for folder in folders) or "no folder of data sets was found",
+        expected=f"one of {', '.join(known) or '(none)'}, or the path of a {DESCRIPTION_FILE}",
+        got=name_or_path,
+        remedy=f"did you mean {near[0]}?" if near else "correct the name or the path",
+    )
+
+
+def load_dataset(
+    name_or_path: str | Path,
+    *,
+    cases: Sequence[str] | None = None,
+    cache: bool | Path = True,
+    search: Sequence[Path] | None = None,
+    progress: Progress | None = None,
+) -> TraceSet:
+    """Load a data set: read its files, or have its generator make the traces.
+
+    Generated traces are kept under the hash of everything that they are made from (recipe, options,
+    channels, versions), and are made again when any of it changes or the kept file is damaged.
+
+    Args:
+        name_or_path: A name, a folder that holds a ``dataset.yaml``, or a YAML file.
+        cases: Only these; ``None`` is all.
+        cache: Whether generated traces are kept, or the folder to keep them in; ``True`` is
+            ``$SYSID_CACHE`` or ``~/.cache/sysid``.
+        search: Folders to look in for names, instead of the usual ones.
+        progress: Called before each case.
+
+    Returns:
+        The traces, with the roles that the description gives them.
+
+    Raises:
+        ConfigError: If the description, or a case asked for, cannot be used.
+        ReaderError: If a file cannot be read.
+        ChannelError: If a channel is missing.
+        UnitError: If a unit is missing, unknown or of another quantity.
+        TraceError: If something is wrong with the samples and its repair was not asked for.
+    """
+    path = find_dataset(name_or_path, search=search)
+    description = read_description(path)
+    chosen = _choose(description, cases, path)
+    store = None
+    if cache is not False:
+        store = TraceCache(folder=default_cache_folder() if cache is True else Path(cache))
+    source = description.source
+    generator = None if source.generator is None else find_generator(source.generator, where=path)
+    traces = []
+    for index, case in enumerate(chosen):
+        if progress is not None:
+            progress(case, index, len(chosen))
+        if generator is not None:
+            traces.append(_generated(description, case, generator, store))
+        else:
+            traces.append(_read(description, case, path.parent))
+    return TraceSet(
+        name=description.name,
+        traces=tuple(traces),
+        roles={case: description.cases[case].role for case in chosen},
+        source=_source(description),
+    )
+
+
+def _choose(description: DatasetDescription, cases: Sequence[str] | None, path: Path) -> list[str]:
+    known = list(description.cases)
+    if cases is None:
+        return known
+    strangers = [case for case in cases if case not in known]
+    if strangers or not cases:
+        near = [match for case in strangers for match in difflib.get_close_matches(case, known, n=1)]
+        raise ConfigError(
+            f"no case {', '.join(strangers)} in the data set" if strangers else "no case is asked for",
+            where=path,
+            expected=f"one of {', '.join(known)}",
+            got=", ".join(strangers) or "none",
+            remedy=f"did you mean {', '.join(near)}?" if near else "correct the name of the case",
+        )
+    return [case for case in known if case in cases]
+
+
+def _generated(description: DatasetDescription, case: str, generator: Generator, store: TraceCache | None) -> Trace:
+    recipe = description.cases[case].recipe or {}
+    key = content_key(
+        {
+            "generator": [generator.name, generator.version],
+            "case": case,
+            "recipe": recipe,
+            "options": description.source.options,
+            "channels": [channel.model_dump(mode="json") for channel in description.channels],
+            "sample_time": description.sample_time,
+        }
+    )
+    kept = store.load(key) if store is not None else None
+    if kept is not None:
+        return kept
+    trace = generator.make(
+        case=case,
+        recipe=recipe,
+        options=description.source.options,
+        channels=description.trace_channels,
+        sample_time=description.sample_time,
+    )
+    values, notes = round_channels(trace.values, trace.channels, description.decimals)
+    finished = Trace(
+        name=trace.name,
+        sample_time=trace.sample_time,
+        channels=trace.channels,
+        values=values,
+        start_time=trace.start_time,
+        usable=trace.usable,
+        provenance=(f"made by the generator {generator.name}", *trace.provenance, *notes),
+    )
+    if store is not None:
+        store.store(key, finished)
+    return finished
+
+
+def _read(description: DatasetDescription, case: str, folder: Path) -> Trace:
+    source, wish = description.source, description.cases[case]
+    files = source.files or FileOptions()
+    table = read_table(folder / (wish.file or ""), files=files, repairs=source.repairs)
+    wanted = Wanted(
+        name=case,
+        channels=description.trace_channels,
+        sample_time=description.sample_time,
+        decimals=description.decimals,
+        start=wish.start,
+        stop=wish.stop,
+    )
+    return assemble(table, wanted, files=files, grid=source.grid, repairs=source.repairs)
+
+
+def _source(description: DatasetDescription) -> str:
+    sentences = [description.provenance.strip(), *(f"Inferred: {sentence}" for sentence in description.inferred)]
+    return "\n".join(sentence for sentence in sentences if sentence)

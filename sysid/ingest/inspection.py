@@ -1,0 +1,287 @@
+"""What is in an unknown file: columns, units, time, gaps, missing values."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from sysid.errors import ReaderError, UnitError, UserError
+from sysid.ingest.assemble import stamps_in_seconds
+from sysid.ingest.grid import grid_places
+from sysid.ingest.headers import is_unit, split_reference
+from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
+from sysid.ingest.reading import read_table
+from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.timing import Timing, round_step, survey
+from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert
+
+_RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
+_UNITS_IN_NAMES = frozenset(
+    {"bar", "mbar", "barg", "bara", "Pa", "hPa", "kPa", "MPa", "psi", "psig", "psia", "V", "mV", "A", "mA"}
+    | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
+    | {"g", "rad", "deg"}
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnFinding:
+    """What was found in a column.
+
+    Args:
+        name: Its name.
+        unit: Its unit; ``"1"`` if neither the file nor the name says one.
+        unit_guessed: Whether the unit is not from the file.
+        reference: For pressures, what they are measured from.
+        reference_guessed: Whether the reference is not from the file.
+        description: As found in the file.
+        minimum: Smallest finite value, in its unit; NaN if there is none.
+        maximum: Largest finite value, in its unit; NaN if there is none.
+        missing: How many values are empty, NaN or infinite.
+        problem: Why it cannot be a channel, or the empty text.
+    """
+
+    name: str
+    unit: str
+    unit_guessed: bool
+    reference: Reference
+    reference_guessed: bool
+    description: str
+    minimum: float
+    maximum: float
+    missing: int
+    problem: str = ""
+
+    @property
+    def constant(self) -> bool:
+        """Whether it never changes."""
+        return self.minimum == self.maximum
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FileFinding:
+    """What was found in a file.
+
+    Args:
+        path: The file.
+        reader: Name of the reader.
+        columns: What is in each column but time.
+        time: The time column and its unit; its ``step`` if the file has no time stamps.
+        time_guessed: Whether column or unit of time is not from the file.
+        timing: The survey of the time stamps as they stand; ``None`` without time stamps.
+        sample_time: Seconds between samples as proposed.
+        samples: How many rows the file has.
+        unstamped: How many of them have no time stamp.
+        needed: The repairs that the file needs, with the gentlest choice of each.
+        files: The reader options that the file was read with, where they are not recognised by itself.
+        notes: What the reader recognised.
+    """
+
+    path: Path
+    reader: str
+    columns: tuple[ColumnFinding, ...]
+    time: TimeOptions
+    time_guessed: bool
+    timing: Timing | None
+    sample_time: float
+    samples: int
+    unstamped: int
+    needed: RepairOptions
+    files: FileOptions
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def channels(self) -> tuple[ColumnFinding, ...]:
+        """The columns that can be channels."""
+        return tuple(column for column in self.columns if not column.problem)
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What a data set of this file has to deal with, one phrase each."""
+        found = list(self.notes)
+        found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
+        timing = self.timing
+        if timing is None:
+            found.append("no time stamps")
+        else:
+            found += [f"{len(timing.backward)} backward time stamps"] if len(timing.backward) else []
+            found += [f"{len(timing.duplicates)} duplicate time stamps"] if len(timing.duplicates) else []
+            found += [f"{timing.missing} samples missing in {len(timing.gaps)} gaps"] if timing.missing else []
+            found += [f"uneven time stamps, up to {timing.jitter:.3g} s off"] if self.needed.jitter else []
+        for column in self.columns:
+            if column.problem:
+                found.append(f"{column.name}: {column.problem}")
+                continue
+            found += [f"{column.name}: {column.missing} missing values"] if column.missing else []
+            found += [f"{column.name}: never changes"] if column.constant else []
+        return tuple(found)
+
+
+def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileFinding:
+    """Look at an unknown file.
+
+    Args:
+        path: The file.
+        files: What is known about it already.
+
+    Returns:
+        What was found; :func:`~sysid.ingest.proposal.propose_dataset` writes a description from it.
+
+    Raises:
+        ReaderError: If the file cannot be read at all.
+        MissingExtraError: If its format needs a package that is not installed.
+        UnitError: If its time column has a unit that is not one of time.
+    """
+    table, files, repairs = _read_somehow(Path(path), files or FileOptions())
+    time, guessed = _time(table, files)
+    timing, unstamped, step = None, 0, time.step or 1.0
+    needs: dict[str, str | None] = {}
+    if time.step is None:
+        stamps = stamps_in_seconds(table, files.model_copy(update={"time": time}))
+        known = stamps[np.isfinite(stamps)]
+        unstamped = len(stamps) - len(known)
+        timing = survey(known) if len(known) else None
+        if timing is not None:
+            step, needs = _needs(known, timing)
+    columns = tuple(_column(column) for column in table.columns if column.name != time.column)
+    channels = [column for column in columns if not column.problem]
+    needed = {
+        "ragged": repairs.ragged,
+        "stamps": "drop" if unstamped else None,
+        **needs,
+        "nan": "mask" if any(column.missing for column in channels) else None,
+        "constant": "accept" if any(column.constant for column in channels) else None,
+    }
+    return FileFinding(
+        path=table.source,
+        reader=table.reader,
+        columns=columns,
+        time=time,
+        time_guessed=guessed,
+        timing=timing,
+        sample_time=step,
+        samples=len(table),
+        unstamped=unstamped,
+        needed=RepairOptions.model_validate(needed),
+        files=files,
+        notes=table.notes,
+    )
+
+
+def _read_somehow(path: Path, files: FileOptions) -> tuple[RawTable, FileOptions, RepairOptions]:
+    """Read a file, trying in turn what a person would try if it cannot be read as it is."""
+    given = files.model_dump(exclude_unset=True)
+    further: list[dict[str, object]] = [{"thousands": ".", "decimal": "."}, {"time": {"unit": "datetime"}}]
+    tries = [(files, RepairOptions()), (files, RepairOptions(ragged="drop"))]
+    tries += [(FileOptions(**{**more, **given}), repairs) for more in further for _, repairs in tries[:2]]
+    best: tuple[RawTable, FileOptions, RepairOptions] | None = None
+    error: ReaderError | None = None
+    for options, repairs in tries:
+        try:
+            table = read_table(path, files=options, repairs=repairs)
+        except ReaderError as problem:
+            error = error or problem
+            continue
+        except UserError:
+            # An option of CSV means nothing for another format.
+            if options is files:
+                raise
+            continue
+        if best is None or _unusable(table) < _unusable(best[0]):
+            best = table, options, repairs
+        if _unusable(best[0]) == 0:
+            break
+    if best is None:
+        raise error or ReaderError("the file cannot be read", where=path)
+    return best
+
+
+def _unusable(table: RawTable) -> int:
+    return sum(column.problem is not None for column in table.columns)
+
+
+def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, bool]:
+    """The time column, and whether it or its unit had to be guessed."""
+    if files.time.step is not None:
+        return files.time, False
+    if files.time.unit == "datetime":
+        return TimeOptions(column=table.time, unit="datetime", format=files.time.format), False
+    name = files.time.column or table.time or _rising(table.columns)
+    if name is None:
+        return TimeOptions(step=1.0), True
+    column = table.find(name)
+    unit = files.time.unit or column.unit or _unit_in_name(name)
+    if unit is not None:
+        return TimeOptions(column=column.name, unit=unit), name != (files.time.column or table.time)
+    steps = np.diff(column.values)
+    step = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
+    # Few records are sampled slower than every 5 s, and few clocks count finer than they sample.
+    guess = "s" if step < 5.0 else "ms" if step < 5e3 else "us"
+    return TimeOptions(column=column.name, unit=guess), True
+
+
+def _rising(columns: Sequence[RawColumn]) -> str | None:
+    for column in columns:
+        steps = np.diff(column.values)
+        if column.problem is None and len(steps) and np.mean(steps > 0.0) >= _RISING_SHARE:
+            return column.name
+    return None
+
+
+def _needs(known: np.ndarray, timing: Timing) -> tuple[float, dict[str, str | None]]:
+    """Sample time, and the repairs of time that the stamps need."""
+    clean = survey(np.sort(known))
+    if not clean.step > 0.0:
+        return 1.0, {"duplicates": "drop" if len(clean.duplicates) else None}
+    rising = np.delete(np.sort(known), clean.duplicates)
+    tolerance = GridOptions().tolerance
+    even_step = round_step(clean.step, samples=clean.samples + clean.missing, even=True)
+    places = grid_places(rising, even_step, start=float(rising[0]), tolerance=tolerance)
+    even = places is not None and int(np.sum(np.diff(places) > 1)) == len(clean.gaps)
+    step = even_step if even else round_step(clean.step, samples=clean.samples, even=False)
+    return step, {
+        "backward": "sort" if len(timing.backward) else None,
+        "duplicates": "drop" if len(clean.duplicates) else None,
+        "gaps": "mask" if len(clean.gaps) else None,
+        "jitter": None if even else "resample",
+    }
+
+
+def _column(column: RawColumn) -> ColumnFinding:
+    finite = column.values[np.isfinite(column.values)]
+    problem = column.problem.what if column.problem is not None else "" if len(finite) else "no values at all"
+    in_file = column.unit if column.unit is not None and is_unit(column.unit) else None
+    unit_text = in_file or _unit_in_name(column.name) or "1"
+    unit, in_name = split_reference(unit_text)
+    reference = column.reference or in_name
+    guess = _guess_reference(finite, unit) if reference is None else reference
+    return ColumnFinding(
+        name=column.name,
+        unit=unit,
+        unit_guessed=in_file is None,
+        reference=guess,
+        reference_guessed=column.reference is None and guess is not Reference.NONE,
+        description=column.description,
+        minimum=float(finite.min()) if len(finite) else float("nan"),
+        maximum=float(finite.max()) if len(finite) else float("nan"),
+        missing=len(column.values) - len(finite),
+        problem=problem,
+    )
+
+
+def _unit_in_name(name: str) -> str | None:
+    last = re.split(r"[_.]", name)[-1]
+    return last if last != name and last in _UNITS_IN_NAMES else None
+
+
+def _guess_reference(values: np.ndarray, unit: str) -> Reference:
+    try:
+        pascals = convert(values, unit, "Pa")
+    except UnitError:
+        return Reference.NONE
+    # An absolute record that is ever at rest shows the atmosphere as its smallest value.
+    near_atmosphere = len(values) and 0.8 < float(pascals.min()) / STANDARD_ATMOSPHERE_PA < 1.15
+    return Reference.ABSOLUTE if near_atmosphere else Reference.GAUGE

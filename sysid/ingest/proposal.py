@@ -1,0 +1,125 @@
+"""A ``dataset.yaml`` for a file that was inspected: it loads, and it says what was guessed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from sysid.errors import ReaderError
+from sysid.ingest.inspection import ColumnFinding, FileFinding
+from sysid.ingest.options import GridOptions
+from sysid.units import Reference
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_/.^-]*(?: [A-Za-z0-9_/.^-]+)*")
+_WORDS = {"true", "false", "null"}
+
+
+def propose_dataset(finding: FileFinding) -> str:
+    """Write the description of a data set that holds one inspected file.
+
+    Args:
+        finding: From :func:`~sysid.ingest.inspection.inspect_file`.
+
+    Returns:
+        YAML to be saved as ``dataset.yaml`` beside the file.
+
+    Raises:
+        ReaderError: If the file has no column that can be a channel.
+    """
+    if not finding.channels:
+        raise ReaderError(
+            "the file has no column that can be a channel",
+            where=finding.path,
+            expected="at least one column of numbers beside time",
+            got=", ".join(f"{column.name}: {column.problem}" for column in finding.columns) or "time alone",
+            remedy="choose another file, or read it with other options",
+        )
+    name = finding.path.stem
+    lines = [
+        f"# Proposed from {_comment(finding.path.name)}. Check what is marked 'guessed' before you rely on it.",
+        f"name: {_text(name)}",
+        'description: ""',
+        f"sample_time: {finding.sample_time!r}  # s",
+        "channels:",
+        *(f"  - {_channel(column)}" for column in finding.channels),
+        "source:",
+        *_files(finding),
+        *_grid(finding),
+        *_repairs(finding),
+        "cases:",
+        f"  {_text(name)}: {{role: estimation, file: {_text(finding.path.name)}}}",
+        'provenance: ""',
+        'licence: ""',
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _channel(column: ColumnFinding) -> str:
+    pairs = {"name": column.name, "unit": column.unit}
+    if column.reference is not Reference.NONE or column.reference_guessed:
+        pairs["reference"] = column.reference.value
+    if column.description:
+        pairs["description"] = column.description
+    guessed = [
+        what for what, is_guess in (("unit", column.unit_guessed), ("reference", column.reference_guessed)) if is_guess
+    ]
+    told = f"guessed: {' and '.join(guessed)}; " if guessed else ""
+    return f"{_mapping(pairs)}  # {told}{column.minimum:g} to {column.maximum:g}"
+
+
+def _files(finding: FileFinding) -> list[str]:
+    time = finding.time
+    if time.step is not None:
+        shown = f"{{step: {time.step!r}}}"
+    else:
+        pairs = {"column": time.column, "unit": time.unit, "format": time.format}
+        shown = _mapping({key: value for key, value in pairs.items() if value is not None})
+    lines = ["  files:", f"    time: {shown}" + ("  # guessed" if finding.time_guessed else "")]
+    options = finding.files.model_dump(exclude_unset=True, exclude={"time", "columns", "units", "references"})
+    lines += [f"    {key}: {_value(value)}" for key, value in options.items()]
+    guessed = [column for column in finding.channels if column.unit_guessed]
+    lines += [f"    units: {_mapping({column.name: column.unit for column in guessed})}"] if guessed else []
+    unsaid = [column for column in finding.channels if column.reference_guessed]
+    lines += [f"    references: {_mapping({c.name: c.reference.value for c in unsaid})}"] if unsaid else []
+    return lines
+
+
+def _grid(finding: FileFinding) -> list[str]:
+    pairs: dict[str, object] = {}
+    if finding.needed.jitter is not None:
+        pairs["method"] = "linear"
+    if finding.samples < GridOptions().fewest_samples:
+        pairs["fewest_samples"] = max(finding.samples, 2)
+    return [f"  grid: {_mapping(pairs)}"] if pairs else []
+
+
+def _repairs(finding: FileFinding) -> list[str]:
+    needed = finding.needed.model_dump(exclude_none=True)
+    if not needed:
+        return []
+    comments = [f"  # found: {_comment(problem)}" for problem in finding.problems]
+    return [*comments, f"  repairs: {_mapping(needed)}"]
+
+
+def _mapping(pairs: Mapping[str, object]) -> str:
+    return "{" + ", ".join(f"{_text(key)}: {_value(value)}" for key, value in pairs.items()) + "}"
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    return _text(value) if isinstance(value, str) else repr(value)
+
+
+def _text(text: str) -> str:
+    """Text as YAML reads it back, quoted only where it must be."""
+    if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
+        return text
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'
+
+
+def _comment(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)

@@ -1,0 +1,150 @@
+"""One file to a raw table, or to a trace."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sysid.errors import UnitError
+from sysid.ingest.assemble import Wanted, assemble, stamps_in_seconds
+from sysid.ingest.options import FileOptions, GridOptions, RepairOptions
+from sysid.ingest.readers import READERS, choose_reader, read_with
+from sysid.ingest.table import RawTable
+from sysid.ingest.timing import round_step, survey
+from sysid.traces import Channel, Trace
+from sysid.units import Reference
+
+
+def read_table(path: str | Path, *, files: FileOptions | None = None, repairs: RepairOptions | None = None) -> RawTable:
+    """Read a file as columns of numbers, as they stand.
+
+    Args:
+        path: The file; its ending says which reader is used.
+        files: How to read it; ``None`` recognises everything.
+        repairs: ``ragged`` is the reader's to make; ``None`` makes none.
+
+    Returns:
+        The columns.
+
+    Raises:
+        ReaderError: If the file cannot be read.
+        ConfigError: If an option does not fit the format.
+        MissingExtraError: If the format needs a package that is not installed.
+    """
+    path, files = Path(path), files or FileOptions()
+    reader = choose_reader(path, READERS, files.reader)
+    return read_with(reader, path, files, repairs or RepairOptions())
+
+
+def read_trace(
+    path: str | Path,
+    *,
+    name: str | None = None,
+    channels: Sequence[Channel] | None = None,
+    sample_time: float | None = None,
+    files: FileOptions | None = None,
+    grid: GridOptions | None = None,
+    repairs: RepairOptions | None = None,
+) -> Trace:
+    """Read one file as a trace.
+
+    A file that was written by :func:`~sysid.ingest.writers.write_trace` and not changed since comes
+    back as the same trace, if nothing else is asked for.
+
+    Args:
+        path: The file.
+        name: Name of the trace; ``None`` is the file's name without its ending.
+        channels: The channels wanted, in the units wanted; ``None`` is every column but time.
+        sample_time: Seconds between samples; ``None`` is the step of the time stamps.
+        files: How to read it.
+        grid: How samples come onto the grid.
+        repairs: Which repairs may be made.
+
+    Returns:
+        The trace.
+
+    Raises:
+        ReaderError: If the file cannot be read.
+        ChannelError: If a channel is missing.
+        UnitError: If a unit is missing, unknown or of another quantity.
+        TraceError: If something is wrong with the samples and its repair was not asked for.
+        ConfigError: If the options do not fit.
+    """
+    path, files = Path(path), files or FileOptions()
+    grid, repairs = grid or GridOptions(), repairs or RepairOptions()
+    table = read_table(path, files=files, repairs=repairs)
+    if name is None and channels is None and sample_time is None:
+        own = _as_written(table)
+        if own is not None:
+            return own
+    wanted = Wanted(
+        name=name or path.stem,
+        channels=tuple(channels) if channels is not None else _all_channels(table, files),
+        sample_time=sample_time if sample_time is not None else _step(table, files, grid),
+    )
+    return assemble(table, wanted, files=files, grid=grid, repairs=repairs)
+
+
+def _as_written(table: RawTable) -> Trace | None:
+    """The trace that a file of ours holds, or ``None`` if it is not ours or was changed."""
+    try:
+        head: dict[str, Any] = json.loads(table.metadata.get("sysid", ""))
+        channels = tuple(
+            Channel(name=name, unit=unit, reference=Reference(reference), description=text)
+            for name, unit, reference, text in head["channels"]
+        )
+        trace = Trace(
+            name=head["name"],
+            sample_time=head["sample_time"],
+            start_time=head["start_time"],
+            channels=channels,
+            values=np.column_stack([column.values for column in table.columns[1 : len(channels) + 1]]),
+            usable=table.columns[-1].values != 0.0 if head["masked"] else None,
+            provenance=tuple(head["provenance"]),
+        )
+    except (ValueError, KeyError, TypeError):
+        return None
+    return trace if trace.digest == head["digest"] and np.array_equal(table.columns[0].values, trace.time) else None
+
+
+def _all_channels(table: RawTable, files: FileOptions) -> tuple[Channel, ...]:
+    time = None if files.time.step is not None else files.time.column or table.time
+    skip = {time, "usable"} if "sysid" in table.metadata else {time}
+    channels = []
+    for column in table.columns:
+        if column.name in skip or column.problem is not None:
+            continue
+        unit = files.units if isinstance(files.units, str) else files.units.get(column.name, column.unit)
+        if unit is None:
+            raise UnitError(
+                "a column has no unit",
+                where=f"{table.source}, column {column.name}",
+                expected="a unit in the header, as in 'BP [kPa]', or in the options",
+                got="none",
+                remedy=f"write the unit into the header: '{column.name} [kPa]', or '[1]' for a pure number",
+            )
+        given = files.references
+        reference = given.get(column.name) if isinstance(given, dict) else None
+        channels.append(
+            Channel(
+                name=column.name,
+                unit=unit,
+                reference=reference or column.reference or Reference.NONE,
+                description=column.description,
+            )
+        )
+    return tuple(channels)
+
+
+def _step(table: RawTable, files: FileOptions, grid: GridOptions) -> float:
+    stamps = stamps_in_seconds(table, files)
+    stamps = stamps[np.isfinite(stamps)]
+    timing = survey(stamps) if len(stamps) else None
+    if timing is None or not timing.step > 0.0:
+        return 1.0  # no steps at all: the checks on the record say what is wrong with it
+    even = timing.jitter <= grid.tolerance * timing.step
+    return round_step(timing.step, samples=timing.samples + timing.missing, even=even)
