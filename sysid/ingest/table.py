@@ -204,7 +204,8 @@ def of_one_length(columns: Sequence[RawColumn], *, where: str) -> tuple[RawColum
     if not columns:
         return ()
     time = recognise_time(columns)
-    lengths = [len(column.values) for column in columns]
+    sound = [column for column in columns if column.problem is None] or list(columns)
+    lengths = [len(column.values) for column in sound]
     by_time = [len(column.values) for column in columns if column.name == time]
     usual = by_time[0] if by_time else max(set(lengths), key=lambda length: (lengths.count(length), length))
     return tuple(
@@ -213,7 +214,7 @@ def of_one_length(columns: Sequence[RawColumn], *, where: str) -> tuple[RawColum
 
 
 def _other_length(column: RawColumn, usual: int, *, where: str) -> RawColumn:
-    problem = ReaderError(
+    problem = column.problem or ReaderError(
         "a column has another length than the rest",
         where=f"{where}, column {column.name}",
         expected=f"{usual} samples",

@@ -1,7 +1,7 @@
 """The readers: one file per format, one table of them all.
 
 Adding a reader is one file with a ``READER`` in it, one line here, and one row in the contract table
-of ``tests/ingest/cases.py``.
+of ``tests/ingest/test_readers.py``.
 """
 
 from sysid.ingest.readers import csv_text, hdf5, matlab, mdf4, parquet, tdms

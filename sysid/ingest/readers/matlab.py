@@ -39,20 +39,31 @@ READER = Reader(name="matlab", suffixes=(".mat",), read=_read, options=frozenset
 
 
 def _load_5(path: Path) -> tuple[dict[str, str], dict[str, Any]]:
-    from scipy.io import loadmat, whosmat
-    from scipy.io.matlab import MatReadWarning
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatlabFunction, MatlabObject, MatlabOpaque, MatReadWarning
 
     try:
         with warnings.catch_warnings():
-            # Two variables of one name: objects have none in the list, and are dealt with below.
+            # SciPy gives every object the name None, and warns when there are two.
             warnings.simplefilter("ignore", MatReadWarning)
-            listed = whosmat(path)
-            plain = [name for name, _, kind in listed if kind in _PLAIN]
-            tree = loadmat(path, simplify_cells=True, variable_names=plain) if plain else {}
+            loaded = loadmat(path, simplify_cells=True)
     except Exception as error:  # SciPy raises ValueError, TypeError, zlib.error and more on damaged files
         raise damaged(path, "MATLAB", error) from error
-    opaque = {name: kind for name, _, kind in listed if kind not in _PLAIN and not name.startswith("__")}
-    return opaque, {name: tree[name] for name in plain if name in tree}
+    opaque: dict[str, str] = {}
+    tree: dict[str, Any] = {}
+    for name, value in loaded.items():
+        if isinstance(value, MatlabOpaque):
+            record = value.reshape(-1)[0]
+            opaque[_text(record["s0"])] = _text(record["s2"])
+        elif isinstance(value, MatlabObject | MatlabFunction):
+            opaque[name] = str(getattr(value, "classname", "function_handle"))
+        elif not name.startswith("__"):
+            tree[name] = value
+    return opaque, tree
+
+
+def _text(value: Any) -> str:
+    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
 
 def _load_73(path: Path) -> tuple[dict[str, str], dict[str, Any]]:

@@ -13,6 +13,8 @@ from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.table import RawColumn, RawTable, array_column
 
+_MARKS = (b"MDF     ", b"UnFinMF ")
+
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
     try:
@@ -20,6 +22,10 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     except ImportError as error:
         raise MissingExtraError("asammdf", "mdf", f"reading {path.name}") from error
 
+    with path.open("rb") as raw:
+        mark = raw.read(8)
+    if mark not in _MARKS:
+        raise damaged(path, "MDF", ValueError(f"it begins with {mark!r}"))
     try:
         file = MDF(path)
     except Exception as error:  # asammdf raises MdfException, struct.error, IndexError ... on damaged files

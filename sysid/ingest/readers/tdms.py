@@ -20,7 +20,8 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
         raise MissingExtraError("npTDMS", "tdms", f"reading {path.name}") from error
 
     try:
-        groups = {group.name: group.channels() for group in TdmsFile.read(path).groups()}
+        file = TdmsFile.read(path)
+        groups = {group.name: group.channels() for group in file.groups()}
     except Exception as error:  # npTDMS raises ValueError, KeyError, struct.error ... on damaged files
         raise damaged(path, "TDMS", error) from error
     channels = _channels(groups, options.group, path)
@@ -28,7 +29,8 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     if recognise_time(columns) is None:
         columns = _waveform_time(channels, path) + columns
     alike = of_one_length(columns, where=str(path))
-    return RawTable(source=path, reader="tdms", columns=alike, time=recognise_time(alike))
+    notes = ("the file breaks off in its last segment",) if file.file_status.incomplete_final_segment else ()
+    return RawTable(source=path, reader="tdms", columns=alike, time=recognise_time(alike), notes=notes)
 
 
 READER = Reader(name="tdms", suffixes=(".tdms",), read=_read, options=frozenset({"group"}))
