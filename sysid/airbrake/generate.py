@@ -12,8 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.machine import QUANTITIES, Probe
 from sysid.airbrake.sequences import RandomCommand
-from sysid.airbrake.simulate import QUANTITIES, AirBrakeRecord, Probe, simulate
+from sysid.airbrake.simulate import AirBrakeRecord, simulate
 from sysid.airbrake.variant import VARIANTS, Variant
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Trace
