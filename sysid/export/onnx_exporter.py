@@ -1,0 +1,60 @@
+"""ONNX: the format to prefer. Runs wherever onnxruntime does, from C, C++, C#, Java, JavaScript or Python."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sysid
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner
+from sysid.models import AbstractModel
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnnxExporter(AbstractExporter):
+    """Writes ``step.onnx`` and ``sequence.onnx``.
+
+    Args:
+        name: Name in the table.
+        dtype: ``"float64"`` or ``"float32"``, of inputs, outputs and arithmetic; it stands in the file name if
+            it is not the first.
+    """
+
+    name: str = "onnx"
+    dtype: str = "float64"
+
+    def write(self, model: AbstractModel, folder: Path) -> tuple[ExportedFile, ...]:
+        """Write both graphs; both have passed the full checker."""
+        from sysid.export.onnx_nodes import IR_VERSION, OPSET, checked_model
+        from sysid.export.onnx_sequence import sequence_graph
+        from sysid.export.onnx_step import step_graph
+
+        files = []
+        suffix = "" if self.dtype == "float64" else f".{self.dtype}"
+        for kind, build in ((Kind.STEP, step_graph), (Kind.SEQUENCE, sequence_graph)):
+            proto = checked_model(build(model, self.dtype), model, sysid.__version__)
+            name = f"{kind.value}{suffix}.onnx"
+            (folder / name).write_bytes(proto.SerializeToString(deterministic=True))
+            details = {"opset": OPSET, "domain": "ai.onnx", "ir_version": IR_VERSION}
+            files.append(ExportedFile(name=name, format=self.name, kind=kind, dtype=self.dtype, details=details))
+        return tuple(files)
+
+    def load(self, path: Path) -> Runner:
+        """Open the file in onnxruntime on one thread: the graph is a chain of small steps."""
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+        dtype = np.dtype(self.dtype)
+
+        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+            feed = {"u": np.asarray(inputs, dtype=dtype), "state": np.asarray(state, dtype=dtype)}
+            output, state_out = session.run(["y", "state_out"], feed)
+            return Run(output=output, state=state_out)
+
+        return run

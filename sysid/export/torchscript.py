@@ -1,0 +1,65 @@
+"""TorchScript: for hosts that embed libtorch. Deprecated by its makers; ONNX is the format to prefer."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner
+from sysid.models import AbstractModel
+
+
+@contextmanager
+def _deprecation_known() -> Iterator[None]:
+    """Keep quiet about what the module's docstring says: torch.jit is deprecated in favour of torch.export."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"`torch\.jit\.", category=DeprecationWarning)
+        yield
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorchScriptExporter(AbstractExporter):
+    """Writes ``step.torchscript.pt`` and ``sequence.torchscript.pt``, zip files of code and tensors."""
+
+    name: str = "torchscript"
+
+    def write(self, model: AbstractModel, folder: Path) -> tuple[ExportedFile, ...]:
+        """Script both modules and save them."""
+        import torch
+
+        from sysid.export.torch_module import RecursionSequence, RecursionStep
+
+        files = []
+        for kind, module in ((Kind.STEP, RecursionStep(model)), (Kind.SEQUENCE, RecursionSequence(model))):
+            name = f"{kind.value}.torchscript.pt"
+            buffer = io.BytesIO()
+            with _deprecation_known():
+                torch.jit.save(torch.jit.script(module.eval()), buffer)
+            (folder / name).write_bytes(buffer.getvalue())
+            details = {"torch": torch.__version__.partition("+")[0]}
+            files.append(ExportedFile(name=name, format=self.name, kind=kind, details=details))
+        return tuple(files)
+
+    def load(self, path: Path) -> Runner:
+        """Load the file on the CPU. TorchScript code can compute, but not reach the file system or network."""
+        import torch
+
+        with _deprecation_known():
+            module = torch.jit.load(path, map_location="cpu")
+
+        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+            with torch.inference_mode():
+                output, state_out = module(
+                    torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(state))
+                )
+            return Run(output=output.numpy(), state=state_out.numpy())
+
+        return run
