@@ -1,0 +1,182 @@
+"""The command line: thin commands that import what they need when they need it.
+
+Exit codes: 0 done, 2 the user's input has to change, 1 ours (a bug, a failed check, or results that are
+complete but could not be tracked), 130 stopped by the user.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    name="sysid",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main() -> None:
+    """Entry point of the command ``sysid``."""
+    sys.exit(run_cli(sys.argv[1:]))
+
+
+def run_cli(arguments: list[str]) -> int:
+    """Run a command and turn what it raises into words and an exit code.
+
+    Args:
+        arguments: The words after ``sysid``.
+
+    Returns:
+        The exit code.
+    """
+    from sysid.errors import SysidError
+
+    # Wherever it stands, as people add it to the end of the command that failed.
+    debug = "--debug" in arguments
+    try:
+        code = app([word for word in arguments if word != "--debug"], standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except KeyboardInterrupt:
+        _say("stopped; the same command goes on where this one was")
+        return 130
+    except BrokenPipeError:
+        # The reader of our output went away (sysid ... | head).
+        return 0
+    except SysidError as error:
+        if debug:
+            _trace()
+        _say(f"error: {error}")
+        return error.exit_code
+    except Exception as error:  # noqa: BLE001 - the last line of defence: whatever it is, it is named and ends with a code
+        return _unexpected(error)
+
+
+def _unexpected(error: Exception) -> int:
+    """A usage error, in the command line's own words, or a bug of ours, with its trace."""
+    show = getattr(error, "show", None)
+    if callable(show):
+        show()
+        return int(getattr(error, "exit_code", 2))
+    if type(error).__name__ == "Abort":
+        return 130
+    _trace()
+    _say(f"error: this is a fault in sysid ({type(error).__name__}); please report it with the lines above")
+    return 1
+
+
+def _trace() -> None:
+    import traceback
+
+    _say(traceback.format_exc().rstrip())
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(text + "\n")
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        import sysid
+
+        typer.echo(f"sysid {sysid.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _: Annotated[bool, typer.Option("--debug", help="Show the full trace of an error.")] = False,
+    __: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
+) -> None:
+    """Reference traces of a slow, trusted model in; a small, fast, frozen surrogate of known accuracy out."""
+
+
+@app.command(epilog="Example: sysid run service-brake")
+def run(
+    pipeline: Annotated[str, typer.Argument(help="Name of a pipeline, or its YAML file.")],
+    fresh: Annotated[bool, typer.Option("--fresh", help="Do everything again, whatever is stored.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/<pipeline> by default.")] = None,
+    no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
+) -> None:
+    """Run a pipeline: load traces, fit, score, export, report. A run that was killed goes on where it was.
+
+    Ctrl-C ends the fit that is running, keeps its best model so far and goes on; twice stops.
+    """
+    from sysid.workbench.commands.run import run_command
+
+    raise typer.Exit(run_command(pipeline, fresh=fresh, out=out, tracking=not no_tracking))
+
+
+@app.command(epilog="Example: sysid ingest measurements.csv")
+def ingest(
+    source: Annotated[str, typer.Argument(help="A file with traces, or the name of a data set.")],
+    propose: Annotated[
+        Path | None, typer.Option(help="Write the proposed dataset.yaml here, to be checked by you.")
+    ] = None,
+) -> None:
+    """Look into a file of traces and propose a data set for it, or load a data set and sum it up."""
+    from sysid.workbench.commands.ingest import ingest_command
+
+    ingest_command(source, propose=propose)
+
+
+@app.command(epilog="Example: sysid simulate runs/service-brake/bundle new.csv --out simulated.csv")
+def simulate(
+    bundle: Annotated[Path, typer.Argument(help="Folder of an exported model.")],
+    inputs: Annotated[Path, typer.Argument(help="File with the model's input channels.")],
+    out: Annotated[Path, typer.Option(help="File to write: time, inputs and simulated output.")],
+) -> None:
+    """Run an exported model on a file of inputs, fed with nothing but its own past output."""
+    from sysid.workbench.commands.simulate import simulate_command
+
+    simulate_command(bundle, inputs, out)
+
+
+@app.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')
+def export(
+    pipeline: Annotated[str, typer.Argument(help="Name of a pipeline that has been run, or its YAML file.")],
+    fit: Annotated[str, typer.Option(help="Name of the fit.")],
+    out: Annotated[Path | None, typer.Option(help="Folder of the bundle; in the run folder by default.")] = None,
+    run_folder: Annotated[Path | None, typer.Option(help="The run folder; runs/<pipeline> by default.")] = None,
+) -> None:
+    """Export a fit of a finished run as files that run elsewhere, each checked against its model."""
+    from sysid.workbench.commands.export import export_command
+
+    export_command(pipeline, fit=fit, out=out, run_folder=run_folder)
+
+
+@app.command(epilog="Example: sysid report runs/service-brake")
+def report(
+    run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")],
+) -> None:
+    """Write the report of a run again, from its stored results; nothing is fitted."""
+    from sysid.workbench.commands.report import report_command
+
+    report_command(run_folder)
+
+
+@app.command(epilog="Example: sysid ui")
+def ui(
+    port: Annotated[int, typer.Option(help="Port on this machine; the next free one if it is taken.")] = 5000,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
+) -> None:
+    """Compare fits in the browser (MLflow). Ctrl-C ends it."""
+    from sysid.workbench.commands.ui import ui_command
+
+    raise typer.Exit(ui_command(port, browser=not no_browser))
+
+
+@app.command(epilog="Example: sysid init brakes")
+def init(
+    folder: Annotated[Path, typer.Argument(help="Folder to make.")],
+) -> None:
+    """Make a workspace: folders for data sets, pipelines and reports, with a first pipeline that runs in seconds."""
+    from sysid.workbench.commands.init import init_command
+
+    init_command(folder)

@@ -1,0 +1,82 @@
+"""``sysid run``: a pipeline with everybody who listens to it."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from rich.console import Console
+
+from sysid.workbench.config import find_pipeline, read_pipeline
+from sysid.workbench.events import Warned, Watcher
+from sysid.workbench.pipeline import run_pipeline
+from sysid.workbench.screen import LogFile, Screen, table_of_fits
+from sysid.workbench.tracking import Tracker
+
+PIPED_WIDTH = 160
+"""Columns where there is no terminal to ask: enough for a table of five cases on one line."""
+
+
+def console() -> Console:
+    """Where results are shown.
+
+    Returns:
+        A console on standard output.
+    """
+    plain = Console(highlight=False)
+    return plain if plain.is_terminal else Console(highlight=False, width=PIPED_WIDTH)
+
+
+def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool) -> int:
+    """Run a pipeline and show how it came out.
+
+    Args:
+        pipeline: Its name or file.
+        fresh: Do everything again.
+        out: The run folder.
+        tracking: Whether fits are tracked in MLflow.
+
+    Returns:
+        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
+
+    Raises:
+        UserError: If the pipeline, its data or its options cannot be used.
+    """
+    read = read_pipeline(find_pipeline(pipeline))
+    folder = out or Path("runs") / read.config.name
+    words = ["sysid", "run", pipeline, *(["--out", str(out)] if out else [])]
+    target = console()
+    screen, log = Screen(target), LogFile()
+    watchers: list[Watcher] = [screen, log]
+
+    def warn(text: str) -> None:
+        for watch in (screen, log):
+            watch(Warned(text=text))
+
+    tracker = Tracker.of_workspace(Path.cwd(), warn) if tracking else None
+    watchers += [tracker] if tracker else []
+    try:
+        results = run_pipeline(read, folder, command=shlex.join(words), fresh=fresh, watchers=watchers)
+    finally:
+        screen.close()
+    target.print()
+    target.print(table_of_fits(results))
+    if results.best is not None:
+        target.print(f"Best: {results.best.name}. {results.best.chosen_by}")
+    lines = {
+        "Report": folder / "report" / "index.html",
+        "Bundle": folder / "bundle",
+        "Results": folder / "results.json",
+    }
+    for name, path in lines.items():
+        if path.exists():
+            target.print(f"{name + ':':<9}{path}", soft_wrap=True)
+    if tracker is None:
+        return 0
+    if tracker.failures:
+        target.print(
+            "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
+        )
+        return 1
+    target.print(f"{'Compare:':<9}sysid ui")
+    return 0

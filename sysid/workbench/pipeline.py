@@ -1,0 +1,269 @@
+"""A pipeline from traces to report: each step's result is on disk before it is announced, and found again."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sysid.estimation import FitProgress, FitResult, Training
+from sysid.reporting.published import read_published
+from sysid.reporting.results import Results, parse_results, write_results
+from sysid.workbench import events, steps
+from sysid.workbench.config import FitConfig, Pipeline
+from sysid.workbench.environment import environment
+from sysid.workbench.record import (
+    export_record,
+    is_final,
+    read_fit,
+    read_scores,
+    results_document,
+    write_fit,
+    write_scores,
+)
+from sysid.workbench.store import RunFolder, strict, write_bytes, write_json
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Fitted:
+    """A fit on its way through the steps.
+
+    Args:
+        ready: The fit and its figures.
+        fit_key: Digest of what the fit alone depends on, for those that start from it.
+        final: Whether it and the fit it started from ran to their end, so that it may be stored for good.
+    """
+
+    ready: events.FitReady
+    fit_key: str
+    final: bool
+
+    @property
+    def scores(self) -> steps.Scores:
+        """The figures."""
+        return steps.Scores(evaluation=self.ready.evaluation, selection_mse=self.ready.selection_mse)
+
+
+def run_pipeline(
+    pipeline: Pipeline,
+    folder: Path,
+    *,
+    command: str,
+    fresh: bool = False,
+    watchers: Sequence[events.Watcher] = (),
+) -> Results:
+    """Run a pipeline; what an earlier run has finished is not done again.
+
+    Ctrl-C ends the fit that is running and keeps its best model so far; that fit is used now, and done
+    again by the next run.
+
+    Args:
+        pipeline: What to do.
+        folder: The run folder.
+        command: The command that makes the run again, for the report.
+        fresh: Do everything again.
+        watchers: Told everything that happens, in order.
+
+    Returns:
+        The contents of ``results.json``.
+
+    Raises:
+        BusyError: If another run is at work in the folder.
+        UserError: If data or options cannot be used as they are.
+        ParityError: If an exported file differs from its model.
+    """
+    run = _Run(
+        pipeline=pipeline, store=RunFolder(path=folder.resolve()), command=command, fresh=fresh, watchers=watchers
+    )
+    with run.store.locked():
+        return run.all()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Run:
+    """One run: what its steps have in common."""
+
+    pipeline: Pipeline
+    store: RunFolder
+    command: str
+    fresh: bool
+    watchers: Sequence[events.Watcher]
+    run_id: str = field(default_factory=lambda: time.strftime("%Y%m%d-%H%M%S"))
+    environment: Mapping[str, Any] = field(default_factory=environment)
+
+    def all(self) -> Results:
+        """Every step, in order."""
+        config = self.pipeline.config
+        write_bytes(self.store.path / "pipeline.yaml", self.pipeline.text.encode())
+        write_json(self.store.path / "environment.json", self.environment)
+        self._tell(events.RunStarted(config=config, folder=self.store.path, run_id=self.run_id, command=self.command))
+        data = self._load()
+        fitted: dict[str, _Fitted] = {}
+        for fit in config.fits:
+            fitted[fit.name] = self._fit(fit, data, fitted)
+            if not fitted[fit.name].ready.stored:
+                # A killed run leaves results.json with what is finished, not with what an older run had.
+                self._write_results(data, fitted, choice=None, exports=())
+        asked = config.export.fit if config.export else "best"
+        choice = steps.choose({name: (one.ready.fit, one.scores) for name, one in fitted.items()}, asked)
+        exports = self._export(fitted[choice.name], data) if config.export else ()
+        results = self._write_results(data, fitted, choice=choice, exports=exports)
+        self._report(fitted[choice.name])
+        self._tell(events.RunDone(results=results))
+        return results
+
+    def _tell(self, event: events.Event) -> None:
+        for watch in self.watchers:
+            watch(event)
+
+    def _done(self, step: str, key: str) -> bool:
+        return not self.fresh and self.store.is_done(step, key)
+
+    def _load(self) -> steps.Data:
+        step = "Loading the traces"
+        self._tell(events.StepStarted(step=step))
+        if self.pipeline.config.report.published is not None:
+            # A misspelt name is told before the fits are done, not after.
+            read_published(self.pipeline.config.report.published)
+        data = steps.load_data(
+            self.pipeline.config,
+            beside=self.pipeline.path.parent,
+            progress=lambda text: self._tell(events.StepProgress(step=step, fraction=None, detail=text)),
+        )
+        cases = f"{len(data.traces)} cases of {data.traces.name}"
+        detail = f"{cases}, {len(data.selection)} to choose by" if data.selection else cases
+        self._tell(events.StepDone(step=step, stored=False, detail=detail))
+        self._tell(events.DataLoaded(traces=data.traces, selection=tuple(trace.name for trace in data.selection)))
+        return data
+
+    def _fit(self, fit: FitConfig, data: steps.Data, earlier: Mapping[str, _Fitted]) -> _Fitted:
+        config, folder = self.pipeline.config, self.store.fit(fit.slug)
+        initial = earlier[fit.initial] if fit.initial else None
+        key = steps.fit_key(fit, config, data, initial.fit_key if initial else None)
+        step = (
+            f"Fitting {fit.name}" if fit.name == fit.structure.label else f"Fitting {fit.name}, {fit.structure.label}"
+        )
+        self._tell(events.StepStarted(step=step))
+        fit_stored = self._done(f"fit-{fit.slug}", key)
+        if fit_stored:
+            result = read_fit(folder)
+        else:
+            progress = _Progress(step=step, training=fit.training_options(config.seed), tell=self._tell)
+            result = steps.fit_traces(fit, config, data, initial.ready.fit if initial else None, progress.report)
+        final = is_final(result) and (initial is None or initial.final)
+        if not fit_stored:
+            files = write_fit(folder, result)
+            if final:
+                self.store.mark_done(f"fit-{fit.slug}", key, files)
+        score_key, scores, scores_stored = self._score(fit, result, data, key, reuse=fit_stored, final=final)
+        stored = fit_stored and scores_stored
+        self._tell(events.StepDone(step=step, stored=stored, detail=_outcome(result, scores)))
+        ready = events.FitReady(
+            config=fit,
+            key=score_key,
+            fit=result,
+            evaluation=scores.evaluation,
+            selection_mse=scores.selection_mse,
+            stored=stored,
+            folder=folder,
+        )
+        self._tell(ready)
+        return _Fitted(ready=ready, fit_key=key, final=final)
+
+    def _score(
+        self, fit: FitConfig, result: FitResult, data: steps.Data, fit_key: str, *, reuse: bool, final: bool
+    ) -> tuple[str, steps.Scores, bool]:
+        """The key of the figures, the figures, and whether they were stored."""
+        config, folder, step = self.pipeline.config, self.store.fit(fit.slug), f"scores-{fit.slug}"
+        key = steps.scores_key(fit_key, data, config)
+        if reuse and self._done(step, key):
+            return key, read_scores(folder), True
+        scores = steps.score(result, data, config)
+        files = write_scores(folder, scores)
+        if final:
+            self.store.mark_done(step, key, files)
+        return key, scores, False
+
+    def _export(self, best: _Fitted, data: steps.Data) -> tuple[dict[str, Any], ...]:
+        config, folder = self.pipeline.config, self.store.path / "bundle"
+        step = f"Exporting {best.ready.config.name}"
+        key = steps.export_key(best.ready.key, config)
+        self._tell(events.StepStarted(step=step))
+        stored = self._done("export", key)
+        if not stored:
+            provenance = {"pipeline": config.name, "fit": best.ready.config.name, "command": self.command}
+            bundle = steps.export(best.ready.fit, best.scores, data, config, folder=folder, provenance=provenance)
+            exports = [export_record(entry, folder.name, best.ready.fit.model.output_unit) for entry in bundle.files]
+            if best.final:
+                files = [file for file in sorted(folder.rglob("*")) if file.is_file()]
+                self.store.mark_done("export", key, files, exports=exports)
+        else:
+            exports = self.store.facts("export")["exports"]
+        worst = max((float(entry["largest_difference"]) for entry in exports), default=0.0)
+        detail = f"{len(exports)} files, at most {worst:.1e} {best.ready.fit.model.output_unit} from the model"
+        self._tell(events.StepDone(step=step, stored=stored, detail=detail))
+        self._tell(events.BundleReady(of=best.ready, folder=folder, exports=tuple(exports), stored=stored))
+        return tuple(exports)
+
+    def _report(self, best: _Fitted) -> None:
+        from sysid.reporting.report import write_report
+
+        step = "Writing the report"
+        self._tell(events.StepStarted(step=step))
+        page = write_report(self.store.path)
+        self._tell(events.StepDone(step=step, stored=False, detail=str(page)))
+        self._tell(events.ReportReady(page=page, results=self.store.results, of=best.ready))
+
+    def _write_results(
+        self,
+        data: steps.Data,
+        fitted: Mapping[str, _Fitted],
+        *,
+        choice: steps.Choice | None,
+        exports: Sequence[Mapping[str, Any]],
+    ) -> Results:
+        document = results_document(
+            config=self.pipeline.config,
+            command=self.command,
+            environment=self.environment,
+            data=data,
+            fits=[one.ready for one in fitted.values()],
+            choice=choice,
+            exports=exports,
+        )
+        results = parse_results(strict(document), where=self.store.results)
+        write_results(self.store.path, results)
+        return results
+
+
+def _outcome(fit: FitResult, scores: steps.Scores) -> str:
+    """How a fit came out, in a line."""
+    cases = scores.evaluation.cases.values()
+    worst = max(cases, key=lambda case: case.free_run.mse)
+    unit = worst.free_run.unit
+    return f"{fit.train_time_s:.1f} s, free run at worst {worst.free_run.mse:.3g} {unit}² ({worst.case})"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Progress:
+    """Turns the iterations of several starts, told from several threads, into one share of the whole."""
+
+    step: str
+    training: Training
+    tell: events.Watcher
+    shares: dict[int, float] = field(default_factory=dict)
+    guard: threading.Lock = field(default_factory=threading.Lock)
+
+    def report(self, entry: FitProgress) -> None:
+        """Told after every iteration of every start."""
+        share = max(entry.iteration / entry.max_iterations, entry.elapsed_s / self.training.max_time_s)
+        with self.guard:
+            # The iterations in open loop come before those that count: the share never falls.
+            self.shares[entry.start] = max(min(share, 1.0), self.shares.get(entry.start, 0.0))
+            fraction = sum(self.shares.values()) / entry.starts
+            start = f"start {entry.start} of {entry.starts}, " if entry.starts > 1 else ""
+            detail = f"{start}{entry.stage}, iteration {entry.iteration}, mse {entry.mse:.3g}"
+            self.tell(events.StepProgress(step=self.step, fraction=fraction, detail=detail))

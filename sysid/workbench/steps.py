@@ -1,0 +1,345 @@
+"""The steps of a pipeline: functions of (config, inputs) that give a result and touch no folder.
+
+Each step has a ``*_key`` beside it: the digest of everything that its result depends on. The pipeline
+stores results under their keys; a step does not know that.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sysid.content import content_folders
+from sysid.errors import ConfigError
+from sysid.estimation import FitProgress, FitResult, fit_arx, fit_narx
+from sysid.models import ARX, NARX
+from sysid.traces import Role, Trace, TraceSet
+from sysid.validation import Evaluation, evaluate, evaluate_case
+from sysid.workbench.config import FitConfig, PipelineConfig
+from sysid.workbench.store import code_digest, digest
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Data:
+    """What a pipeline works on.
+
+    Args:
+        traces: The data set: every case that is scored.
+        selection: Traces that choose between fits and nothing else.
+    """
+
+    traces: TraceSet
+    selection: tuple[Trace, ...]
+
+    @property
+    def estimation(self) -> tuple[Trace, ...]:
+        """The traces that are fitted."""
+        return self.traces.with_role(Role.ESTIMATION)
+
+
+def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str], None]) -> Data:
+    """Load the traces of a pipeline and check that they can do what it asks.
+
+    Args:
+        config: The pipeline.
+        beside: Folder of the pipeline's file: a path to a data set is relative to it.
+        progress: Told what is being done.
+
+    Returns:
+        The data.
+
+    Raises:
+        ConfigError: If no trace is for estimation, or a trace that chooses is also scored.
+        ChannelError: If a channel of the mapping is missing.
+    """
+    traces = _load(config.data, beside, progress)
+    names = (*config.mapping.inputs, config.mapping.output)
+    traces.traces[0].columns(names)
+    if not traces.with_role(Role.ESTIMATION):
+        raise ConfigError(
+            "no trace is for estimation",
+            where=f"data set {traces.name}",
+            expected="a case with role: estimation",
+            got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
+            remedy="give a case that role in the data set's dataset.yaml",
+        )
+    selection = traces.with_role(Role.SELECTION)
+    if config.selection is not None:
+        chosen = _load(config.selection, beside, progress)
+        selection = (*selection, *_selection_traces(chosen, traces, names))
+    return Data(traces=traces, selection=selection)
+
+
+def _load(name: str, beside: Path, progress: Callable[[str], None]) -> TraceSet:
+    from sysid.ingest import load_dataset
+
+    local = beside / name
+    # A workspace is three folders side by side: its data sets are found from wherever it is run.
+    search = (beside.parent / "datasets", *content_folders("datasets"))
+    return load_dataset(
+        local if local.exists() else name,
+        search=search,
+        progress=lambda case, index, count: progress(f"{name}: {case} ({index + 1} of {count})"),
+    )
+
+
+def _selection_traces(chosen: TraceSet, traces: TraceSet, names: Sequence[str]) -> tuple[Trace, ...]:
+    """The traces that may choose: of that role, in the same terms, and not among those that are scored."""
+    found = chosen.with_role(Role.SELECTION)
+    if not found:
+        raise ConfigError(
+            "no trace is for selection",
+            where=f"data set {chosen.name}",
+            expected="a case with role: selection",
+            got=", ".join(f"{name}: {role.value}" for name, role in chosen.roles.items()),
+            remedy="give a case that role in the data set's dataset.yaml, or leave selection out",
+        )
+    scored = {trace.digest: trace.name for trace in traces if traces.roles[trace.name] is not Role.SELECTION}
+    for trace in found:
+        trace.columns(names)
+        if trace.digest in scored:
+            raise ConfigError(
+                f"the selection trace {trace.name} is the case {scored[trace.digest]}",
+                where=f"data set {chosen.name}",
+                expected="traces that are neither fitted nor scored",
+                remedy="a score counts only if nothing was chosen on it: use another trace",
+            )
+        ours, theirs = ([(t.channel(n).unit, t.channel(n).reference) for n in names] for t in (traces.traces[0], trace))
+        if ours != theirs or not math.isclose(trace.sample_time, traces.sample_time, rel_tol=1e-9):
+            raise ConfigError(
+                f"the selection trace {trace.name} is not in the terms of the data",
+                where=f"data set {chosen.name}",
+                expected=f"{_terms(traces.traces[0], names)}",
+                got=f"{_terms(trace, names)}",
+                remedy="convert or resample it at ingest",
+            )
+    return found
+
+
+def _terms(trace: Trace, names: Sequence[str]) -> str:
+    return f"{', '.join(trace.channel(name).label for name in names)} every {trace.sample_time:g} s"
+
+
+def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | None) -> str:
+    """Digest of everything that a fit depends on.
+
+    Args:
+        fit: The fit.
+        config: Its pipeline.
+        data: The traces.
+        initial: Key of the fit that it starts from.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    is_arx = isinstance(fit.structure, ARX)
+    training = None if is_arx else dataclasses.asdict(fit.training_options(config.seed))
+    terms = {
+        "structure": fit.structure.to_dict(),
+        "training": training,
+        "initial": initial,
+        "traces": [trace.digest for trace in data.estimation],
+        # Least squares has nothing to choose, so that other selection traces do not concern it.
+        "selection": None if is_arx else [trace.digest for trace in data.selection],
+        "code": code_digest("estimation", "models", "kernels"),
+    }
+    return digest(_plain(terms | _common(config)))
+
+
+def _common(config: PipelineConfig) -> dict[str, Any]:
+    start = {"kind": config.start.kind.value, "n_measured": config.start.n_measured}
+    return {"mapping": str(config.mapping), "start": start, "rest_output": config.rest_output}
+
+
+def _plain(value: Any) -> Any:
+    """JSON values, with enums by their value."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    return getattr(value, "value", value)
+
+
+def fit_traces(
+    fit: FitConfig,
+    config: PipelineConfig,
+    data: Data,
+    initial: FitResult | None,
+    on_progress: Callable[[FitProgress], None],
+) -> FitResult:
+    """Fit one structure.
+
+    Args:
+        fit: The fit.
+        config: Its pipeline.
+        data: The traces.
+        initial: The fit that it starts from.
+        on_progress: Called after every iteration, from the threads that train.
+
+    Returns:
+        The fit.
+
+    Raises:
+        ConfigError: If no estimator belongs to the structure.
+    """
+    structure = fit.structure
+    common: dict[str, Any] = {"start": config.start, "rest_output": config.rest_output}
+    if isinstance(structure, ARX):
+        return fit_arx(data.estimation, config.mapping, structure, **common)
+    if isinstance(structure, NARX):
+        return fit_narx(
+            data.estimation,
+            config.mapping,
+            structure,
+            fit.training_options(config.seed),
+            selection=data.selection,
+            initial=initial,
+            on_progress=on_progress,
+            **common,
+        )
+    raise ConfigError(f"no estimator for the structure {structure.kind}", where=f"fit {fit.name}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scores:
+    """A fit's figures.
+
+    Args:
+        evaluation: On every case.
+        selection_mse: Mean free-run mse on the selection traces; NaN without any.
+    """
+
+    evaluation: Evaluation
+    selection_mse: float
+
+
+def scores_key(fit: str, data: Data, config: PipelineConfig) -> str:
+    """Digest of everything that a fit's figures depend on.
+
+    Args:
+        fit: Key of the fit.
+        data: The traces.
+        config: The pipeline.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    code = code_digest("validation", "models", "kernels")
+    selection = [trace.digest for trace in data.selection]
+    return digest({"fit": fit, "traces": data.traces.digest, "selection": selection, "code": code} | _common(config))
+
+
+def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
+    """Run a fitted model over every case, in free run and one step ahead.
+
+    Args:
+        fit: The fit.
+        data: The traces.
+        config: The pipeline.
+
+    Returns:
+        The figures.
+    """
+    errors = [evaluate_case(fit.model, trace, Role.SELECTION, config.start, 1).free_run.mse for trace in data.selection]
+    return Scores(
+        evaluation=evaluate(fit.model, data.traces, config.start),
+        selection_mse=float(np.mean(errors)) if errors else math.nan,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """Which fit is put first.
+
+    Args:
+        name: The fit.
+        chosen_by: By which figure, on which traces, as a sentence.
+    """
+
+    name: str
+    chosen_by: str
+
+
+def choose(fits: Mapping[str, tuple[FitResult, Scores]], asked: str) -> Choice:
+    """Choose the fit that is exported and put first in the report.
+
+    Args:
+        fits: Fits and figures by name.
+        asked: ``best``, or the name of a fit.
+
+    Returns:
+        The choice. Cases for validation have no say in it.
+    """
+    if asked != "best":
+        return Choice(name=asked, chosen_by="Named in the pipeline.")
+    usable = {name: pair for name, pair in fits.items() if pair[0].status.usable} or dict(fits)
+    by_selection = {name: pair[1].selection_mse for name, pair in usable.items()}
+    if not any(math.isnan(mse) for mse in by_selection.values()):
+        sentence = "Least mean squared error of the free run on the selection traces."
+        return Choice(name=min(by_selection, key=by_selection.__getitem__), chosen_by=sentence)
+    # Evidence cannot be compared between open and closed loop: their residuals are not the same.
+    by_estimation = {name: pair[1].evaluation.mean_mse(Role.ESTIMATION) for name, pair in usable.items()}
+    return Choice(
+        name=min(by_estimation, key=by_estimation.__getitem__),
+        chosen_by="Least mean squared error of the free run on the estimation traces, for want of selection traces; "
+        "it favours the largest network.",
+    )
+
+
+def export_key(scores: str, config: PipelineConfig) -> str:
+    """Digest of everything that a bundle depends on.
+
+    Args:
+        scores: Key of the exported fit's figures.
+        config: The pipeline.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    export = None if config.export is None else config.export.model_dump(mode="json", exclude={"fit"})
+    return digest({"scores": scores, "export": export, "code": code_digest("export", "models", "kernels")})
+
+
+def export(
+    fit: FitResult, scores: Scores, data: Data, config: PipelineConfig, *, folder: Path, provenance: dict[str, Any]
+) -> Bundle:
+    """Write a fit's files and check each against the model on every case.
+
+    Args:
+        fit: The fit.
+        scores: Its figures, for the model card.
+        data: The traces that the files are run on.
+        config: The pipeline, with an ``export``.
+        folder: Where the bundle goes.
+        provenance: What the bundle says about where it comes from.
+
+    Returns:
+        The bundle.
+
+    Raises:
+        ConfigError: If the pipeline exports nothing.
+        ParityError: If a file differs from the model by more than the tolerance.
+    """
+    from sysid.export import export_bundle
+
+    if config.export is None:
+        raise ConfigError("the pipeline exports nothing", where=config.name, remedy="add export: {fit: best}")
+    return export_bundle(
+        fit,
+        data.traces,
+        folder,
+        start=config.start,
+        formats=config.export.formats,
+        tolerance=config.export.tolerance,
+        metrics=scores.evaluation,
+        provenance=provenance,
+    )

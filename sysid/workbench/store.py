@@ -1,0 +1,250 @@
+"""The run folder: every result on disk before it is announced, found again by what it depends on.
+
+A finished step leaves a stamp: the key of everything it depended on, and the SHA-256 of each file it wrote.
+A later run whose key is the same, and whose files are whole, takes the stored result; anything else is done
+again. The stamp is written last, so that a killed run can leave files without a stamp but never a stamp
+without its files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import math
+import os
+import platform
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+from numpy.typing import NDArray
+
+import sysid
+from sysid.atomic import replacing
+from sysid.errors import ConfigError, UserError
+
+
+class BusyError(UserError):
+    """Another process is working in the same folder."""
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file so that readers see the old one or the new one, never a part.
+
+    Args:
+        path: The file; its folder is made if it is not there.
+        data: Its contents.
+    """
+    with replacing(path) as draft:
+        draft.write_bytes(data)
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write JSON values, indented; a number that JSON has no word for becomes a string.
+
+    Args:
+        path: The file.
+        value: JSON values.
+    """
+    text = json.dumps(strict(value), indent=1, ensure_ascii=False, allow_nan=False)
+    write_bytes(path, (text + "\n").encode())
+
+
+def strict(value: Any) -> Any:
+    """The same values with NaN and the infinities as strings that ``float`` reads.
+
+    Args:
+        value: JSON values.
+
+    Returns:
+        A copy.
+
+    Example:
+        >>> strict({"r": float("nan"), "mse": [1.0, float("inf")]})
+        {'r': 'NaN', 'mse': [1.0, 'Infinity']}
+    """
+    if isinstance(value, Mapping):
+        return {str(key): strict(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(entry) for entry in value]
+    if isinstance(value, float | np.floating) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return value
+
+
+def read_json(path: Path) -> Any:
+    """The JSON values of a file."""
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write named arrays as npz.
+
+    Args:
+        path: The file.
+        arrays: Arrays by name; nothing that would have to be pickled.
+    """
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    write_bytes(path, buffer.getvalue())
+
+
+def read_arrays(path: Path) -> dict[str, NDArray[np.float64]]:
+    """The arrays that :func:`write_arrays` wrote, by name."""
+    with np.load(path, allow_pickle=False) as stored:
+        return {name: stored[name] for name in stored.files}
+
+
+def digest(value: object) -> str:
+    """SHA-256 of JSON values, whatever the order of their keys.
+
+    Args:
+        value: JSON values.
+
+    Returns:
+        64 hexadecimal digits.
+
+    Example:
+        >>> digest({"a": 1, "b": 2}) == digest({"b": 2, "a": 1})
+        True
+    """
+    return hashlib.sha256(json.dumps(value, sort_keys=True, ensure_ascii=True).encode()).hexdigest()
+
+
+@cache
+def code_digest(*rooms: str) -> str:
+    """SHA-256 over the source of some rooms, so that changed code never reuses what older code computed.
+
+    Args:
+        rooms: Folders of the package, such as ``"estimation"``.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    package = Path(sysid.__file__).parent
+    sha = hashlib.sha256(sysid.__version__.encode())
+    for room in rooms:
+        for file in sorted((package / room).rglob("*.py")):
+            sha.update(file.relative_to(package).as_posix().encode())
+            sha.update(file.read_bytes())
+    return sha.hexdigest()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunFolder:
+    """The folder of one pipeline's results.
+
+    Args:
+        path: ``runs/<pipeline>`` unless told otherwise.
+    """
+
+    path: Path
+
+    @property
+    def results(self) -> Path:
+        """The machine-readable results."""
+        return self.path / "results.json"
+
+    def fit(self, slug: str) -> Path:
+        """Folder of one fit."""
+        return self.path / "fits" / slug
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs out of the folder.
+
+        The operating system lets go of the lock when its process ends, however it ends: a killed run
+        leaves nothing to clear up.
+
+        Yields:
+            Nothing.
+
+        Raises:
+            BusyError: If another run holds the folder.
+            ConfigError: If the folder cannot be written to.
+        """
+        steps = self.path / ".steps"
+        holder = steps / "holder.json"
+        try:
+            steps.mkdir(parents=True, exist_ok=True)
+            lock = FileLock(steps / "lock", timeout=0)
+            lock.acquire()
+        except Timeout:
+            raise BusyError(
+                "another run is at work in this folder",
+                where=self.path,
+                expected="one run at a time",
+                got=_describe(holder),
+                remedy="wait until it is done, or give this run a folder of its own with --out",
+            ) from None
+        except OSError as error:
+            raise ConfigError(
+                "the run folder cannot be written to",
+                where=self.path,
+                got=error,
+                remedy="choose another folder with --out",
+            ) from error
+        try:
+            write_json(holder, {"pid": os.getpid(), "host": platform.node(), "since": time.strftime("%H:%M:%S")})
+            yield
+        finally:
+            lock.release()
+
+    def is_done(self, step: str, key: str) -> bool:
+        """Whether a step's result is stored, whole, and still what would come out.
+
+        Args:
+            step: Name of the step.
+            key: Digest of everything the step depends on.
+
+        Returns:
+            Whether it need not be done again.
+        """
+        try:
+            stamp = read_json(self._stamp(step))
+            return bool(stamp["key"] == key) and all(
+                _sha256(self.path / name) == sha for name, sha in stamp["files"].items()
+            )
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            # A stamp or a file that cannot be read is no stamp: the step is done again.
+            return False
+
+    def mark_done(self, step: str, key: str, files: Sequence[Path], **facts: object) -> None:
+        """Stamp a step whose files are written.
+
+        Args:
+            step: Name of the step.
+            key: Digest of everything it depended on.
+            files: What it wrote, inside the folder.
+            facts: JSON values to keep with the stamp.
+        """
+        names = {file.relative_to(self.path).as_posix(): _sha256(file) for file in files}
+        write_json(self._stamp(step), {"step": step, "key": key, "files": names, **facts})
+
+    def facts(self, step: str) -> dict[str, Any]:
+        """What was kept with a step's stamp."""
+        return dict(read_json(self._stamp(step)))
+
+    def _stamp(self, step: str) -> Path:
+        return self.path / ".steps" / f"{step}.json"
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _describe(holder: Path) -> str:
+    try:
+        facts = read_json(holder)
+        return f"process {facts['pid']} on {facts['host']} since {facts['since']}"
+    except (OSError, ValueError, KeyError):
+        # Between taking the lock and writing its name a holder is anonymous.
+        return "a process that has just begun"

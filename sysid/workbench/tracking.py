@@ -1,0 +1,329 @@
+"""Every fit into MLflow. The only file that imports it; no other room knows that it exists.
+
+Results are on disk before the tracker hears of them, and whatever fails here is told and gone past: tracking
+never costs a fit. Runs are flat, one per fit, because the charts show only the visible rows of a nested tree;
+what belongs together carries the same tag. A fit that is already tracked is found by its key and not logged
+again, so that running a pipeline once more logs what is missing and nothing else.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock
+from numpy.typing import NDArray
+
+from sysid.workbench import tracked
+from sysid.workbench.events import BundleReady, DataLoaded, Event, FitReady, ReportReady, RunStarted
+
+KEY_TAG = "sysid.key"
+"""Tag that holds the digest of everything a fit and its figures depend on."""
+
+SEQUENCE_FILE = "sequence.onnx"
+"""The exported file that runs a whole record, which is what a caller of a tracked model wants."""
+
+MAX_METRICS = 1000
+"""Metrics that MLflow takes in one batch (``mlflow.utils.validation.MAX_METRICS_PER_BATCH``)."""
+
+QUIET = {
+    "MLFLOW_DISABLE_TELEMETRY": "true",
+    "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
+    "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
+    "GIT_PYTHON_REFRESH": "quiet",
+}
+"""Settings that MLflow reads when it is imported; what the user has set stays."""
+
+
+def store_uri(workspace: Path) -> str:
+    """Where runs are tracked: ``MLFLOW_TRACKING_URI``, or SQLite in the workspace.
+
+    Args:
+        workspace: The user's workspace.
+
+    Returns:
+        A tracking URI.
+    """
+    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{(workspace / 'mlflow.db').resolve().as_posix()}"
+
+
+def connect(uri: str) -> Any:
+    """A client of a store that is ready for use by several processes.
+
+    Args:
+        uri: The tracking URI.
+
+    Returns:
+        An ``MlflowClient``.
+    """
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
+    with _no_deprecations():
+        from mlflow import MlflowClient
+
+        for name in ("mlflow", "alembic"):
+            logging.getLogger(name).setLevel(logging.WARNING)
+        client = MlflowClient(uri)
+        if not uri.startswith("sqlite:///"):
+            return client
+        # Processes that touch a new SQLite store at the same moment break each other's migrations (measured: 7 of 8
+        # failed): the first one makes it, the others wait.
+        database = Path(uri.removeprefix("sqlite:///"))
+        with FileLock(database.with_name(f".{database.name}.lock")):
+            client.search_experiments(max_results=1)
+    return client
+
+
+@contextmanager
+def _no_deprecations() -> Iterator[None]:
+    """What MLflow and its web framework deprecate in each other is not the user's business, nor ours to fix."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+@dataclass(kw_only=True, eq=False)
+class Tracker:
+    """Listens to a pipeline and logs what it hears.
+
+    Args:
+        uri: The tracking URI.
+        artifacts: Where a new experiment keeps its files; ``None`` leaves it to a server.
+        warn: Told what could not be tracked.
+    """
+
+    uri: str
+    artifacts: Path | None
+    warn: Callable[[str], None]
+
+    # What is known of the run so far.
+    failures: list[str] = field(default_factory=list)
+    client: Any = None
+    run: RunStarted | None = None
+    data: DataLoaded | None = None
+    run_ids: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of_workspace(cls, workspace: Path, warn: Callable[[str], None]) -> Tracker:
+        """The tracker of a workspace.
+
+        Args:
+            workspace: The folder that holds ``mlflow.db`` and ``mlartifacts``.
+            warn: Told what could not be tracked.
+
+        Returns:
+            The tracker; nothing is opened yet.
+        """
+        uri = store_uri(workspace)
+        return cls(uri=uri, artifacts=workspace / "mlartifacts" if uri.startswith("sqlite:") else None, warn=warn)
+
+    def __call__(self, event: Event) -> None:
+        """Log an event; never raises."""
+        try:
+            with _no_deprecations():
+                self._log(event)
+        except Exception as error:  # noqa: BLE001 - a store can fail in any way, and no fit may be lost by it
+            text = f"{type(event).__name__}: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+            self.failures.append(text)
+            self.warn(f"not tracked in MLflow ({text})")
+
+    def _log(self, event: Event) -> None:
+        match event:
+            case RunStarted():
+                self.run = event
+                self.client = connect(self.uri)
+            case DataLoaded():
+                self.data = event
+            case FitReady():
+                self._log_fit(event)
+            case BundleReady():
+                self._log_bundle(event)
+            case ReportReady():
+                self._log_report(event)
+            case _:
+                pass
+
+    def _log_fit(self, ready: FitReady) -> None:
+        if self.client is None or self.run is None or self.data is None:
+            return
+        experiment = self._experiment(str(ready.fit.model.mapping))
+        known = self._known_run(experiment, ready)
+        if known is not None and ready.stored:
+            self.run_ids[ready.config.name] = known
+            return
+        words = tracked.tags(ready, self.run, self.data) | {
+            KEY_TAG: ready.key,
+            "mlflow.note.content": tracked.description(ready, self.run),
+            "mlflow.source.name": self.run.command,
+            "mlflow.source.type": "LOCAL",
+        }
+        run = self.client.create_run(experiment, run_name=tracked.run_name(ready), tags=words)
+        run_id = run.info.run_id
+        self.run_ids[ready.config.name] = run_id
+        status = "FAILED"
+        try:
+            self._log_values(run_id, ready)
+            self._log_data(run_id)
+            for name, picture in tracked.pictures(ready):
+                self.client.log_image(run_id, picture, key=name, step=0)
+            status = "FINISHED"
+        finally:
+            self.client.set_terminated(run_id, status=status)
+
+    def _experiment(self, name: str) -> str:
+        """The experiment of a mapping, made or brought back if need be."""
+        from mlflow.exceptions import MlflowException
+
+        found = self.client.get_experiment_by_name(name)
+        if found is None:
+            location = None
+            if self.artifacts is not None:
+                location = (self.artifacts / tracked.key(name)).resolve().as_uri()
+            try:
+                return str(self.client.create_experiment(name, artifact_location=location))
+            except MlflowException:
+                # Another process has just made it.
+                found = self.client.get_experiment_by_name(name)
+                if found is None:
+                    raise
+        if found.lifecycle_stage == "deleted":
+            self.client.restore_experiment(found.experiment_id)
+        return str(found.experiment_id)
+
+    def _known_run(self, experiment: str, ready: FitReady) -> str | None:
+        """The run that tracks this very fit already; what a killed process left half logged is closed."""
+        found = self.client.search_runs([experiment], filter_string=f"tags.`{KEY_TAG}` = '{ready.key}'")
+        for run in found:
+            if run.info.status == "RUNNING":
+                self.client.set_terminated(run.info.run_id, status="KILLED")
+        return next((str(run.info.run_id) for run in found if run.info.status == "FINISHED"), None)
+
+    def _log_values(self, run_id: str, ready: FitReady) -> None:
+        from mlflow.entities import Metric, Param
+
+        if self.run is None:
+            return
+        now = int(time.time() * 1000)
+        values = [Metric(name, value, now, 0) for name, value in tracked.metrics(ready).items()]
+        values += [Metric("learning_curve_mse", mse, now, step) for step, mse in tracked.learning_curve(ready)]
+        params = [Param(name, value[:6000]) for name, value in tracked.parameters(ready, self.run).items()]
+        for first in range(0, len(values), MAX_METRICS):
+            batch = values[first : first + MAX_METRICS]
+            self.client.log_batch(run_id, metrics=batch, params=params if first == 0 else ())
+
+    def _log_data(self, run_id: str) -> None:
+        from mlflow.data.code_dataset_source import CodeDatasetSource
+        from mlflow.data.meta_dataset import MetaDataset
+        from mlflow.entities import DatasetInput, InputTag
+        from mlflow.types import ColSpec, Schema
+
+        if self.data is None:
+            return
+        traces = self.data.traces
+        cases = {trace.name: f"{traces.roles[trace.name].value}, {len(trace)} samples" for trace in traces}
+        dataset = MetaDataset(
+            CodeDatasetSource(tags={"source": traces.source[:2000], "digest": traces.digest, "cases": cases}),
+            name=traces.name,
+            # MLflow keeps at most 36 characters; the whole digest stands in the source and in the run's tags.
+            digest=traces.digest[:32],
+            schema=Schema([ColSpec("double", channel.label) for channel in traces.channels]),
+        )
+        context = InputTag("mlflow.data.context", "estimation and validation")
+        self.client.log_inputs(run_id, [DatasetInput(dataset._to_mlflow_entity(), [context])])
+
+    def _log_bundle(self, ready: BundleReady) -> None:
+        run_id = self.run_ids.get(ready.of.config.name)
+        if self.client is None or run_id is None:
+            return
+        if ready.stored and self.client.get_run(run_id).data.tags.get("exported") == "yes":
+            return
+        self.client.log_artifacts(run_id, str(ready.folder), "bundle")
+        sequence = next((entry for entry in ready.exports if Path(entry["file"]).name == SEQUENCE_FILE), None)
+        if sequence is not None:
+            self._log_model(run_id, ready.folder.parent / sequence["file"], ready)
+        self.client.set_tag(run_id, "exported", "yes")
+
+    def _log_model(self, run_id: str, file: Path, ready: BundleReady) -> None:
+        """The exported network as a model that MLflow can load and serve."""
+        import mlflow
+        import onnx
+
+        network = onnx.load(str(file))
+        before = mlflow.get_tracking_uri()
+        mlflow.set_tracking_uri(self.uri)
+        try:
+            with mlflow.start_run(run_id=run_id):
+                mlflow.onnx.log_model(
+                    network,
+                    name=tracked.key(ready.of.fit.model.structure.label).replace(".", "_"),
+                    signature=_signature(network),
+                    input_example=self._example(network, ready.of),
+                    # Without these MLflow asks for CUDA at load and for whatever it finds installed.
+                    onnx_execution_providers=["CPUExecutionProvider"],
+                    pip_requirements=["onnx", "onnxruntime", "numpy"],
+                    save_as_external_data=False,
+                )
+        finally:
+            mlflow.set_tracking_uri(before)
+
+    def _example(self, network: Any, ready: FitReady) -> dict[str, NDArray[np.float64]]:
+        """A few samples of the first trace for one car, from the middle of every channel's range."""
+        if self.data is None:
+            return {}
+        trace = self.data.traces.traces[0]
+        columns = trace.columns(ready.fit.model.mapping.inputs)[:8]
+        _, state = network.graph.input
+        return {"u": columns[:, None, :], "state": np.zeros((1, state.type.tensor_type.shape.dim[1].dim_value))}
+
+    def _log_report(self, ready: ReportReady) -> None:
+        run_id = self.run_ids.get(ready.of.config.name)
+        if self.client is None or run_id is None:
+            return
+        self.client.log_artifact(run_id, str(ready.page), "report")
+        self.client.log_artifact(run_id, str(ready.results), "report")
+
+
+def _signature(network: Any) -> Any:
+    """Names, types and shapes of a graph's inputs and outputs; -1 stands for any length."""
+    from mlflow.models import ModelSignature
+    from mlflow.types import Schema, TensorSpec
+    from onnx.helper import tensor_dtype_to_np_dtype
+
+    def schema(values: Any) -> Any:
+        tensors = [(value.name, value.type.tensor_type) for value in values]
+        return Schema(
+            [
+                TensorSpec(
+                    np.dtype(tensor_dtype_to_np_dtype(tensor.elem_type)),
+                    tuple(dim.dim_value or -1 for dim in tensor.shape.dim),
+                    name,
+                )
+                for name, tensor in tensors
+            ]
+        )
+
+    return ModelSignature(inputs=schema(network.graph.input), outputs=schema(network.graph.output))
+
+
+def latest_experiment(uri: str) -> str | None:
+    """The experiment with the newest run, the one to open first.
+
+    Args:
+        uri: The tracking URI.
+
+    Returns:
+        Its identifier; ``None`` where nothing is tracked yet.
+    """
+    with _no_deprecations():
+        client = connect(uri)
+        experiments = [experiment.experiment_id for experiment in client.search_experiments()]
+        newest = client.search_runs(experiments, order_by=["attributes.start_time DESC"], max_results=1)
+    return str(newest[0].info.experiment_id) if newest else None
