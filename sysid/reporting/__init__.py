@@ -1,1 +1,46 @@
 """Stored results in, tables, figures and HTML out; no fit is computed here."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sysid.reporting.figures import case_figure as case_figure
+    from sysid.reporting.published import PublishedFigure as PublishedFigure
+    from sysid.reporting.published import PublishedTable as PublishedTable
+    from sysid.reporting.published import published_names as published_names
+    from sysid.reporting.published import read_published as read_published
+    from sysid.reporting.report import write_report as write_report
+    from sysid.reporting.results import Results as Results
+    from sysid.reporting.results import parse_results as parse_results
+    from sysid.reporting.results import read_results as read_results
+    from sysid.reporting.results import results_json_schema as results_json_schema
+    from sysid.reporting.results import write_results as write_results
+    from sysid.reporting.signals import CaseSignals as CaseSignals
+    from sysid.reporting.signals import read_signals as read_signals
+
+# Loaded when first asked for: matplotlib takes longer to import than `sysid --help` may take to answer.
+_HOME = {
+    "CaseSignals": "signals",
+    "PublishedFigure": "published",
+    "PublishedTable": "published",
+    "Results": "results",
+    "case_figure": "figures",
+    "parse_results": "results",
+    "published_names": "published",
+    "read_published": "published",
+    "read_results": "results",
+    "read_signals": "signals",
+    "results_json_schema": "results",
+    "write_report": "report",
+    "write_results": "results",
+}
+
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -47,6 +47,7 @@ def case_figure(
     label: str,
     unit: str,
     predicted: NDArray[np.float64] | None = None,
+    columns: int = 450,
 ) -> Figure:
     """One model on one case: target and free run over time, and the error below.
 
@@ -58,6 +59,7 @@ def case_figure(
         label: What the output is, for the axis.
         unit: Its unit.
         predicted: One step ahead, shape ``(n_samples,)``; left out if not given.
+        columns: How finely lines are drawn: up to four points in each of so many columns.
 
     Returns:
         The figure; nothing outside it was touched.
@@ -66,12 +68,12 @@ def case_figure(
         figure = new_figure(7.6, 3.9)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.4, 1.0])
         above.set_title(title)
-        _line(above, time, target, color=TARGET, linewidth=1.1, label="target")
+        _line(above, time, target, columns, color=TARGET, linewidth=1.1, label="target")
         if predicted is not None:
-            _line(above, time, predicted, **_ONE_STEP, label="one step ahead")
-            _line(below, time, predicted - target, **_ONE_STEP)
-        _line(above, time, simulated, **_FREE_RUN, label="free run")
-        _line(below, time, simulated - target, color=PALETTE[0], linewidth=1.0)
+            _line(above, time, predicted, columns, **_ONE_STEP, label="one step ahead")
+            _line(below, time, predicted - target, columns, **_ONE_STEP)
+        _line(above, time, simulated, columns, **_FREE_RUN, label="free run")
+        _line(below, time, simulated - target, columns, color=PALETTE[0], linewidth=1.0)
         below.axhline(0.0, color=TARGET, linewidth=0.6)
         _limit(above, below, target, simulated)
         above.set_ylabel(f"{label} [{unit}]")
@@ -82,8 +84,8 @@ def case_figure(
         return figure
 
 
-def _line(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], **style: Any) -> None:
-    axes.plot(*thin(x, np.where(np.isfinite(y), y, np.nan), _COLUMNS), **style)
+def _line(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], columns: int, **style: Any) -> None:
+    axes.plot(*thin(x, np.where(np.isfinite(y), y, np.nan), columns), **style)
 
 
 def _limit(above: Axes, below: Axes, target: NDArray[np.float64], simulated: NDArray[np.float64]) -> None:
@@ -122,10 +124,11 @@ def moments_figure(
         for number, (axes, moment) in enumerate(zip(panels, moments, strict=False)):
             case = signals[moment.case]
             window = slice(moment.first, moment.last + 1)
-            _line(axes, case.time[window], case.target[window], color=TARGET, linewidth=1.1, label="target")
-            _line(axes, case.time[window], case.simulated[window], **_FREE_RUN, label="free run")
+            _line(axes, case.time[window], case.target[window], _COLUMNS, color=TARGET, linewidth=1.1, label="target")
+            _line(axes, case.time[window], case.simulated[window], _COLUMNS, **_FREE_RUN, label="free run")
             axes.axvline(moment.time, color=PALETTE[1], linewidth=0.9, linestyle=DASHES[2])
-            axes.set_title(f"{number + 1}. {moment.case}, {moment.time:g} s", fontsize=9)
+            error = f"{moment.error:+.3g} {unit}" if np.isfinite(moment.error) else "diverged"
+            axes.set_title(f"{number + 1}. {moment.case}, {moment.time:g} s: {error}", fontsize=8.5)
             axes.set_xlabel("time [s]")
             axes.set_ylabel(f"{label} [{unit}]" if number % columns == 0 else "")
             axes.locator_params(nbins=4)

@@ -33,6 +33,8 @@ def number(value: float, *, digits: int = 3, missing: str = "not defined") -> st
     if -4 < power < 6:
         rounded = round(value, digits - 1 - power)
         text = f"{rounded:.{max(0, digits - 1 - power)}f}"
+        # A narrow space between thousands, which is not a decimal sign in any language.
+        text = f"{rounded:,.0f}".replace(",", "\u202f") if power >= 4 else text
     else:
         text = f"{mantissa} × 10{str(power).translate(_SUPERSCRIPT)}"
     return text.replace("-", "−")

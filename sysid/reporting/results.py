@@ -109,6 +109,8 @@ class FitRecord(_Record):
     structure: dict[str, Any]
     label: str = Field(description="Structure in a few characters, such as 'NARX 4/4/20'.")
     loop: Loop
+    seed: int | None = None
+    initial: str | None = Field(default=None, description="Name of the fit that this one was started from.")
     train_time_s: Number
     status: str = Field(description="Name of the status, such as CONVERGED.")
     notes: list[str] = []
@@ -148,6 +150,13 @@ class DataRecord(_Record):
     cases: dict[str, DataCaseRecord]
 
 
+class SelectionRecord(_Record):
+    """The traces that chose between fits."""
+
+    name: str = Field(description="Name of their data set.")
+    cases: dict[str, Any] = Field(description="By name of the trace.")
+
+
 class BestRecord(_Record):
     """Which fit was chosen."""
 
@@ -165,8 +174,9 @@ class Results(_Record):
     created: str = Field(description="Date and time, ISO 8601.")
     environment: dict[str, Any]
     seed: int | None
+    start: dict[str, Any] | None = Field(default=None, description="How each free run begins.")
     data: DataRecord
-    selection: dict[str, Any] | None = Field(default=None, description="The traces that chose between fits.")
+    selection: SelectionRecord | None = None
     fits: list[FitRecord] = Field(min_length=1)
     best: BestRecord | None = None
     published: str | None = Field(default=None, description="Reference table to set beside ours.")

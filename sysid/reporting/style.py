@@ -99,6 +99,10 @@ def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    # A rule for everything would reach beyond the figure; on its root it is inherited instead.
+    text = re.sub(r"<style.*?</style>\s*", "", text, flags=re.DOTALL)
+    # A hundredth of a point cannot be seen; six decimals double the size.
+    text = re.sub(r'\bd="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path.group()), text)
     # Ids are unique in a figure only; in one page with others each figure needs its own.
     text = re.sub(r'\bid="', f'id="{name}-', text)
     text = re.sub(r"url\(#", f"url(#{name}-", text)
@@ -111,7 +115,7 @@ def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
     box = re.search(r'viewBox="[^"]*"', opening)
     head = (
         f'<svg role="img" aria-labelledby="{name}-title {name}-desc" {box.group() if box else ""} '
-        f'preserveAspectRatio="xMidYMid meet"><title id="{name}-title">{_escape(title)}</title>'
+        f'style="stroke-linejoin:round;stroke-linecap:butt"><title id="{name}-title">{_escape(title)}</title>'
         f'<desc id="{name}-desc">{_escape(description)}</desc>'
     )
     return head + rest.strip()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sysid.reporting.numbers import number, seconds, times
-from sysid.reporting.results import CaseRecord, FitRecord, PublishedRecord, Results
+from sysid.reporting.results import CaseRecord, FiguresRecord, FitRecord, PublishedRecord, Results
 from sysid.traces import Role
 
 SCORED = (Role.VALIDATION, Role.TEST)
@@ -53,9 +53,11 @@ class Table:
     note: str = ""
 
 
-def figure_cell(value: float, *, missing: str = "not defined", below: str = "", mark: str = "number") -> Cell:
-    """A cell with a number in three significant digits."""
-    return Cell(text=number(value, missing=missing), value=value, below=below, mark=mark)
+def figure_cell(
+    value: float, *, missing: str = "not defined", below: str = "", mark: str = "number", digits: int = 3
+) -> Cell:
+    """A cell with a number in a few significant digits."""
+    return Cell(text=number(value, missing=missing, digits=digits), value=value, below=below, mark=mark)
 
 
 def case_columns(fits: Sequence[FitRecord]) -> dict[str, Role]:
@@ -106,7 +108,7 @@ def accuracy_table(fits: Sequence[FitRecord], kind: str, best: str | None) -> Ta
         head=(
             ("fit", ""),
             *((name, role.value) for name, role in columns.items()),
-            ("mean", "not fitted or chosen on"),
+            ("mean", "unseen cases"),
         ),
         rows=tuple(rows),
         note=note + (" Small figures: ours divided by the published one; below 1 is better." if published else ""),
@@ -170,9 +172,9 @@ def quality_table(fit: FitRecord, kind: str) -> Table:
                 Cell(text=name, header=True),
                 Cell(text=case.role.value),
                 figure_cell(figures.mse, missing=DIVERGED),
-                figure_cell(figures.nrmse_fit, missing=DIVERGED if math.isnan(figures.mse) else "not defined"),
+                figure_cell(figures.nrmse_fit, digits=4, missing=_word(figures)),
                 figure_cell(figures.max_abs_error, missing=DIVERGED),
-                Cell(text=_correlation(figures.r), value=figures.r, mark="number"),
+                Cell(text=_correlation(figures), value=figures.r, mark="number"),
             )
         )
     words = {"free_run": "free run", "one_step": "one step ahead"}[kind]
@@ -201,9 +203,8 @@ def ranking_table(results: Results) -> Table:
         count = Cell(text="unknown") if fit.n_parameters is None else _count_cell(fit.n_parameters, effective)
         rows.append(
             (
-                _name_cell(fit, best),
-                Cell(text=fit.mapping),
-                Cell(text=fit.label),
+                Cell(text=fit.name, header=True, below="chosen" if fit.name == best else "", mark=_mark(fit, best)),
+                Cell(text=fit.label, below=fit.mapping.replace("->", "→")),
                 Cell(text=fit.loop.value),
                 count,
                 Cell(text=seconds(fit.train_time_s), value=fit.train_time_s, mark="number"),
@@ -215,7 +216,6 @@ def ranking_table(results: Results) -> Table:
         caption="Every fit of this run, best first on the traces that choose between fits.",
         head=(
             ("fit", ""),
-            ("mapping", ""),
             ("structure", ""),
             ("trained", "loop"),
             ("parameters", ""),
@@ -308,7 +308,16 @@ def _sentence(text: str) -> str:
 def _name_cell(fit: FitRecord, best: str | None) -> Cell:
     chosen = fit.name == best
     below = f"{fit.label}, trained {fit.loop.value} loop" + ("; chosen" if chosen else "")
-    return Cell(text=fit.name, below=below, header=True, mark="best" if chosen else "")
+    return Cell(text=fit.name, below=below, header=True, mark=_mark(fit, best))
+
+
+def _mark(fit: FitRecord, best: str | None) -> str:
+    return "best" if fit.name == best else ""
+
+
+def _word(figures: FiguresRecord) -> str:
+    """Why a figure is not a number: a free run that diverged, or a target that does not vary."""
+    return "not defined" if math.isfinite(figures.mse) else DIVERGED
 
 
 def _mse_cell(case: CaseRecord, kind: str) -> Cell:
@@ -349,6 +358,6 @@ def _simulated(fits: Sequence[FitRecord], name: str) -> float:
     return next(fit.cases[name].simulated_s for fit in fits if name in fit.cases)
 
 
-def _correlation(r: float) -> str:
+def _correlation(figures: FiguresRecord) -> str:
     # R lies close to 1 for any useful model: three digits would print 1.00 for all of them.
-    return f"{r:.6f}".replace("-", "−") if math.isfinite(r) else "not defined"
+    return f"{figures.r:.6f}".replace("-", "−") if math.isfinite(figures.r) else _word(figures)

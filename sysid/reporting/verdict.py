@@ -114,7 +114,8 @@ def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord]) -> str:
     if len(finite) < len(cases):
         return f"{text}; on {', '.join(sorted(set(cases) - set(finite)))} it diverges."
     text += f", on average {number(mean_mse(fit, 'free_run'))} {unit}²" if scored_cases(fit) else ""
-    return f"{text}. The root mean square error of the worst case is {number(math.sqrt(finite[high].free_run.mse))} {unit}."
+    rms = number(math.sqrt(finite[high].free_run.mse))
+    return f"{text}. The root mean square error of the worst case is {rms} {unit}."
 
 
 def _published(cases: Dict[str, CaseRecord], comparability: str) -> str:
@@ -153,7 +154,8 @@ def _weakness(fit: FitRecord, cases: Dict[str, CaseRecord], moments: Sequence[Mo
         moment = moments[0]
         text += (
             f" The largest error, {number(moment.error)} {fit.unit}, occurs in {moment.case} at {moment.time:g} s, "
-            f"where the target is {number(moment.target)} {fit.unit} and the free run {number(moment.simulated)} {fit.unit}."
+            f"where the target is {number(moment.target, digits=5)} {fit.unit} and the free run "
+            f"{number(moment.simulated, digits=5)} {fit.unit}."
         )
     return text
 

@@ -1,0 +1,277 @@
+"""The parts of a report in the order they are read: stored results turned into tables and pictures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sysid.reporting import figures
+from sysid.reporting.moments import Moment, worst_moments
+from sysid.reporting.numbers import number
+from sysid.reporting.published import PublishedTable
+from sysid.reporting.results import FitRecord, LearningCurve, Results
+from sysid.reporting.signals import CaseSignals, read_signals
+from sysid.reporting.style import svg
+from sysid.reporting.tables import (
+    DIVERGED,
+    Cell,
+    Table,
+    accuracy_table,
+    case_columns,
+    data_table,
+    export_table,
+    figure_cell,
+    quality_table,
+    ranking_table,
+    run_time_table,
+    scored_cases,
+)
+from sysid.reporting.verdict import Verdict, verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picture:
+    """A figure as markup.
+
+    Args:
+        svg: Inline SVG element.
+        caption: Stands below it.
+    """
+
+    svg: str
+    caption: str
+
+
+Part = Table | Picture | str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A heading and what stands under it.
+
+    Args:
+        anchor: Its id in the page.
+        title: Its heading.
+        parts: Tables, pictures and paragraphs, in order.
+    """
+
+    anchor: str
+    title: str
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Document:
+    """Everything that the page shows.
+
+    Args:
+        results: The results it was made from.
+        verdict: Stands first.
+        sections: The rest, in order.
+    """
+
+    results: Results
+    verdict: Verdict
+    sections: tuple[Section, ...]
+
+
+def build_document(folder: Path, results: Results, published: PublishedTable | None) -> Document:
+    """Turn a run into the parts of a report.
+
+    Args:
+        folder: The run's folder, with the signals of its fits.
+        results: Its results, with published figures where there are some.
+        published: Where those figures come from.
+
+    Returns:
+        The parts.
+
+    Raises:
+        ConfigError: If the signals of a fit are missing or damaged.
+    """
+    signals = {fit.slug: read_signals(folder / "fits" / fit.slug, list(fit.cases)) for fit in results.fits}
+    best = results.best_fit
+    moments: list[Moment] = []
+    if best is not None:
+        judged = scored_cases(best) or best.cases
+        moments = worst_moments({name: signals[best.slug][name] for name in judged}, 5)
+    sections = [_accuracy(results, published)]
+    columns = _columns(results)
+    if best is not None:
+        sections.append(_best(best, signals[best.slug], moments, columns))
+    sections += [_run_times(results, published), _tried(results)]
+    exports = export_table(results)
+    if exports is not None:
+        sections.append(Section(anchor="exports", title="Exported files", parts=(exports,)))
+    sections += [_data(results), *_others(results, signals, columns)]
+    comparability = "" if published is None else published.comparability
+    return Document(results=results, verdict=verdict(results, moments, comparability), sections=tuple(sections))
+
+
+def _accuracy(results: Results, published: PublishedTable | None) -> Section:
+    best = None if results.best is None else results.best.name
+    parts: list[Part] = []
+    for index, (mapping, fits) in enumerate(results.mappings().items()):
+        parts.append(accuracy_table(fits, "free_run", best))
+        parts.append(_mse_picture(mapping, fits, f"mse-{index}"))
+        parts.append(accuracy_table(fits, "one_step", best))
+    if published is not None:
+        parts.append(f"Published figures: {published.reference}; {published.part}. {published.comparability}")
+    return Section(anchor="accuracy", title="Accuracy by case", parts=tuple(parts))
+
+
+def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
+    cases = list(case_columns(fits))
+    series = [
+        figures.Series(name=fit.name, values={case: record.free_run.mse for case, record in fit.cases.items()})
+        for fit in fits
+    ]
+    published = {
+        case: record.published["free_run"].value
+        for fit in fits
+        for case, record in fit.cases.items()
+        if record.published and "free_run" in record.published
+    }
+    if published:
+        series.append(figures.Series(name="published", values=published, published=True))
+    figure = figures.cases_figure(series, cases, quantity=f"free-run mse [{fits[0].unit}²]")
+    caption = f"Free-run mse by case and fit, {mapping}; logarithmic, lower is better. A fit without a mark diverges."
+    return _picture(figure, f"Free-run mse by case, {mapping}", caption, name)
+
+
+def _best(fit: FitRecord, signals: Dict[str, CaseSignals], moments: list[Moment], columns: int) -> Section:
+    parts: list[Part] = [quality_table(fit, "free_run"), quality_table(fit, "one_step")]
+    parts += _case_pictures(fit, signals, columns)
+    output = fit.mapping.rpartition("->")[2].strip()
+    if moments:
+        title = f"{fit.name}: the {len(moments)} worst moments"
+        picture = figures.moments_figure(moments, signals, title=title, label=output, unit=fit.unit)
+        parts.append(_picture(picture, title, "Zooms at the largest errors of the free run, worst first.", "moments"))
+        parts.append(_moments_table(fit, moments))
+    r = {case: record.free_run.r for case, record in fit.cases.items()}
+    picture = figures.regression_figure(signals, r, label=output, unit=fit.unit)
+    caption = "Free run against target: a perfect model lies on the line."
+    parts.append(_picture(picture, f"{fit.name}: target-output regression", caption, "regression"))
+    return Section(anchor="best", title=f"The chosen model: {fit.name}", parts=tuple(parts))
+
+
+def _columns(results: Results) -> int:
+    """How finely time plots are drawn, so that a page with many of them stays under three megabytes."""
+    pictures = sum(len(fit.cases) for fit in results.fits)
+    return max(60, min(450, 450 * 30 // pictures))
+
+
+def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int) -> list[Part]:
+    output = fit.mapping.rpartition("->")[2].strip()
+    parts: list[Part] = []
+    for index, (name, case) in enumerate(fit.cases.items()):
+        signal = signals[name]
+        figure = figures.case_figure(
+            signal.time, signal.target, signal.simulated, title=name, label=output, unit=fit.unit, columns=columns
+        )
+        caption = (
+            f"{fit.name} on {name} ({case.role.value}): target and free run above, error below. "
+            f"mse {number(case.free_run.mse, missing='diverged')} {fit.unit}², largest error "
+            f"{number(case.free_run.max_abs_error, missing='diverged')} {fit.unit}."
+        )
+        parts.append(_picture(figure, f"{fit.name} on {name}", caption, f"case-{_identifier(fit.slug)}-{index}"))
+    return parts
+
+
+def _moments_table(fit: FitRecord, moments: list[Moment]) -> Table:
+    return Table(
+        caption="The worst moments of the free run, on the cases that the verdict rests on.",
+        head=(("", ""), ("case", ""), ("time", "s"), ("target", fit.unit), ("free run", fit.unit), ("error", fit.unit)),
+        rows=tuple(
+            (
+                Cell(text=str(place), header=True),
+                Cell(text=moment.case),
+                Cell(text=f"{moment.time:g}", value=moment.time, mark="number"),
+                figure_cell(moment.target, digits=5),
+                figure_cell(moment.simulated, digits=5, missing=DIVERGED),
+                figure_cell(moment.error, missing=DIVERGED),
+            )
+            for place, moment in enumerate(moments, start=1)
+        ),
+    )
+
+
+def _run_times(results: Results, published: PublishedTable | None) -> Section:
+    best = None if results.best is None else results.best.name
+    parts: list[Part] = [run_time_table(fits, best) for fits in results.mappings().values()]
+    per_thousand = {
+        fit.name: float(np.median([1e6 * case.run_time_s / case.simulated_s for case in fit.cases.values()]))
+        for fit in results.fits
+    }
+    figure = figures.run_time_figure(per_thousand, quantity="run time for 1000 simulated seconds [ms]")
+    caption = "Free run, median over the cases."
+    parts.append(_picture(figure, "Run time of each fit", caption, "run-time"))
+    machine = results.environment.get("cpu") or "the machine named below"
+    protocol = (
+        f"Protocol: the free run of each whole case, median of repeats after one that warms up, measured on {machine}."
+    )
+    if published is not None:
+        protocol += f" Published run times were measured on: {published.computer}."
+    parts.append(protocol)
+    return Section(anchor="run-times", title="Run times", parts=tuple(parts))
+
+
+def _tried(results: Results) -> Section:
+    parts: list[Part] = []
+    if results.best is not None:
+        parts.append(f"Choice: {results.best.chosen_by}")
+    if results.selection is not None:
+        parts.append(f"Traces that choose: {results.selection.name} ({', '.join(results.selection.cases)}).")
+    parts.append(ranking_table(results))
+    curves: dict[str, dict[str, LearningCurve]] = {}
+    for fit in results.fits:
+        if fit.learning_curve is not None and len(fit.learning_curve.mse) > 1:
+            curves.setdefault(fit.unit, {})[fit.name] = fit.learning_curve
+    for index, (unit, group) in enumerate(curves.items()):
+        caption = "Learning curves on the estimation records; an open-loop fit learns the error of one step."
+        parts.append(
+            _picture(figures.learning_figure(group, unit=unit), "Learning curves", caption, f"learning-{index}")
+        )
+    notes = [(fit.name, " ".join(fit.notes)) for fit in results.fits if fit.notes]
+    if notes:
+        rows = tuple((Cell(text=name, header=True), Cell(text=text)) for name, text in notes)
+        parts.append(Table(caption="Notes of the fits.", head=(("fit", ""), ("notes", "")), rows=rows))
+    return Section(anchor="tried", title="What was tried, and what chose", parts=tuple(parts))
+
+
+def _data(results: Results) -> Section:
+    return Section(
+        anchor="data",
+        title="Traces",
+        parts=(data_table(results), f"Digest of the data set (SHA-256): {results.data.digest}"),
+    )
+
+
+def _others(results: Results, signals: Dict[str, Dict[str, CaseSignals]], columns: int) -> list[Section]:
+    best = results.best_fit
+    return [
+        Section(
+            anchor=f"fit-{_identifier(fit.slug)}",
+            title=f"Every case: {fit.name}",
+            parts=(
+                quality_table(fit, "free_run"),
+                quality_table(fit, "one_step"),
+                *_case_pictures(fit, signals[fit.slug], columns),
+            ),
+        )
+        for fit in results.fits
+        if fit is not best
+    ]
+
+
+def _picture(figure: Figure, title: str, caption: str, name: str) -> Picture:
+    return Picture(svg=svg(figure, title=title, description=caption, name=name), caption=caption)
+
+
+def _identifier(slug: str) -> str:
+    return re.sub(r"[^A-Za-z0-9-]", "-", slug)
