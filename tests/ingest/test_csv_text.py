@@ -1,0 +1,160 @@
+"""CSV as it comes: separators, decimal marks, encodings, comments, unit lines, and their refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sysid.errors import ReaderError
+from sysid.ingest import FileOptions, read_table
+
+Write = Callable[[str, str | bytes], Path]
+
+READABLE = {
+    "comma": "t [s],u [V]\n0.0,1.5\n0.1,-2.5\n",
+    "semicolon and decimal comma": "t [s];u [V]\n0,0;1,5\n0,1;-2,5\n",
+    "tab and decimal comma": "t [s]\tu [V]\n0,0\t1,5\n0,1\t-2,5\n",
+    "CRLF": "t [s],u [V]\r\n0.0,1.5\r\n0.1,-2.5\r\n",
+    "no newline at the end": "t [s],u [V]\n0.0,1.5\n0.1,-2.5",
+    "comments": "# rig 3\n# by: me\nt [s],u [V]\n0.0,1.5\n# paused\n0.1,-2.5\n",
+    "blank lines": "\n\nt [s],u [V]\n\n0.0,1.5\n \n0.1,-2.5\n\n",
+    "units line": "t,u\ns,V\n0.0,1.5\n0.1,-2.5\n",
+    "units line in brackets": "t;u\n[s];[V]\n0,0;1,5\n0,1;-2,5\n",
+    "separator at the end of every line": "t [s],u [V],\n0.0,1.5,\n0.1,-2.5,\n",
+    "separator at the end of every row but not of the header": "t [s],u [V]\n0.0,1.5,\n0.1,-2.5,\n",
+    "quoted cells": '"t [s]","u [V]"\n"0.0","1.5"\n"0.1","-2.5"\n',
+    "spaces around cells": "t [s] , u [V]\n 0.0 , 1.5\n 0.1 , -2.5\n",
+}
+
+
+@pytest.mark.parametrize("text", READABLE.values(), ids=READABLE)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_layout_is_recognised(write: Write, text: str, encoding: str) -> None:
+    table = read_table(write("run.csv", text.encode(encoding)))
+    assert [(column.name, column.unit) for column in table.columns] == [("t", "s"), ("u", "V")]
+    assert [column.values.tolist() for column in table.columns] == [[0.0, 0.1], [1.5, -2.5]]
+    assert table.time == "t"
+
+
+def test_windows_encoding_is_recognised(write: Write) -> None:
+    table = read_table(write("run.csv", "t [s];T [°C]\n0;20,5\n1;21,5\n".encode("cp1252")))
+    assert (table.find("T").unit, table.settings["encoding"]) == ("degC", "cp1252")
+
+
+def test_a_file_without_header_gets_numbered_columns(write: Write) -> None:
+    table = read_table(write("run.csv", "0;1,5\n1;2,5\n"))
+    assert (table.names, len(table), table.time) == (("column_1", "column_2"), 2, None)
+
+
+def test_lines_before_the_header_are_skipped_and_lines_still_count_from_the_top(write: Write) -> None:
+    path = write("run.csv", "Logger 7\nSerial;12;34\nt [s];u [V]\n0;1,5\n1;x\n")
+    table = read_table(path, files=FileOptions(skip_lines=2, separator=";"))
+    with pytest.raises(ReaderError, match=r"line 5, column u"):
+        table.find("u")
+
+
+def test_what_the_options_say_is_not_guessed(write: Write) -> None:
+    path = write("run.csv", "1;1,500\n2;2,500\n")
+    european = read_table(path).find("column_2").values
+    english = read_table(path, files=FileOptions(thousands=",", decimal=".")).find("column_2").values
+    assert (european.tolist(), english.tolist()) == ([1.5, 2.5], [1500.0, 2500.0])
+
+
+def test_stamps_whose_marks_all_look_alike_are_read_as_told(write: Write) -> None:
+    path = write("run.csv", "0.000;3.658;7.315\r\n301.000;3.657;7.315\r\n1.003.000;3.658;7.317")
+    options = FileOptions(names=("t [ms]", "P [bar]", "U [V]"), decimal=".", thousands=".")
+    table = read_table(path, files=options)
+    assert table.find("t").values.tolist() == [0.0, 301.0, 1003.0]
+    assert table.find("U").values.tolist() == [7.315, 7.315, 7.317]
+
+
+def test_calendar_time_becomes_seconds(write: Write) -> None:
+    path = write("run.csv", "u [V],stamp\n1,01.05.2024 23:59:59.5\n2,02.05.2024 00:00:01.0\n")
+    options = FileOptions.model_validate(
+        {"time": {"column": "stamp", "unit": "datetime", "format": "%d.%m.%Y %H:%M:%S.%f"}}
+    )
+    table = read_table(path, files=options)
+    assert (table.time, table.find("stamp").values.tolist()) == ("stamp", [0.0, 1.5])
+
+
+def test_missing_values_are_what_the_options_name(write: Write) -> None:
+    path = write("run.csv", "t [s],u [V]\n0,---\n1,\n2,3\n")
+    table = read_table(path, files=FileOptions(missing=("---",)))
+    np.testing.assert_array_equal(table.find("u").values, [np.nan, np.nan, 3.0])
+
+
+def test_a_column_of_remarks_does_no_harm(write: Write) -> None:
+    table = read_table(write("run.csv", "t [s],state,u [V]\n0,OK,1\n1,OK,2\n"))
+    assert table.find("u").values.tolist() == [1.0, 2.0]
+    with pytest.raises(ReaderError, match=r"(?s)line 2, column state.*got: +'OK'.*missing: \['OK'\]"):
+        table.find("state")
+
+
+REFUSED = {
+    "several points": ("t;u\n0.000;1\n1.003.000;2\n", {}, "t", r"(?s)line 3, column t.*'1\.003\.000'.*thousands: '\.'"),
+    "calendar time": ("t;u\n2024-05-01 10:00;1\n", {"header": True}, "t", "unit: datetime"),
+    "wrong decimal mark": ("t,u\n0,1.5\n1,2;5\n", {}, "u", r"(?s)line 3, column u.*'2;5'.*decimal"),
+    "two decimal marks": ("t;u\n0,5;1\n1.5;2\n", {}, "t", r"(?s)decimal comma and.*lines 2 and 3.*decimal: ','"),
+    "nothing": ("", {}, "t", "holds no samples"),
+    "comments alone": ("# a\n# b\n", {}, "t", "holds no samples"),
+    "header alone": ("t [s],u [V]\n", {}, "t", "holds no samples"),
+    "zero bytes": ("t,u\n0,1\n\0\0\0\0,2\n", {}, "t", r"(?s)not text.*zero bytes"),
+    "an open quote": ('t,u\n0,"1\n1,2\n', {}, "t", r"(?s)cannot be split.*quotes in pairs"),
+    "a nameless column": ("t,,u\n0,1,2\n", {}, "t", r"(?s)column 2 has no name.*names: \[\.\.\.\]"),
+    "names that do not fit": ("0,1,2\n1,2,3\n", {"names": ("t", "u")}, "t", r"(?s)expected: 3 names.*got: +2"),
+    "an unknown encoding": ("t,u\n0,1\n", {"encoding": "klingon"}, "t", r"(?s)not text.*klingon"),
+    "mixed calendar": (
+        "t,u\n2024-05-01 10:00,1\n2024-05-01 11:00+02:00,1\n",
+        {"time": {"column": "t", "unit": "datetime"}},
+        "t",
+        "some time stamps have a time zone",
+    ),
+    "not a date": (
+        "t,u\n2024-05-01 10:00,1\nyesterday,1\n",
+        {"time": {"column": "t", "unit": "datetime"}},
+        "t",
+        r"(?s)line 3.*'yesterday'.*format:",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "options", "column", "message"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_read_is_refused(
+    write: Write, text: str, options: dict[str, object], column: str, message: str
+) -> None:
+    with pytest.raises(ReaderError, match=message):
+        read_table(write("run.csv", text), files=FileOptions.model_validate(options)).find(column)
+
+
+@settings(max_examples=200)
+@given(st.binary(max_size=200))
+def test_any_bytes_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
+    path = tmp_path_factory.mktemp("any") / "run.csv"
+    path.write_bytes(content)
+    try:
+        table = read_table(path)
+    except ReaderError as error:
+        assert error.remedy
+    else:
+        assert len({len(column.values) for column in table.columns}) == 1
+
+
+@settings(max_examples=200)
+@given(st.text(alphabet="0123456789.,;\t\n\r\"'# ekPatsV[]()-", max_size=120))
+def test_any_text_that_looks_like_csv_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, content: str
+) -> None:
+    path = tmp_path_factory.mktemp("any") / "run.csv"
+    path.write_bytes(content.encode())
+    try:
+        table = read_table(path)
+    except ReaderError as error:
+        assert error.remedy
+    else:
+        assert table.lines is not None
+        assert (np.diff(table.lines) > 0).all()
