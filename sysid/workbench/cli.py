@@ -130,12 +130,15 @@ def ingest(
 def simulate(
     bundle: Annotated[Path, typer.Argument(help="Folder of an exported model.")],
     inputs: Annotated[Path, typer.Argument(help="File with the model's input channels.")],
-    out: Annotated[Path, typer.Option(help="File to write: time, inputs and simulated output.")],
+    out: Annotated[Path, typer.Option(help="File to write, .csv or .parquet: time, inputs and simulated output.")],
+    initial: Annotated[
+        float | None, typer.Option(help="Output before the first sample; the model's value at rest by default.")
+    ] = None,
 ) -> None:
     """Run an exported model on a file of inputs, fed with nothing but its own past output."""
     from sysid.workbench.commands.simulate import simulate_command
 
-    simulate_command(bundle, inputs, out)
+    simulate_command(bundle, inputs, out, initial=initial)
 
 
 @app.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')

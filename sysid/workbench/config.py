@@ -8,7 +8,7 @@ import inspect
 import typing
 from collections.abc import Mapping as Dict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import (
     BaseModel,
@@ -26,6 +26,7 @@ from pydantic import (
 from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import Training
+from sysid.export.exporters import EXPORTERS
 from sysid.models import ARX, NARX, AbstractStructure, Mapping, Start, StartKind, structure_from_dict
 from sysid.workbench.naming import slug
 from sysid.yaml_files import FieldError, check, parse_yaml, read_yaml
@@ -165,6 +166,22 @@ MappingField = Annotated[
 ]
 
 
+def _format(value: object) -> str:
+    """The name of an exporter."""
+    if isinstance(value, str) and value in EXPORTERS:
+        return value
+    near = difflib.get_close_matches(str(value), EXPORTERS, n=1)
+    raise FieldError(
+        "unknown export format",
+        expected=f"one of {', '.join(EXPORTERS)}",
+        got=repr(value),
+        remedy=f"did you mean {near[0]}?" if near else "choose one of these formats",
+    )
+
+
+FormatField = Annotated[str, PlainValidator(_format), WithJsonSchema({"enum": list(EXPORTERS)})]
+
+
 def _fields_of(dataclass: type) -> dict[str, Any]:
     """A dataclass's fields as pydantic wants them, so that the YAML has exactly the options the code has."""
     hints = typing.get_type_hints(dataclass)
@@ -250,7 +267,7 @@ class ExportConfig(BaseModel):
     model_config = _STRICT
 
     fit: str = "best"
-    formats: tuple[Literal["onnx", "torchscript"], ...] = ("onnx", "torchscript")
+    formats: tuple[FormatField, ...] = ("onnx", "torchscript")
     tolerance: float = Field(default=1e-9, gt=0.0)
 
 

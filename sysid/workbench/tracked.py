@@ -156,7 +156,8 @@ def _picture(ready: FitReady, case: CaseResult) -> NDArray[np.uint8]:
         label=model.mapping.output,
         unit=model.output_unit,
     )
-    canvas = FigureCanvasAgg(figure)
+    # matplotlib's backends carry no annotations.
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[:, :, :3])
 
@@ -170,4 +171,4 @@ def key(name: str) -> str:
     Returns:
         For example ``"VAL 1 __ _ 0.3_"``.
     """
-    return re.sub(r"[^A-Za-z0-9_\\-. ]", "_", name)
+    return re.sub(r"[^A-Za-z0-9_. -]", "_", name)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from sysid.workbench import tracked
 from sysid.workbench.events import BundleReady, DataLoaded, Event, FitReady, ReportReady, RunStarted
+from sysid.workbench.naming import slug
 
 KEY_TAG = "sysid.key"
 """Tag that holds the digest of everything a fit and its figures depend on."""
@@ -77,7 +78,7 @@ def connect(uri: str) -> Any:
         # Processes that touch a new SQLite store at the same moment break each other's migrations (measured: 7 of 8
         # failed): the first one makes it, the others wait.
         database = Path(uri.removeprefix("sqlite:///"))
-        with FileLock(database.with_name(f".{database.name}.lock")):
+        with FileLock(database.with_name(f"{database.name}.lock")):
             client.search_experiments(max_results=1)
     return client
 
@@ -186,7 +187,7 @@ class Tracker:
         if found is None:
             location = None
             if self.artifacts is not None:
-                location = (self.artifacts / tracked.key(name)).resolve().as_uri()
+                location = (self.artifacts / slug(name)).resolve().as_uri()
             try:
                 return str(self.client.create_experiment(name, artifact_location=location))
             except MlflowException:
@@ -263,7 +264,7 @@ class Tracker:
             with mlflow.start_run(run_id=run_id):
                 mlflow.onnx.log_model(
                     network,
-                    name=tracked.key(ready.of.fit.model.structure.label).replace(".", "_"),
+                    name=slug(tracked.run_name(ready.of)),
                     signature=_signature(network),
                     input_example=self._example(network, ready.of),
                     # Without these MLflow asks for CUDA at load and for whatever it finds installed.

@@ -1,0 +1,76 @@
+"""A workspace as a user has one: CSV files of their own, other names and units than the project's, 0.05 s apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+DATASET = """\
+name: rig
+sample_time: 0.05
+channels:
+  - {name: inlet, unit: kPa, reference: gauge}
+  - {name: valve, unit: V}
+  - {name: outlet, unit: kPa, reference: gauge}
+source: {files: {}}
+cases:
+  run-1: {role: estimation, file: run-1.csv}
+  run-2: {role: selection, file: run-2.csv}
+  run-3: {role: validation, file: run-3.csv}
+"""
+
+PIPELINE = """\
+name: first
+data: rig
+mapping: inlet+valve -> outlet
+start: rest
+rest: {outlet: 100}
+seed: 3
+fits:
+  - {name: ARX, structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}}
+  - name: open loop
+    structure: {kind: NARX, input_delays: 1, output_delays: 1, neurons: 2}
+    training: {loop: open, max_iterations: 8}
+  - name: closed loop
+    structure: {kind: NARX, input_delays: 1, output_delays: 1, neurons: 2}
+    training: {loop: closed, max_iterations: 8}
+    initial: open loop
+export: null
+"""
+
+
+def rig_record(seed: int, n_samples: int = 400) -> tuple[np.ndarray, ...]:
+    """Time [s], inlet [kPa], valve [V], outlet [kPa]: a volume filled through a valve, saturating."""
+    rng = np.random.default_rng(seed)
+    inlet = np.repeat(rng.uniform(200.0, 600.0, n_samples // 40 + 1), 40)[:n_samples]
+    valve = np.repeat(rng.uniform(0.0, 5.0, n_samples // 25 + 1), 25)[:n_samples]
+    outlet = np.empty(n_samples)
+    pressure = 100.0
+    for n in range(n_samples):
+        outlet[n] = pressure
+        pressure += 0.05 * valve[n] * np.tanh((inlet[n] - pressure) / 200.0) * 40.0 - 0.02 * (pressure - 100.0)
+    return 0.05 * np.arange(n_samples), inlet, valve, outlet
+
+
+def write_rig(folder: Path) -> None:
+    """The data set and the pipeline of a workspace."""
+    data = folder / "datasets" / "rig"
+    data.mkdir(parents=True)
+    (data / "dataset.yaml").write_text(DATASET, encoding="utf-8")
+    for seed in (1, 2, 3):
+        rows = [",".join(f"{value:.6f}" for value in row) for row in zip(*rig_record(seed), strict=True)]
+        header = "t [s],inlet [kPa],valve [V],outlet [kPa]"
+        (data / f"run-{seed}.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    (folder / "pipelines").mkdir()
+    (folder / "pipelines" / "first.yaml").write_text(PIPELINE, encoding="utf-8")
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user's workspace, and the current folder."""
+    write_rig(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    return tmp_path
