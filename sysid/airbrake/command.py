@@ -20,6 +20,17 @@ MAX_DURATION = 86_400.0
 """Longest command in s that is taken for meant: one day."""
 
 
+def _check_increasing(times: Sequence[float] | NDArray[np.float64]) -> None:
+    if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
+        raise ConfigError(
+            "the command's times do not increase from 0",
+            where="command",
+            expected="a first row at time 0, then increasing times",
+            got=[float(t) for t in times],
+            remedy="sort the rows; say what holds from the start",
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
 class Command:
     """A command vector: zero-order hold, psi gauge at the handle.
@@ -55,14 +66,7 @@ class Command:
         finite = np.isfinite([*self.times, *self.pressures, self.duration])
         if not finite.all():
             raise ConfigError("the command has a value that is not finite", where="command", expected="finite numbers")
-        if self.times[0] != 0.0 or any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
-            raise ConfigError(
-                "the command's times do not increase from 0",
-                where="command",
-                expected="a first row at time 0, then increasing times",
-                got=list(self.times),
-                remedy="sort the rows; say what holds from the start",
-            )
+        _check_increasing(self.times)
         low = [p for p in self.pressures if p < 0.0]
         if low:
             raise ConfigError(
@@ -114,6 +118,7 @@ class Command:
                 expected="at least two rows [time, pressure in psi gauge]",
                 got=rows,
             )
+        _check_increasing(table[:, 0])
         # Division by ten is exact to the last digit where multiplication by 0.1 is not.
         seconds = table[:, 0] / (10.0 if time_unit == "ds" else 1.0)
         if duration is None:

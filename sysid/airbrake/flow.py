@@ -66,7 +66,7 @@ def flow_function(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
     g = HEAT_RATIO
     # The difference of two powers loses all digits near r = 1; expm1 and log keep them.
     power = ratio ** (2.0 / g) * -np.expm1((g - 1.0) / g * np.log(ratio))
-    return np.sqrt(2.0 * g / (GAS_CONSTANT * (g - 1.0)) * power)
+    return np.sqrt(2.0 * g / (GAS_CONSTANT * (g - 1.0)) * np.abs(power))
 
 
 def flow_coefficient(ratio: NDArray[np.float64], *, laminar_ratio: float | None = None) -> NDArray[np.float64]:

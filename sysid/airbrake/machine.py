@@ -204,9 +204,9 @@ class BrakedTrain:
     ) -> None:
         table = flow_table(laminar_ratio=variant.laminar_ratio) if table is None else table
         self.consist = consist
+        self._steps = _steps_per_sample(time_step, sample_time, consist, variant, table)
         self.state = charged_state(consist, variant, time_step)
         self.gained = 0.0
-        self._steps = _steps_per_sample(time_step, sample_time, consist, variant, table)
         self._watch = _watch(probes, consist)
         self._constants = kernel_constants(consist, variant, time_step)
         root = math.sqrt(TEMPERATURE)

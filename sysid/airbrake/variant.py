@@ -143,12 +143,16 @@ class Variant:
                 raise ConfigError(
                     "unknown quick service", where="variant", expected=f"one of {choices}", got=value
                 ) from None
-        if isinstance(getattr(LISTING, name), bool) != isinstance(value, bool):
-            raise ConfigError("the switch has the wrong type", where=f"variant, {name}", got=value)
-        if isinstance(value, bool) or value is None:
+        printed = getattr(LISTING, name)
+        if isinstance(printed, bool) and isinstance(value, bool):
             return value
-        if not isinstance(value, int | float):
-            raise ConfigError("the switch has the wrong type", where=f"variant, {name}", expected="a number", got=value)
+        if printed is None and value is None:
+            return None
+        if isinstance(printed, bool) or isinstance(value, bool) or not isinstance(value, int | float):
+            kind = (
+                "true or false" if isinstance(printed, bool) else "a number" + (" or null" if printed is None else "")
+            )
+            raise ConfigError("the switch has the wrong type", where=f"variant, {name}", expected=kind, got=value)
         return float(value)
 
 

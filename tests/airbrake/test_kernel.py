@@ -52,7 +52,9 @@ def train_pair(consist: Consist, variant: Variant, sample_time: float = STEP) ->
 
 
 def plain_pressures(plain: PlainTrain) -> np.ndarray:
-    columns = [[getattr(pair, name) for pair in plain.pairs] for name in ("auxiliary", "emergency", "cylinder", "action")]
+    columns = [
+        [getattr(pair, name) for pair in plain.pairs] for name in ("auxiliary", "emergency", "cylinder", "action")
+    ]
     return np.array([*plain.pipe, *np.ravel(columns)])
 
 

@@ -1,0 +1,88 @@
+"""The door to data sets: recipes, options, units, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from sysid.airbrake.generate import generate
+from sysid.errors import ConfigError, UnitError
+from sysid.traces import Channel
+from sysid.units import Reference
+
+PSI = {"unit": "psi", "reference": Reference.GAUGE}
+CHANNELS = tuple(Channel(name=name, **PSI) for name in ("STP", "BP", "AR", "BC"))
+RECIPE = {"command": [[0, 90], [20, 70], [300, 90]], "time_unit": "ds"}
+SMALL = {"pairs": 2}
+
+
+def made(recipe=RECIPE, options=SMALL, channels=CHANNELS, sample_time=0.1):
+    return generate(case="A", recipe=recipe, options=options, channels=channels, sample_time=sample_time)
+
+
+def test_a_trace_has_the_channels_asked_for() -> None:
+    trace = made()
+    assert (trace.name, trace.sample_time, trace.channels, len(trace)) == ("A", 0.1, CHANNELS, 300)
+    assert trace["STP"][[0, 19, 20, -1]].tolist() == [90.0, 90.0, 70.0, 70.0]
+    assert trace["BP"][0] == pytest.approx(90.0)
+    assert trace["BC"][-1] == pytest.approx(49.0, abs=2.0)
+    assert "variant physical" in trace.provenance[0]
+
+
+def test_other_units_are_the_same_pressures() -> None:
+    channels = (
+        Channel(name="BP", unit="bar", reference=Reference.ABSOLUTE),
+        Channel(name="BC", unit="kPa", reference=Reference.GAUGE),
+        Channel(name="STP", unit="kPa", reference=Reference.GAUGE),
+    )
+    other, psi = made(channels=channels), made()
+    np.testing.assert_allclose(other["BP"], psi["BP"] * 0.06894757 + 1.01325, rtol=1e-6)
+    np.testing.assert_allclose(other["BC"], psi["BC"] * 6.894757, rtol=1e-6)
+    assert other["STP"][0] == pytest.approx(620.528, abs=1e-2)
+
+
+def test_quantities_name_channels_and_nodes() -> None:
+    options = SMALL | {"quantities": {"HEAD": {"pipe": 2}, "TAIL": {"cylinder": 5}, "K": "command", "Q": "auxiliary"}}
+    trace = made(options=options, channels=tuple(Channel(name=name, **PSI) for name in ("TAIL", "HEAD", "K", "Q")))
+    straight = made(options=SMALL | {"node": 5})
+    np.testing.assert_array_equal(trace["TAIL"], straight["BC"])
+    np.testing.assert_array_equal(trace["K"], straight["STP"])
+    assert trace["HEAD"][25] < straight["BP"][25]
+    np.testing.assert_array_equal(trace["Q"], made()["AR"])
+
+
+def test_switches_reach_the_physics() -> None:
+    listing = made(options=SMALL | {"variant": "listing"})
+    mended = made(options=SMALL | {"variant": "listing", "switches": {"piston": True}})
+    assert listing["BC"][-1] > mended["BC"][-1] + 3.0
+    assert "piston=True" in mended.provenance[0]
+
+
+def test_a_random_recipe_repeats_from_its_seed() -> None:
+    recipe = {"random": {"seed": 3, "duration": 60.0, "emergency": 0.5}}
+    assert made(recipe=recipe).digest == made(recipe=recipe).digest
+    assert made(recipe=recipe).digest != made(recipe={"random": {"seed": 4, "duration": 60.0}}).digest
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "said"),
+    [
+        ({"recipe": {}}, ConfigError, "either command or random"),
+        ({"recipe": {"command": [[0, 90], [1, 80]], "seed": 3}}, ConfigError, "recipe of case A, seed"),
+        ({"recipe": {"random": {"duration": 5.0}}}, ConfigError, r"random\.seed"),
+        ({"recipe": {"command": [[0, 120], [9, 90]]}}, ConfigError, "exceeds the running pressure"),
+        ({"recipe": {"random": {"seed": 1, "duration": 9.0, "steps": 0}}}, ConfigError, "steps is out of range"),
+        ({"options": {"pairs": 0}}, ConfigError, "options of the generator, pairs"),
+        ({"options": {"variant": "real"}}, ConfigError, "unknown variant"),
+        ({"options": {"switches": {"pistons": True}}}, ConfigError, "unknown switch pistons"),
+        ({"options": {"node": 4}}, ConfigError, "no auxiliary pressure at node 4"),
+        ({"options": {"quantities": {"BP": "steam"}}}, ConfigError, "unknown quantity"),
+        ({"options": {"quantities": {"BP": {"pipe": 2, "cylinder": 3}}}}, ConfigError, "unknown quantity"),
+        ({"options": {"quantities": {"BP": {}}}}, ConfigError, "unknown quantity"),
+        ({"channels": (Channel(name="T", unit="K"),)}, ConfigError, "does not know what channel T is"),
+        ({"channels": (Channel(name="BC", unit="K", reference=Reference.GAUGE),)}, UnitError, "cannot convert"),
+        ({"channels": (Channel(name="BC", unit="psi"),)}, UnitError, "a reference is known on one side"),
+    ],
+    ids=lambda value: str(value)[:48] if isinstance(value, dict) else "",
+)
+def test_what_cannot_be_made_is_refused(change: dict, error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said):
+        made(**change)
