@@ -55,7 +55,9 @@ class Nodes:
         self.nodes.append(helper.make_node(operator, list(inputs), [output], name=f"make_{output}", **attributes))
         return output
 
-    def add_scan(self, states: Sequence[str], scanned: Sequence[str], ends: Sequence[str], output: str, body: Any) -> str:
+    def add_scan(
+        self, states: Sequence[str], scanned: Sequence[str], ends: Sequence[str], output: str, body: Any
+    ) -> str:
         """Add a loop over the first axis of ``scanned``; gives back the name of its one output by sample."""
         outputs = [*ends, output]
         inputs = [*states, *scanned]

@@ -45,11 +45,16 @@ def sequence_graph(model: AbstractModel, dtype: DTypeLike) -> Any:
     output = nodes.add_scan([past], [regressors], ["output_line_end"], "y_scaled", body)
     unscaled_output(nodes, output, recursion)
     _state_out(nodes, layout, history, longest)
-    sequence, state = ["time", "batch"], ["batch", layout.size]
     return nodes.graph(
         "sequence",
-        [nodes.value("u", [*sequence, n_inputs], input_text(model)), nodes.value("state", state, STATE_TEXT)],
-        [nodes.value("y", [*sequence, 1], output_text(model)), nodes.value("state_out", state, STATE_TEXT)],
+        [
+            nodes.value("u", ["time", "batch", n_inputs], input_text(model)),
+            nodes.value("state", ["batch", layout.size], STATE_TEXT),
+        ],
+        [
+            nodes.value("y", ["time", "batch", 1], output_text(model)),
+            nodes.value("state_out", ["batch", layout.size], STATE_TEXT),
+        ],
     )
 
 
@@ -116,7 +121,9 @@ def _scan_body(recursion: Recursion, columns: list[tuple[int, int, int]], length
         x = nodes.add("Concat", [x, lagged], "regressors", axis=1)
     W, w = (_by_column(table, columns, lags) for table in (recursion.hidden_weights, recursion.linear[np.newaxis]))
     if recursion.neurons:
-        hidden = nodes.add("Gemm", [x, nodes.numbers("W", W.T), nodes.numbers("b", recursion.hidden_bias)], "hidden_sum")
+        hidden = nodes.add(
+            "Gemm", [x, nodes.numbers("W", W.T), nodes.numbers("b", recursion.hidden_bias)], "hidden_sum"
+        )
         hidden = nodes.add("Tanh", [hidden], "hidden")
         # Side by side, neurons and regressors reach the output in one product.
         x = nodes.add("Concat", [hidden, x], "neurons_and_regressors", axis=1)
@@ -136,9 +143,7 @@ def _scan_body(recursion: Recursion, columns: list[tuple[int, int, int]], length
     )
 
 
-def _by_column(
-    table: NDArray[np.float64], columns: list[tuple[int, int, int]], lags: Lags
-) -> NDArray[np.float64]:
+def _by_column(table: NDArray[np.float64], columns: list[tuple[int, int, int]], lags: Lags) -> NDArray[np.float64]:
     """Weights ``(n, n_regressors)`` in the order of the columns; zeros for inputs that the model does not read."""
     places = [place for _, _, place in columns]
     inputs = table[:, places] if columns else np.zeros((len(table), lags.n_inputs))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -43,7 +44,7 @@ class TorchScriptExporter(AbstractExporter):
             buffer = io.BytesIO()
             with _deprecation_known():
                 torch.jit.save(torch.jit.script(module.eval()), buffer)
-            (folder / name).write_bytes(buffer.getvalue())
+            (folder / name).write_bytes(_reproducible(buffer.getvalue()))
             details = {"torch": torch.__version__.partition("+")[0]}
             files.append(ExportedFile(name=name, format=self.name, kind=kind, details=details))
         return tuple(files)
@@ -53,7 +54,7 @@ class TorchScriptExporter(AbstractExporter):
         import torch
 
         with _deprecation_known():
-            module = torch.jit.load(path, map_location="cpu")
+            module = torch.jit.load(path, map_location="cpu")  # type: ignore[no-untyped-call]  # torch.jit has no types
 
         def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
             with torch.inference_mode():
@@ -63,3 +64,20 @@ class TorchScriptExporter(AbstractExporter):
             return Run(output=output.numpy(), state=state_out.numpy())
 
         return run
+
+
+def _reproducible(archive: bytes) -> bytes:
+    """The same archive without what belongs to the machine that wrote it.
+
+    Beside the code torch stores its source lines with the path of this checkout (``.debug_pkl``), and a hash over
+    them (``serialization_id``); neither is read when the file is loaded.
+    """
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(archive)) as source, zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as target:
+        for entry in source.infolist():
+            if entry.filename.endswith((".debug_pkl", "/serialization_id")):
+                continue
+            plain = zipfile.ZipInfo(entry.filename)
+            plain.create_system = 0  # otherwise it tells the operating system
+            target.writestr(plain, source.read(entry))
+    return buffer.getvalue()

@@ -1,0 +1,161 @@
+"""Writing a bundle: a folder that holds a surrogate and everything its receiver needs to run and to judge it."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as Dict
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sysid.errors import ConfigError
+from sysid.estimation.result import FitResult
+from sysid.export.card import model_card
+from sysid.export.exporters import exporter
+from sysid.export.manifest import CARD, MANIFEST, Metrics, describe, file_entry, seal, sha256
+from sysid.export.parity import check_parity, parity_cases
+from sysid.models import AbstractModel, Start
+from sysid.traces import TraceSet
+
+
+@dataclass(frozen=True, kw_only=True)
+class BundleFile:
+    """An exported file in a bundle.
+
+    Args:
+        name: File name.
+        format: Name of the exporter, such as ``"onnx"``.
+        kind: ``"step"`` or ``"sequence"``.
+        dtype: Of the numbers.
+        sha256: Of the bytes.
+        largest_difference: From the model, over all cases, in the output's unit.
+        case: Where it occurred.
+        tolerance: What was allowed.
+    """
+
+    name: str
+    format: str
+    kind: str
+    dtype: str
+    sha256: str
+    largest_difference: float
+    case: str
+    tolerance: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bundle:
+    """A bundle on disk.
+
+    Args:
+        folder: Where it lies.
+        model: The model, built from ``model.json``.
+        metadata: Everything that ``model.json`` says.
+        files: The exported files.
+    """
+
+    folder: Path
+    model: AbstractModel
+    metadata: dict[str, Any]
+    files: tuple[BundleFile, ...]
+
+
+def export_bundle(
+    fit: FitResult,
+    traces: TraceSet,
+    folder: Path,
+    *,
+    start: Start,
+    formats: Sequence[str] = ("onnx", "torchscript"),
+    tolerance: float = 1e-9,
+    metrics: Metrics | None = None,
+    provenance: Dict[str, Any] | None = None,
+) -> Bundle:
+    """Write a fitted model as a bundle, after each file has reproduced the model on every case.
+
+    The folder appears, or is replaced, only when the new bundle is complete. The same fit, traces and metrics
+    give the same bytes.
+
+    Args:
+        fit: The fitted model.
+        traces: The cases that each file is run on; the estimation traces also declare the range of the inputs.
+        folder: Where the bundle goes. What lies there is replaced if it is a bundle, or empty.
+        start: How the free run over each case begins.
+        formats: Names of exporters.
+        tolerance: Largest difference from the model allowed, in the output's unit.
+        metrics: The model's figures on the cases, as :func:`sysid.validation.evaluate` gives them.
+        provenance: JSON values about where the fit comes from, kept as they are.
+
+    Returns:
+        The bundle.
+
+    Raises:
+        ConfigError: If a format is unknown, or the folder holds something that is not a bundle.
+        ChannelError: If a trace lacks a channel of the mapping.
+        ParityError: If a file differs from the model by more than the tolerance; nothing is published then.
+    """
+    writers = [exporter(name) for name in dict.fromkeys(formats)]
+    model, cases = fit.model, parity_cases(fit.model, traces, start)
+    with _published(Path(folder)) as draft:
+        written = [file for writer in writers for file in writer.write(model, draft)]
+        checked = [(file, check_parity(file, draft, model, cases, tolerance)) for file in written]
+        manifest = describe(fit, traces, start, metrics, provenance or {})
+        manifest["files"] = [file_entry(file, parity, draft) for file, parity in checked]
+        (draft / CARD).write_text(model_card(manifest), encoding="utf-8", newline="\n")
+        manifest["card"] = {"name": CARD, "sha256": sha256(draft / CARD)}
+        (draft / MANIFEST).write_text(seal(manifest), encoding="utf-8", newline="\n")
+    return Bundle(folder=Path(folder), model=model, metadata=manifest, files=bundle_files(manifest))
+
+
+def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
+    """The exported files that a manifest lists.
+
+    Args:
+        manifest: Content of ``model.json``.
+
+    Returns:
+        One entry per file.
+    """
+    return tuple(
+        BundleFile(
+            name=entry["name"],
+            format=entry["format"],
+            kind=entry["kind"],
+            dtype=entry["dtype"],
+            sha256=entry["sha256"],
+            largest_difference=entry["parity"]["largest_difference"],
+            case=entry["parity"]["case"],
+            tolerance=entry["parity"]["tolerance"],
+        )
+        for entry in manifest["files"]
+    )
+
+
+@contextmanager
+def _published(folder: Path) -> Iterator[Path]:
+    """A draft folder beside ``folder`` that takes its place when the block ends without an error."""
+    if folder.exists() and not (folder.is_dir() and (not any(folder.iterdir()) or (folder / MANIFEST).is_file())):
+        raise ConfigError(
+            "the bundle's folder is already used for something else",
+            where=str(folder),
+            expected="a new or empty folder, or one with an earlier bundle",
+            got="a file" if folder.is_file() else f"a folder without {MANIFEST}",
+            remedy="choose another folder, or remove what lies there",
+        )
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as workplace:
+        draft, old = Path(workplace) / "new", Path(workplace) / "old"
+        draft.mkdir()
+        yield draft
+        if folder.exists():
+            folder.rename(old)
+        try:
+            draft.rename(folder)
+        except OSError:
+            if old.exists():
+                old.rename(folder)
+            raise
+        shutil.rmtree(old, ignore_errors=True)

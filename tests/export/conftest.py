@@ -1,0 +1,224 @@
+"""The table of models that every exporter is held to, and traces to run them on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.estimation.result import FitResult, Loop, Status
+from sysid.export import EXPORTERS, AbstractExporter, Kind, Run, StateLayout, run_sequence
+from sysid.models import (
+    ARX,
+    NARX,
+    AbstractModel,
+    ARXModel,
+    History,
+    Mapping,
+    NARXModel,
+    Scaling,
+    Start,
+    parameter_count,
+)
+from sysid.traces import Channel, Role, Trace, TraceSet
+from sysid.units import Reference
+
+MAPPINGS = {1: "BP -> BC", 2: "BP+AR -> BC"}
+
+
+def build_arx(*, na: int, nb: tuple[int, ...], nk: tuple[int, ...], seed: int = 1) -> ARXModel:
+    """A stable ARX model: the moduli of its ``a`` add up to 0.9."""
+    rng = np.random.default_rng(seed)
+    b, a = rng.normal(size=sum(nb)), rng.uniform(0.1, 1.0, na) * rng.choice([-1.0, 1.0], na)
+    a *= 0.9 / max(np.abs(a).sum(), 1e-3)
+    return ARXModel(
+        orders=ARX(na=na, nb=nb, nk=nk),
+        coefficients=np.concatenate([b, a]),
+        intercept=1.5,
+        mapping=Mapping.parse(MAPPINGS[len(nb)]),
+        sample_time=0.1,
+        input_units=("psi",) * len(nb),
+        output_unit="psi",
+        rest_output=2.0,
+    )
+
+
+def build_narx(
+    structure: NARX, *, n_inputs: int = 2, clamp: float = 3.0, gain: float = 0.4, seed: int = 2
+) -> NARXModel:
+    """A NARX network with random weights, shrunk until its free run forgets where it started."""
+    rng = np.random.default_rng(seed)
+    lags = structure.lags(n_inputs)
+    theta = rng.normal(size=parameter_count(lags, structure.neurons, linear=structure.feedthrough))
+    theta *= gain / np.sqrt(len(theta))
+    theta[structure.neurons * lags.n_regressors :] *= 2.0
+    return NARXModel(
+        network=structure,
+        theta=theta,
+        scaling=Scaling(
+            input_offset=(45.0, 70.0)[:n_inputs],
+            input_scale=(45.0, 20.0)[:n_inputs],
+            output_offset=38.0,
+            output_scale=40.0,
+        ),
+        mapping=Mapping.parse(MAPPINGS[n_inputs]),
+        sample_time=0.1,
+        input_units=("psi",) * n_inputs,
+        output_unit="psi",
+        rest_output=0.0,
+        clamp=clamp,
+    )
+
+
+MODELS: dict[str, Callable[[], AbstractModel]] = {
+    "ARX": lambda: build_arx(na=2, nb=(2,), nk=(1,)),
+    "ARX, two inputs, dead times": lambda: build_arx(na=3, nb=(2, 3), nk=(0, 5)),
+    "ARX, finite impulse response": lambda: build_arx(na=0, nb=(4,), nk=(1,)),
+    "ARX, direct input only": lambda: build_arx(na=0, nb=(1,), nk=(0,)),
+    "ARX, one input unused": lambda: build_arx(na=1, nb=(0, 2), nk=(0, 1)),
+    "ARX, no input used": lambda: build_arx(na=2, nb=(0,), nk=(0,)),
+    "NARX 4/4/20": lambda: build_narx(NARX(input_delays=4, output_delays=4, neurons=20)),
+    "NARX, one input": lambda: build_narx(NARX(input_delays=2, output_delays=3, neurons=5), n_inputs=1),
+    "NARX without feed-through": lambda: build_narx(
+        NARX(input_delays=2, output_delays=2, neurons=6, feedthrough=False)
+    ),
+    "NARX, linear part alone": lambda: build_narx(NARX(input_delays=2, output_delays=2, neurons=0)),
+    "NARX, direct input": lambda: build_narx(NARX(input_delays="0:3", output_delays=2, neurons=5)),
+    "NARX, direct input only": lambda: build_narx(NARX(input_delays="0:0", output_delays=1, neurons=5)),
+    "NARX, sparse lags": lambda: build_narx(NARX(input_delays=[1, 2, 4, 8], output_delays=[2, 5], neurons=5)),
+    "NARX, delays per input": lambda: build_narx(NARX(input_delays=[[0], [1, 2, 4]], output_delays="1:2", neurons=5)),
+    "NARX against its bounds": lambda: build_narx(
+        NARX(input_delays=2, output_delays=2, neurons=8), clamp=0.1, gain=3.0, seed=5
+    ),
+    "NARX without bounds": lambda: build_narx(NARX(input_delays=2, output_delays=2, neurons=5), clamp=float("inf")),
+}
+
+
+@pytest.fixture(params=MODELS, scope="session")
+def model(request: pytest.FixtureRequest) -> AbstractModel:
+    return MODELS[request.param]()
+
+
+@pytest.fixture(scope="session")
+def models() -> dict[str, Callable[[], AbstractModel]]:
+    return MODELS
+
+
+@pytest.fixture(scope="session")
+def narx() -> Callable[..., NARXModel]:
+    return build_narx
+
+
+FORMATS = ("onnx", "torchscript")
+
+
+@pytest.fixture(scope="session")
+def formats() -> tuple[str, ...]:
+    return FORMATS
+
+
+@pytest.fixture(params=FORMATS, scope="session")
+def format_name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(params=list(Kind), ids=lambda kind: kind.value, scope="session")
+def kind(request: pytest.FixtureRequest) -> Kind:
+    return Kind(request.param)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exported:
+    """A model and a file of it, ready to run."""
+
+    model: AbstractModel
+    path: Path
+    run: Callable[[np.ndarray, np.ndarray], Run]
+
+    @property
+    def layout(self) -> StateLayout:
+        return StateLayout.of(self.model)
+
+
+def open_file(exporter: AbstractExporter, model: AbstractModel, kind: Kind, folder: Path) -> Exported:
+    """Write a model and load the file of one kind."""
+    (file,) = [file for file in exporter.write(model, folder) if file.kind is kind]
+    runner = exporter.load(folder / file.name)
+    return Exported(
+        model=model, path=folder / file.name, run=lambda inputs, state: run_sequence(runner, kind, inputs, state)
+    )
+
+
+@pytest.fixture(scope="session")
+def opened() -> Callable[..., Exported]:
+    return open_file
+
+
+@pytest.fixture(scope="session")
+def exported(model: AbstractModel, format_name: str, kind: Kind, tmp_path_factory: pytest.TempPathFactory) -> Exported:
+    return open_file(EXPORTERS[format_name], model, kind, tmp_path_factory.mktemp("exported"))
+
+
+def random_inputs(n_samples: int, n_inputs: int, *, seed: int = 3) -> np.ndarray:
+    """Steps and noise, between 0 and 95 psi."""
+    rng = np.random.default_rng(seed)
+    steps = np.repeat(rng.uniform(0.0, 90.0, (n_samples // 20 + 1, n_inputs)), 20, axis=0)[:n_samples]
+    return steps + rng.uniform(0.0, 5.0, steps.shape)
+
+
+@pytest.fixture(scope="session")
+def inputs() -> Callable[..., np.ndarray]:
+    return random_inputs
+
+
+def random_history(model: AbstractModel, *, seed: int = 4) -> History:
+    """A past that is not at rest, longer than any lag."""
+    rng = np.random.default_rng(seed)
+    n_past = model.recursion.lags.depth + 3
+    return History(
+        inputs=rng.uniform(0.0, 90.0, (n_past, len(model.mapping.inputs))), output=rng.uniform(0.0, 60.0, n_past)
+    )
+
+
+@pytest.fixture(scope="session")
+def past() -> Callable[..., History]:
+    return random_history
+
+
+@pytest.fixture(scope="session")
+def fit() -> FitResult:
+    return FitResult(
+        model=build_narx(NARX(input_delays=4, output_delays=4, neurons=20)),
+        status=Status.CONVERGED,
+        loop=Loop.CLOSED,
+        history={"iteration": np.arange(2.0), "mse": np.array([2.0, 1.0])},
+        train_time_s=1.25,
+        seed=7,
+        notes=("Started from the open-loop fit.",),
+    )
+
+
+@pytest.fixture(scope="session")
+def traces(fit: FitResult) -> TraceSet:
+    """Three short records: what the model itself computes, with noise."""
+    channels = (
+        Channel(name="BP", unit="psi", reference=Reference.GAUGE, description="brake pipe"),
+        Channel(name="AR", unit="psi", reference=Reference.GAUGE),
+        Channel(name="BC", unit="psi", reference=Reference.GAUGE),
+    )
+    records = []
+    for i, name in enumerate(["EST01", "VAL01", "VAL02"]):
+        columns = random_inputs(300 + 50 * i, 2, seed=20 + i)
+        output = fit.model.simulate(columns) + np.random.default_rng(i).normal(size=len(columns))
+        records.append(Trace(name=name, sample_time=0.1, channels=channels, values=np.column_stack([columns, output])))
+    return TraceSet(
+        name="synthetic", traces=tuple(records), roles={"EST01": Role.ESTIMATION}, source="Made for a test."
+    )
+
+
+@pytest.fixture(scope="session")
+def start() -> Start:
+    return Start()
