@@ -136,7 +136,7 @@ def _average(
 ) -> Gridded:
     half = 0.5 * float(np.median(np.diff(stamps)))
     count = max(int(np.floor((stamps[-1] + 2.0 * half - start) / sample_time + _FUZZ)), 0)
-    interval = np.floor((stamps + half - start) / sample_time).astype(np.intp)
+    interval = np.floor((stamps + half - start) / sample_time + _FUZZ).astype(np.intp)
     inside = (interval >= 0) & (interval < count)
     interval = interval[inside]
     counts = np.bincount(interval, minlength=count)

@@ -11,12 +11,11 @@ import numpy as np
 
 from sysid.errors import ReaderError, UnitError, UserError
 from sysid.ingest.assemble import stamps_in_seconds
-from sysid.ingest.grid import grid_places
 from sysid.ingest.headers import is_unit, split_reference
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.reading import read_table
 from sysid.ingest.table import RawColumn, RawTable
-from sysid.ingest.timing import Timing, round_step, survey
+from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
@@ -237,16 +236,13 @@ def _needs(known: np.ndarray, timing: Timing) -> tuple[float, dict[str, str | No
     if not clean.step > 0.0:
         return 1.0, {"duplicates": "drop" if len(clean.duplicates) else None}
     rising = np.delete(np.sort(known), clean.duplicates)
-    tolerance = GridOptions().tolerance
-    even_step = round_step(clean.step, samples=clean.samples + clean.missing, even=True)
-    places = grid_places(rising, even_step, start=float(rising[0]), tolerance=tolerance)
-    even = places is not None and int(np.sum(np.diff(places) > 1)) == len(clean.gaps)
-    step = even_step if even else round_step(clean.step, samples=clean.samples, even=False)
+    even = even_step(rising, survey(rising), tolerance=GridOptions().tolerance)
+    step = round_step(clean.step) if even is None else even
     return step, {
         "backward": "sort" if len(timing.backward) else None,
         "duplicates": "drop" if len(clean.duplicates) else None,
         "gaps": "mask" if len(clean.gaps) else None,
-        "jitter": None if even else "resample",
+        "jitter": "resample" if even is None else None,
     }
 
 

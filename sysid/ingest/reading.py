@@ -14,7 +14,7 @@ from sysid.ingest.assemble import Wanted, assemble, stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions
 from sysid.ingest.readers import READERS, choose_reader, read_with
 from sysid.ingest.table import RawTable
-from sysid.ingest.timing import round_step, survey
+from sysid.ingest.timing import even_step, round_step, survey
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
 
@@ -146,5 +146,5 @@ def _step(table: RawTable, files: FileOptions, grid: GridOptions) -> float:
     timing = survey(stamps) if len(stamps) else None
     if timing is None or not timing.step > 0.0:
         return 1.0  # no steps at all: the checks on the record say what is wrong with it
-    even = timing.jitter <= grid.tolerance * timing.step
-    return round_step(timing.step, samples=timing.samples + timing.missing, even=even)
+    even = even_step(stamps, timing, tolerance=grid.tolerance) if timing.in_order else None
+    return round_step(timing.step) if even is None else even

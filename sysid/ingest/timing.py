@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.ingest.grid import grid_places
+
 _GAP_FACTOR = 1.5  # a step this many times the usual one means that a sample is missing
 
 
@@ -22,7 +24,7 @@ class Timing:
             the samples that they lack. NaN if there are fewer than two different stamps.
         median_step: Median of the rising steps.
         jitter: Largest distance of a stamp from that line, in seconds.
-        gaps: Indices ``i`` for which samples are missing between ``i`` and ``i + 1``.
+        gaps: Indices of the samples after which some are missing.
         missing: How many samples are missing in all.
         duplicates: Indices of samples with the stamp of the one before.
         backward: Indices of samples whose stamp is before an earlier one's.
@@ -64,9 +66,9 @@ def survey(stamps: NDArray[np.float64], *, longest_step: float | None = None) ->
     highest = np.maximum.accumulate(stamps)
     backward = np.flatnonzero(stamps[1:] < highest[:-1]) + 1
     duplicates = np.flatnonzero(steps == 0.0) + 1
-    rising = np.delete(stamps, np.concatenate([backward, duplicates]))
+    kept = np.flatnonzero(np.concatenate([[True], stamps[1:] > highest[:-1]]))
+    rising = stamps[kept]
     steps = np.diff(rising)
-    kept = np.delete(np.arange(len(stamps)), np.concatenate([backward, duplicates]))
     if len(steps) == 0:
         median, slope, jitter, slots, is_gap = np.nan, np.nan, 0.0, np.zeros(1), np.zeros(0, dtype=bool)
     else:
@@ -97,25 +99,46 @@ def _line(slots: NDArray[np.float64], stamps: NDArray[np.float64]) -> tuple[floa
     return slope, float(np.abs(y - slope * x).max())
 
 
-def round_step(step: float, *, samples: int, even: bool) -> float:
+def round_step(step: float) -> float:
     """A measured step as a person would write it.
 
     Args:
         step: Seconds between samples, as fitted.
-        samples: How many samples it was fitted over.
-        even: Whether the stamps are even. If so, the result keeps the last stamp within a thousandth
-            of a step of its place; if not (they will be resampled) it is within 0.5 % of the step.
 
     Returns:
-        The number of fewest digits that does so.
+        The number of fewest digits that is within 0.5 % of it.
 
     Example:
-        >>> round_step(0.10029, samples=1500, even=False), round_step(1 / 120, samples=100, even=True)
-        (0.1, 0.0083333)
+        >>> round_step(0.10029), round_step(1 / 120)
+        (0.1, 0.0083)
     """
-    tolerance = 1e-3 / samples if even else 5e-3
-    for digits in range(1, 15):
-        rounded = float(f"{step:.{digits}g}")
-        if abs(rounded - step) <= tolerance * step:
-            return rounded
-    return step
+    return next(value for value in _by_digits(step) if abs(value - step) <= 5e-3 * abs(step))
+
+
+def even_step(stamps: NDArray[np.float64], timing: Timing, *, tolerance: float) -> float | None:
+    """The sample time of a grid that all stamps lie on, gaps apart.
+
+    Args:
+        stamps: Shape ``(n,)``, rising, seconds.
+        timing: Their survey.
+        tolerance: How far off a stamp may lie, as a fraction of the sample time.
+
+    Returns:
+        The number of fewest digits that is one, or ``None`` if there is none.
+
+    Example:
+        >>> stamps = np.array([0.0, 1 / 120, 2 / 120, 5 / 120])
+        >>> even_step(stamps, survey(stamps), tolerance=0.01)
+        0.00833
+    """
+    if not timing.step > 0.0:
+        return None
+    for value in _by_digits(timing.step):
+        places = grid_places(stamps, value, start=float(stamps[0]), tolerance=tolerance) if value > 0.0 else None
+        if places is not None and int(np.sum(np.diff(places) > 1)) == len(timing.gaps):
+            return value
+    return None
+
+
+def _by_digits(step: float) -> list[float]:
+    return [float(f"{step:.{digits}g}") for digits in range(1, 17)]

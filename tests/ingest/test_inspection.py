@@ -1,0 +1,166 @@
+"""Unknown files: what is found, and a description that loads them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sysid.errors import ReaderError, UserError
+from sysid.ingest import inspect_file, load_dataset, propose_dataset
+from sysid.traces import TraceSet
+from sysid.units import Reference
+
+Write = Callable[[str, str | bytes], Path]
+
+
+def proposed(path: Path) -> TraceSet:
+    """The data set that is proposed for a file, loaded from beside it."""
+    (path.parent / "dataset.yaml").write_text(propose_dataset(inspect_file(path)))
+    return load_dataset(path.parent)
+
+
+def rows(count: int, line: Callable[[int], str]) -> str:
+    return "".join(line(i) + "\n" for i in range(count))
+
+
+def test_a_clean_file_is_described_without_guesses(write: Write) -> None:
+    path = write("run.csv", "t [s],BP [bar gauge],u [V]\n" + rows(20, lambda i: f"{0.05 * i!r},{5 + i},{i}"))
+    found = inspect_file(path)
+    assert (found.sample_time, found.samples, found.problems) == (0.05, 20, ())
+    assert [(c.name, c.unit, c.reference) for c in found.channels] == [
+        ("BP", "bar", Reference.GAUGE),
+        ("u", "V", Reference.NONE),
+    ]
+    assert (found.channels[0].minimum, found.channels[0].maximum) == (5.0, 24.0)
+    text = propose_dataset(found)
+    assert "guessed:" not in text
+    assert "repairs" not in text
+    assert proposed(path)["run"]["BP"].tolist() == [5.0 + i for i in range(20)]
+
+
+def test_units_references_and_time_are_guessed_and_marked(write: Write) -> None:
+    path = write("run.csv", "clock,P_kPa,Q_kPa,valve\n" + rows(20, lambda i: f"{100 * i},{101 + i},{i},{i % 3}"))
+    found = inspect_file(path)
+    assert (found.time.column, found.time.unit, found.time_guessed) == ("clock", "ms", True)
+    assert found.sample_time == 0.1
+    assert [(c.unit, c.unit_guessed, c.reference, c.reference_guessed) for c in found.channels] == [
+        ("kPa", True, Reference.ABSOLUTE, True),
+        ("kPa", True, Reference.GAUGE, True),
+        ("1", True, Reference.NONE, False),
+    ]
+    assert "guessed: unit and reference; 101 to 120" in propose_dataset(found)
+    assert proposed(path)["run"]["valve"].tolist() == [float(i % 3) for i in range(20)]
+
+
+def test_every_problem_is_told_and_its_repair_proposed(write: Write) -> None:
+    stamps = [0, 1, 2, 3, 3, 4, 6, 5, 7, 8, 12, 13, 14.3, 15, 16, 17, 18, 19, 20]
+    cells = [f"{t};{i};7;{'' if i == 2 else i}" for i, t in enumerate(stamps)]
+    cells.insert(9, ";1;7;1")
+    cells.insert(12, "9;9")
+    found = inspect_file(path := write("run.csv", "t [s];u [V];still [A];holes [V]\n" + "\n".join(cells)))
+    assert found.problems == (
+        "1 ragged rows dropped, first at line 14",
+        "1 samples without a time stamp",
+        "1 backward time stamps",
+        "1 duplicate time stamps",
+        "4 samples missing in 2 gaps",
+        "uneven time stamps, up to 0.277 s off",
+        "still: never changes",
+        "holes: 1 missing values",
+    )
+    assert found.needed.model_dump() == {
+        "ragged": "drop", "stamps": "drop", "backward": "sort", "duplicates": "drop",
+        "gaps": "mask", "nan": "mask", "jitter": "resample", "constant": "accept",
+    }  # fmt: skip
+    trace = proposed(path)["run"]
+    assert (trace.sample_time, len(trace)) == (1.0, 21)
+    assert np.flatnonzero(~trace.usable_samples).tolist() == [2, 9, 10, 11]
+
+
+def test_stamps_whose_marks_all_look_alike_are_understood(write: Write) -> None:
+    stamps = [100 * i + i % 2 for i in range(30)]
+    path = write("run.csv", "\r\n".join(f"{t:,}.000;{3 + t / 1e4:.3f}".replace(",", ".") for t in stamps))
+    found = inspect_file(path)
+    assert (found.time.column, found.time.unit, found.sample_time) == ("column_1", "ms", 0.1)
+    assert (found.files.decimal, found.files.thousands) == (".", ".")
+    trace = proposed(path)["run"]
+    assert len(trace) == 30
+    np.testing.assert_allclose(trace["column_2"], 3.0 + trace.time / 10.0, atol=6e-4)
+
+
+def test_calendar_time_is_understood(write: Write) -> None:
+    path = write("run.csv", "Time,u [V]\n" + rows(20, lambda i: f"2024-05-01 10:00:{i:02d},{i}"))
+    found = inspect_file(path)
+    assert (found.time.unit, found.sample_time) == ("datetime", 1.0)
+    assert proposed(path)["run"]["u"].tolist() == [float(i) for i in range(20)]
+
+
+def test_a_file_without_time_gets_a_step_to_be_corrected(write: Write) -> None:
+    path = write("run.csv", "u [V],y [V]\n" + rows(20, lambda i: f"{i % 4},{i % 3}"))
+    found = inspect_file(path)
+    assert (found.time.step, found.time_guessed, found.problems) == (1.0, True, ("no time stamps",))
+    assert "time: {step: 1.0}  # guessed" in propose_dataset(found)
+    assert len(proposed(path)["run"]) == 20
+
+
+def test_a_column_of_remarks_is_left_out_and_told(write: Write) -> None:
+    path = write("run.csv", "t [s],state,u [V]\n" + rows(20, lambda i: f"{i},OK,{i}"))
+    assert inspect_file(path).problems == ("state: a cell is not a number",)
+    assert proposed(path).channels[0].name == "u"
+
+
+def test_a_short_file_is_still_described(write: Write) -> None:
+    path = write("run.csv", "t [s],u [V]\n0,1\n1,2\n2,4\n")
+    assert proposed(path)["run"]["u"].tolist() == [1.0, 2.0, 4.0]
+
+
+def test_a_file_of_time_alone_is_refused(write: Write) -> None:
+    with pytest.raises(ReaderError, match=r"(?s)no column that can be a channel.*time alone"):
+        propose_dataset(inspect_file(write("run.csv", "t [s]\n" + rows(12, str))))
+
+
+def test_what_cannot_be_read_at_all_is_refused(write: Write) -> None:
+    with pytest.raises(ReaderError, match="not text"):
+        inspect_file(write("run.csv", b"\x00" * 100))
+
+
+def test_any_format_is_inspected(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["rig/time"], file["rig/u"] = np.arange(20) * 0.01, np.sin(np.arange(20.0))
+    trace = proposed(tmp_path / "run.h5")["run"]
+    assert (trace.sample_time, trace.channel_names) == (0.01, ("rig/u",))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.text(min_size=1, max_size=12).filter(
+        lambda name: name == name.strip() and "\r" not in name and "\n" not in name
+    ),
+    st.text(alphabet="abcdefghij -_.!'#{}[]:,&*?|<>=%@", min_size=1, max_size=12),
+)
+def test_whatever_columns_and_files_are_called_the_proposal_loads(
+    tmp_path_factory: pytest.TempPathFactory, name: str, stem: str
+) -> None:
+    import csv
+
+    path = tmp_path_factory.mktemp("any") / f"{stem}.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["t [s]", f"{name} [V]", "other [V]"])
+        writer.writerows([[0.1 * i, i, 2 * i] for i in range(20)])
+    try:
+        traces = proposed(path)
+    except UserError as error:
+        assert error.remedy  # two columns of one name, a name that is nothing: refused, and told how to go on
+        assert name.strip() in {"t", "other"} or not name.isprintable() or "\x00" in name
+        return
+    trace = traces.traces[0]
+    assert trace.values[:, -1].tolist() == [2.0 * i for i in range(20)]
+    assert name in trace.channel_names

@@ -1,0 +1,109 @@
+"""YAML as an engineer means it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel, ConfigDict
+
+from sysid.errors import ConfigError
+from sysid.yaml_files import check, parse_yaml, read_yaml
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("no", "no"),
+        ("on", "on"),
+        ("Y", "Y"),
+        ("true", True),
+        ("1e-3", 0.001),
+        ("1.5", 1.5),
+        (".5", 0.5),
+        ("-.inf", float("-inf")),
+        ("17", 17),
+        ("-3", -3),
+        ("0x1F", 31),
+        ("0o17", 15),
+        ("010", 10),
+        ("1:30", "1:30"),
+        ("2024-05-01", "2024-05-01"),
+        ("1_000", "1_000"),
+        ("", None),
+        ("~", None),
+        ("'1'", "1"),
+    ],
+)
+def test_a_scalar_is_what_it_looks_like(text: str, value: object) -> None:
+    parsed = parse_yaml(f"key: {text}", where="x")["key"]
+    assert parsed == value
+    assert type(parsed) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: 1\na: 2", r"key 'a' stands twice"),
+        ("a: {b: 1, b: 2}", r"key 'b' stands twice"),
+        ("a: [1", r"line \d+"),
+        ("a: !!python/object/apply:os.system ['echo no']", r"could not determine a constructor"),
+        ("? [1, 2]\n: 3", r"plain text"),
+        ("- 1", r"a list"),
+        ("a: *nothing", r"undefined alias"),
+    ],
+    ids=["key twice", "key twice inside", "broken", "python object", "list as key", "a list", "unknown alias"],
+)
+def test_what_is_not_plain_data_is_refused(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        parse_yaml(text, where="x.yaml")
+
+
+@given(st.text(max_size=80))
+def test_any_text_is_parsed_or_refused(text: str) -> None:
+    try:
+        assert isinstance(parse_yaml(text, where="x"), dict)
+    except ConfigError as error:
+        assert error.remedy
+
+
+def test_an_unreadable_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_yaml(tmp_path / "none.yaml")
+
+
+class Inner(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    neurons: int = 1
+    delays: int = 2
+
+
+class Outer(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    name: str
+    steps: tuple[Inner, ...] = ()
+    models: dict[str, Inner | None] = {}
+
+
+@pytest.mark.parametrize(
+    ("data", "where", "remedy"),
+    [
+        ({"name": "a", "stepps": []}, "field stepps", "did you mean steps?"),
+        ({"name": "a", "steps": [{}, {"neuronz": 3}]}, "field steps[1].neuronz", "did you mean neurons?"),
+        ({"name": "a", "models": {"m": {"delay": 3}}}, "field models.m.delay", "did you mean delays?"),
+        ({"name": "a", "models": {"m": {"xyz": 3}}}, "field models.m.xyz", "remove it"),
+        ({"nam": "a"}, "field nam", "did you mean name? (also at fault: name)"),
+        ({}, "field name", "add name: ..."),
+    ],
+)
+def test_a_field_at_fault_is_named_with_its_path(data: dict[str, object], where: str, remedy: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        check(Outer, data, where="x.yaml")
+    assert caught.value.where == f"x.yaml, {where}"
+    assert str(caught.value.remedy).startswith(remedy)
+
+
+def test_good_data_becomes_the_model() -> None:
+    assert check(Outer, {"name": "a", "steps": [{"neurons": 4}]}, where="x").steps[0].neurons == 4
