@@ -21,8 +21,7 @@ class Pipe:
     """The brake pipe of one vehicle.
 
     Args:
-        radius: Radius in m as the listing writes it; it squares twice the radius, so this is the diameter's half
-            of a 2 1/2 in bore on paper, and the volume is kept as printed.
+        radius: Inner radius in m (rEG): a pipe of 1 1/4 in.
         length: Length per vehicle in m (Legvag).
         area: Area between two vehicles in m2 (AEG).
         vehicle_length: Distance from one vehicle to the next in m (Lvag + Lcti).
