@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -34,4 +33,4 @@ def test_the_file_has_the_usual_permissions(tmp_path: Path) -> None:
     (tmp_path / "plain").write_text("x")
     with replacing(tmp_path / "ours") as draft:
         draft.write_text("x")
-    assert os.stat(tmp_path / "ours").st_mode == os.stat(tmp_path / "plain").st_mode
+    assert (tmp_path / "ours").stat().st_mode == (tmp_path / "plain").stat().st_mode

@@ -59,7 +59,7 @@ def ramp(monkeypatch: pytest.MonkeyPatch) -> RampGenerator:
         def load(self) -> RampGenerator:
             return generator
 
-    monkeypatch.setattr(generators, "entry_points", lambda group: [Entry()])
+    monkeypatch.setattr(generators, "entry_points", lambda **_: [Entry()])
     return generator
 
 

@@ -85,12 +85,12 @@ def pickle_instead(npz: Path, sidecar: Path) -> None:
 DAMAGES: dict[str, Callable[[Path, Path], object]] = {
     "a bit of the samples": flip_a_value,
     "samples cut short": cut_short,
-    "samples missing": lambda npz, sidecar: npz.unlink(),
-    "sidecar missing": lambda npz, sidecar: sidecar.unlink(),
+    "samples missing": lambda npz, _: npz.unlink(),
+    "sidecar missing": lambda _, sidecar: sidecar.unlink(),
     "sidecar changed": change_the_sidecar,
-    "sidecar not JSON": lambda npz, sidecar: sidecar.write_text("{"),
-    "sidecar of another kind": lambda npz, sidecar: sidecar.write_text("[1, 2]"),
-    "sidecar without digest": lambda npz, sidecar: sidecar.write_text("{}"),
+    "sidecar not JSON": lambda _, sidecar: sidecar.write_text("{"),
+    "sidecar of another kind": lambda _, sidecar: sidecar.write_text("[1, 2]"),
+    "sidecar without digest": lambda _, sidecar: sidecar.write_text("{}"),
     "a pickle in place of samples": pickle_instead,
     "empty files": lambda npz, sidecar: (npz.write_bytes(b""), sidecar.write_bytes(b"")),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ def test_the_default_cache_is_used(
         ("made for a test", "made for another", []),
     ],
 )
-def test_what_changes_the_samples_makes_them_again(
+def test_what_changes_the_samples_makes_them_again(  # noqa: PLR0917 - fixtures and one row of a table
     ramp: Any, ramp_dataset: Path, tmp_path: Path, old: str, new: str, made: list[str]
 ) -> None:
     load_dataset(ramp_dataset, cache=tmp_path / "cache")
@@ -204,7 +205,7 @@ cases:
     assert len(trace) == 1439
     # steps of 262, 572 and 499 ms between stamps that are 100 ms apart otherwise
     stamps = [int(line.split(";")[0].replace(".", "")) for line in source.read_text().splitlines()]  # microseconds
-    gaps = [(a, b) for a, b in zip(stamps, stamps[1:], strict=False) if b - a > 150_000]
+    gaps = [(a, b) for a, b in pairwise(stamps) if b - a > 150_000]
     lost = [100_000 * k for k in range(1439) if any(a < 100_000 * k < b for a, b in gaps)]
     assert len(gaps) == 3
     np.testing.assert_allclose(trace.time[~trace.usable_samples], np.array(lost) / 1e6, atol=1e-9)

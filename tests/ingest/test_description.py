@@ -53,35 +53,107 @@ def test_a_description_is_read(write: Write) -> None:
 
 # problem: text to replace, its replacement, message: field, expected, got, remedy
 REFUSED = {
-    "a misspelt field": ("sample_time:", "sampletime:", r"unknown field 'sampletime'.*field sampletime.*did you mean sample_time"),
-    "a misspelt field in a channel": ("decimals: 1", "decimal: 1", r"field channels\[0\]\.decimal.*decimals.*did you mean decimals"),
-    "a misspelt option of files": ("separator:", "seperator:", r"field source\.files\.seperator.*did you mean separator"),
-    "a misspelt repair": ("nan: interpolate", "nans: drop", r"field source\.repairs\.nans.*duplicates.*did you mean nan\?"),
-    "a repair that does not exist": ("gaps: mask", "gaps: ignore", r"field source\.repairs\.gaps.*'linear', 'hold' or 'mask'.*'ignore'"),
-    "a misspelt field of a case": ("role: est", "rolle: est", r"field cases\.R1\.rolle.*role, recipe, file, start, stop.*did you mean role"),
-    "a role that does not exist": ("role: estimation", "role: training", r"field cases\.R1\.role.*estimation.*'training'"),
+    "a misspelt field": (
+        "sample_time:",
+        "sampletime:",
+        r"unknown field 'sampletime'.*field sampletime.*did you mean sample_time",
+    ),
+    "a misspelt field in a channel": (
+        "decimals: 1",
+        "decimal: 1",
+        r"field channels\[0\]\.decimal.*decimals.*did you mean decimals",
+    ),
+    "a misspelt option of files": (
+        "separator:",
+        "seperator:",
+        r"field source\.files\.seperator.*did you mean separator",
+    ),
+    "a misspelt repair": (
+        "nan: interpolate",
+        "nans: drop",
+        r"field source\.repairs\.nans.*duplicates.*did you mean nan\?",
+    ),
+    "a repair that does not exist": (
+        "gaps: mask",
+        "gaps: ignore",
+        r"field source\.repairs\.gaps.*'linear', 'hold' or 'mask'.*'ignore'",
+    ),
+    "a misspelt field of a case": (
+        "role: est",
+        "rolle: est",
+        r"field cases\.R1\.rolle.*role, recipe, file, start, stop.*did you mean role",
+    ),
+    "a role that does not exist": (
+        "role: estimation",
+        "role: training",
+        r"field cases\.R1\.role.*estimation.*'training'",
+    ),
     "a missing field": ("sample_time: 0.05", "", r"'sample_time' is missing.*add sample_time"),
     "a sample time that is not positive": ("0.05", "-0.05", r"field sample_time.*greater than 0.*-0\.05"),
     "a sample time that is text": ("0.05", "fast", r"field sample_time.*valid number.*'fast'"),
     "an unknown unit": ("unit: kPa", "unit: kPaa", r"unknown unit 'kPaa'.*field channels\[0\].*known to pint.*kPaa"),
-    "a unit with its reference": ("unit: kPa, reference: gauge", "unit: barg", r"mixes a unit and a reference.*unit: bar and reference: gauge"),
-    "a pressure without reference": (", reference: gauge, d", ", d", r"channel BP does not say.*gauge, absolute, or none.*add reference"),
-    "a reference on no pressure": ("unit: 1}", "unit: V, reference: gauge}", r"channel u has a reference.*a unit of pressure.*unit: V"),
+    "a unit with its reference": (
+        "unit: kPa, reference: gauge",
+        "unit: barg",
+        r"mixes a unit and a reference.*unit: bar and reference: gauge",
+    ),
+    "a pressure without reference": (
+        ", reference: gauge, d",
+        ", d",
+        r"channel BP does not say.*gauge, absolute, or none.*add reference",
+    ),
+    "a reference on no pressure": (
+        "unit: 1}",
+        "unit: V, reference: gauge}",
+        r"channel u has a reference.*a unit of pressure.*unit: V",
+    ),
     "two channels of one name": ("name: u", "name: BP", r"two channels are named BP.*field channels.*a different name"),
-    "no channels": (GOOD[GOOD.index("channels:") : GOOD.index("source:")], "channels: []\n", r"field channels.*at least 1 item"),
+    "no channels": (
+        GOOD[GOOD.index("channels:") : GOOD.index("source:")],
+        "channels: []\n",
+        r"field channels.*at least 1 item",
+    ),
     "no cases": (GOOD[GOOD.index("cases:") : GOOD.index("inferred:")], "cases: {}\n", r"field cases.*at least 1 item"),
-    "both kinds of source": ("  files:\n", "  generator: abdx\n  files:\n", r"source is both.*field source.*generator: <name>, or files"),
-    "neither kind of source": ("  files:\n    time: t [ms]\n    columns: {BP: \"P_pipe [bar gauge]\", u: {column: drive, unit: V}}\n    separator: \";\"\n", "", r"neither a generator nor files"),
-    "a recipe for a file": ("file: r1.csv", "recipe: {a: 1}", r"case R1 does not fit.*file, as the source is files.*write file"),
+    "both kinds of source": (
+        "  files:\n",
+        "  generator: abdx\n  files:\n",
+        r"source is both.*field source.*generator: <name>, or files",
+    ),
+    "neither kind of source": (
+        GOOD[GOOD.index("  files:") : GOOD.index("  grid:")],
+        "",
+        r"neither a generator nor files",
+    ),
+    "a recipe for a file": (
+        "file: r1.csv",
+        "recipe: {a: 1}",
+        r"case R1 does not fit.*file, as the source is files.*write file",
+    ),
     "stop before start": ("stop: 2.5", "stop: 0.5", r"stop is not after start.*field cases\.R1.*above 1 s.*0\.5 s"),
-    "one mark for two things": ("separator: \";\"", "separator: \",\"\n    decimal: \",\"", r"separator and decimal are the same.*field source\.files"),
-    "a step beside a time column": ("time: t [ms]", "time: {column: t, step: 0.1}", r"time\.step and a time column exclude"),
-    "a format beside no calendar time": ("time: t [ms]", "time: {column: t, unit: s, format: '%S'}", r"format is for calendar time.*unit: datetime"),
-    "a key that stands twice": ("sample_time: 0.05", "sample_time: 0.05\nname: again", r"'name' stands twice|key 'name'"),
+    "one mark for two things": (
+        'separator: ";"',
+        'separator: ","\n    decimal: ","',
+        r"separator and decimal are the same.*field source\.files",
+    ),
+    "a step beside a time column": (
+        "time: t [ms]",
+        "time: {column: t, step: 0.1}",
+        r"time\.step and a time column exclude",
+    ),
+    "a format beside no calendar time": (
+        "time: t [ms]",
+        "time: {column: t, unit: s, format: '%S'}",
+        r"format is for calendar time.*unit: datetime",
+    ),
+    "a key that stands twice": (
+        "sample_time: 0.05",
+        "sample_time: 0.05\nname: again",
+        r"'name' stands twice|key 'name'",
+    ),
     "broken YAML": ("channels:", "channels: [", r"not valid YAML.*line \d+, column \d+"),
     "not a mapping": (GOOD, "- a\n- b\n", r"does not hold a mapping.*a list"),
     "an empty file": (GOOD, "", r"does not hold a mapping.*an empty file"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("old", "new", "message"), REFUSED.values(), ids=REFUSED)

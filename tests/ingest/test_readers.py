@@ -198,7 +198,7 @@ def test_a_missing_extra_is_named(
     real = builtins.__import__
 
     def without(module: str, *args: object, **kwargs: object) -> object:
-        if module.split(".")[0] == package:
+        if module.split(".", maxsplit=1)[0] == package:
             raise ImportError(module)
         return real(module, *args, **kwargs)  # type: ignore[arg-type]  # passed on unchanged
 

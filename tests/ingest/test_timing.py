@@ -21,7 +21,7 @@ from sysid.ingest.timing import even_step, round_step, survey
         pytest.param([0, 1, 2, 2, 7, 8], 1.0, [2], 4, [3], [], id="a duplicate before a gap"),
     ],
 )
-def test_a_survey_finds(
+def test_a_survey_finds(  # noqa: PLR0917 - one row of a table
     stamps: list[float], step: float, gaps: list[int], missing: int, duplicates: list[int], backward: list[int]
 ) -> None:
     timing = survey(np.array(stamps, dtype=float))
