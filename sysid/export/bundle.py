@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sysid.errors import ConfigError
 from sysid.estimation.result import FitResult
 from sysid.export.card import model_card
@@ -93,11 +95,13 @@ def export_bundle(
         The bundle.
 
     Raises:
-        ConfigError: If a format is unknown, or the folder holds something that is not a bundle.
+        ConfigError: If a format is unknown, a parameter is not finite, or the folder holds something that is not a
+            bundle.
         ChannelError: If a trace lacks a channel of the mapping.
         ParityError: If a file differs from the model by more than the tolerance; nothing is published then.
     """
     writers = [exporter(name) for name in dict.fromkeys(formats)]
+    _check_finite(fit.model)
     model, cases = fit.model, parity_cases(fit.model, traces, start)
     with _published(Path(folder)) as draft:
         written = [file for writer in writers for file in writer.write(model, draft)]
@@ -132,6 +136,19 @@ def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
         )
         for entry in manifest["files"]
     )
+
+
+def _check_finite(model: AbstractModel) -> None:
+    theta = model.recursion.theta
+    lost = int(np.sum(~np.isfinite(theta)))
+    if lost:  # such a file would reproduce its model: both compute nothing but NaN
+        raise ConfigError(
+            "the model has parameters that are not finite",
+            where=model.structure.label,
+            expected="finite numbers",
+            got=f"{lost} of {len(theta)} are not",
+            remedy="export a fit whose status is usable",
+        )
 
 
 @contextmanager

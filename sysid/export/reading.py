@@ -58,7 +58,7 @@ def _read_manifest(path: Path) -> dict[str, Any]:
         ) from error
     fields: dict[str, Any] = manifest if isinstance(manifest, dict) else {}
     version = fields.get("schema_version")
-    if not isinstance(version, int) or version < 1:
+    if type(version) is not int or version < 1:
         raise BundleError(
             f"{MANIFEST} does not describe a bundle",
             where=str(path),
@@ -90,13 +90,16 @@ _AGAIN = "export or copy the bundle again"
 
 def _model(manifest: dict[str, Any], folder: Path) -> AbstractModel:
     try:
-        return model_from_dict(manifest["model"])
-    except SysidError as error:
+        model = model_from_dict(manifest["model"])
+        model.recursion  # noqa: B018 - it checks that parameters and structure belong together
+    except (SysidError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise BundleError(
-            f"the model in {MANIFEST} cannot be built: {error.what}",
+            f"the model in {MANIFEST} cannot be built",
             where=str(folder / MANIFEST),
+            got=error.what if isinstance(error, SysidError) else f"{type(error).__name__}: {error}",
             remedy=_AGAIN,
         ) from error
+    return model
 
 
 def _check_file(folder: Path, name: str, expected: str, listed: Iterable[str]) -> None:

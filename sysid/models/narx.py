@@ -142,7 +142,7 @@ class NARXModel(AbstractModel):
         input_units: Unit of each input.
         output_unit: Unit of the output.
         rest_output: Output at rest, in its unit.
-        clamp: Bound of the output in scaled numbers.
+        clamp: Bound of the output in scaled numbers; infinite for none.
     """
 
     network: NARX
@@ -192,7 +192,7 @@ class NARXModel(AbstractModel):
             "input_units": list(self.input_units),
             "output_unit": self.output_unit,
             "rest_output": self.rest_output,
-            "clamp": self.clamp,
+            "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
             "scaling": {
                 "input_offset": list(self.scaling.input_offset),
                 "input_scale": list(self.scaling.input_scale),
@@ -207,12 +207,13 @@ class NARXModel(AbstractModel):
         """The model that :meth:`to_dict` wrote."""
         network = {key: value for key, value in fields["structure"].items() if key != "kind"}
         scaling: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields["scaling"].items()}
-        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output", "clamp")}
+        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output")}
         return cls(
             network=NARX(**network),
             theta=np.array(fields["theta"], dtype=np.float64),
             scaling=Scaling(**scaling),
             mapping=Mapping.parse(fields["mapping"]),
             input_units=tuple(fields["input_units"]),
+            clamp=np.inf if fields["clamp"] is None else fields["clamp"],
             **rest,
         )

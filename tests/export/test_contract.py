@@ -100,7 +100,7 @@ structures = st.builds(
 @pytest.mark.parametrize("format_name", ["onnx"])
 @settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(structure=structures, seed=st.integers(0, 100), n_samples=st.integers(1, 30))
-def test_any_structure(format_name, kind, narx, opened, inputs, past, tmp_path, structure, seed, n_samples):
+def test_any_structure(*, format_name, kind, narx, opened, inputs, past, tmp_path, structure, seed, n_samples):
     model = narx(structure, seed=seed)
     exported = opened(EXPORTERS[format_name], model, kind, tmp_path)
     u, history = inputs(n_samples, 2, seed=seed), past(model, seed=seed)
