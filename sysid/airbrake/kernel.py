@@ -121,7 +121,7 @@ class Drive(NamedTuple):
 def _coefficient(low, high, values, slopes):
     """Cq Cm / sqrt(T) at a ratio of pressures."""
     position = sqrt(1.0 - low / high) * (len(values) - 1)
-    index = int(position)
+    index = np.uintp(int(position))  # unsigned: numba then leaves out the test for indices from the end
     return values[index] + (position - index) * slopes[index]
 
 
