@@ -65,7 +65,9 @@ def case_figure(
         The figure; nothing outside it was touched.
     """
     with styled():
-        figure = new_figure(7.6, 3.9)
+        # Fixed margins: cases stand one above the other on the same axes, and drawing takes half the time.
+        figure = new_figure(7.6, 3.9, fixed=True)
+        figure.subplots_adjust(left=0.1, right=0.985, top=0.935, bottom=0.115, hspace=0.12)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.4, 1.0])
         above.set_title(title)
         _line(above, time, target, columns, color=TARGET, linewidth=1.1, label="target")
@@ -80,6 +82,7 @@ def case_figure(
         below.set_ylabel(f"error [{unit}]")
         below.set_xlabel("time [s]")
         below.set_xlim(float(time[0]), float(time[-1]) if len(time) > 1 else float(time[0]) + 1.0)
+        figure.align_ylabels()
         above.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
         return figure
 

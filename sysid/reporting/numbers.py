@@ -8,7 +8,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float, *, digits: int = 3, missing: str = "not defined") -> str:
-    """A number with a few significant digits.
+    r"""A number with a few significant digits.
 
     Args:
         value: The number.
@@ -20,7 +20,7 @@ def number(value: float, *, digits: int = 3, missing: str = "not defined") -> st
 
     Example:
         >>> number(0.0041493), number(2.2391e-5), number(-1234.5), number(float("nan"))
-        ('0.00415', '2.24 × 10⁻⁵', '−1230', 'not defined')
+        ('0.00415', '2.24\xa0×\xa010⁻⁵', '−1230', 'not defined')
     """
     if math.isnan(value):
         return missing
@@ -36,12 +36,32 @@ def number(value: float, *, digits: int = 3, missing: str = "not defined") -> st
         # A narrow space between thousands, which is not a decimal sign in any language.
         text = f"{rounded:,.0f}".replace(",", "\u202f") if power >= 4 else text
     else:
-        text = f"{mantissa} × 10{str(power).translate(_SUPERSCRIPT)}"
+        text = f"{mantissa}\u00a0×\u00a010{str(power).translate(_SUPERSCRIPT)}"
     return text.replace("-", "−")
 
 
+def quantity(value: float, unit: str, *, digits: int = 3, missing: str = "not defined") -> str:
+    r"""A number with its unit, never parted at the end of a line.
+
+    Args:
+        value: The number.
+        unit: The unit.
+        digits: Significant digits.
+        missing: What to say for NaN.
+
+    Returns:
+        The text, with the unit where it is a number.
+
+    Example:
+        >>> quantity(0.0541, "psi"), quantity(float("nan"), "psi", missing="diverged")
+        ('0.0541\xa0psi', 'diverged')
+    """
+    text = number(value, digits=digits, missing=missing)
+    return f"{text}\u00a0{unit}" if math.isfinite(value) else text
+
+
 def seconds(value: float) -> str:
-    """A duration in the unit that suits it.
+    r"""A duration in the unit that suits it.
 
     Args:
         value: Seconds.
@@ -51,18 +71,18 @@ def seconds(value: float) -> str:
 
     Example:
         >>> seconds(0.00123), seconds(41.7), seconds(4500.0)
-        ('1.23 ms', '41.7 s', '75.0 min')
+        ('1.23\xa0ms', '41.7\xa0s', '75.0\xa0min')
     """
     if not math.isfinite(value):
         return "not measured"
     for limit, factor, unit in ((1e-3, 1e6, "µs"), (1.0, 1e3, "ms"), (120.0, 1.0, "s"), (7200.0, 1 / 60, "min")):
         if value < limit:
-            return f"{number(value * factor)} {unit}"
-    return f"{number(value / 3600)} h"
+            return quantity(value * factor, unit)
+    return quantity(value / 3600, "h")
 
 
 def times(value: float) -> str:
-    """A ratio.
+    r"""A ratio.
 
     Args:
         value: The ratio.
@@ -72,6 +92,6 @@ def times(value: float) -> str:
 
     Example:
         >>> times(0.0312), times(1234.0)
-        ('0.031 ×', '1200 ×')
+        ('0.031\xa0×', '1200\xa0×')
     """
-    return f"{number(value, digits=2)} ×" if math.isfinite(value) else "not defined"
+    return f"{number(value, digits=2)}\u00a0×" if math.isfinite(value) else "not defined"

@@ -54,7 +54,8 @@ def read_signals(folder: Path, cases: list[str]) -> dict[str, CaseSignals]:
     """
     path = Path(folder) / SIGNALS_FILE
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        # Opened here: NumPy leaves its own file open when the archive turns out to be damaged.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             return {case: _case(stored, case, path) for case in cases}
     except FileNotFoundError as error:
         raise _damaged(path, "the signals of the fit", "no such file") from error

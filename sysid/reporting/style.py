@@ -67,17 +67,20 @@ def styled() -> AbstractContextManager[None]:
     return mpl.rc_context(_STYLE)
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float, *, fixed: bool = False) -> Figure:
     """An empty figure; call it, and everything that draws on it, inside :func:`styled`.
 
     Args:
         width: Inches.
         height: Inches.
+        fixed: Leave the margins to the caller instead of fitting them to the labels.
 
     Returns:
         The figure, not known to pyplot.
     """
-    return Figure(figsize=(width, height))
+    layout: Any = {"figure.constrained_layout.use": not fixed}
+    with mpl.rc_context(layout):
+        return Figure(figsize=(width, height))
 
 
 def svg(figure: Figure, *, title: str, description: str, name: str) -> str:

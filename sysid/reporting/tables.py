@@ -134,7 +134,7 @@ def run_time_table(fits: Sequence[FitRecord], best: str | None) -> Table:
             if case is None:
                 cells.append(Cell(text="not run"))
                 continue
-            faster = f"{number(real_time_factor(case), digits=2)} × real time"
+            faster = times(real_time_factor(case))
             cells.append(figure_cell(1e3 * case.run_time_s, missing="not measured", below=faster))
         rows.append(tuple(cells))
     rows.extend(
@@ -146,6 +146,7 @@ def run_time_table(fits: Sequence[FitRecord], best: str | None) -> Table:
         caption=f"Run time of the free run [ms] by case. {fits[0].mapping}.",
         head=(("fit", ""), *((name, f"{number(_simulated(fits, name))} s simulated") for name in columns)),
         rows=tuple(rows),
+        note="Small figures: how many times faster than real time.",
     )
 
 
@@ -307,7 +308,7 @@ def _sentence(text: str) -> str:
 
 def _name_cell(fit: FitRecord, best: str | None) -> Cell:
     chosen = fit.name == best
-    below = f"{fit.label}, trained {fit.loop.value} loop" + ("; chosen" if chosen else "")
+    below = f"{fit.label}, trained in {fit.loop.value} loop" + ("; chosen" if chosen else "")
     return Cell(text=fit.name, below=below, header=True, mark=_mark(fit, best))
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from sysid.estimation import Status
 from sysid.reporting.moments import Moment
-from sysid.reporting.numbers import number, seconds, times
+from sysid.reporting.numbers import number, quantity, seconds, times
 from sysid.reporting.results import CaseRecord, FitRecord, Results
 from sysid.reporting.tables import mean_mse, real_time_factor, scored_cases
 
@@ -71,7 +71,7 @@ def verdict(results: Results, moments: Sequence[Moment], comparability: str) -> 
     points += [("Choice", results.best.chosen_by), ("Export", _export(best))]
     count = "" if best.n_parameters is None else f", {best.n_parameters} parameters"
     return Verdict(
-        headline=f"{best.name} ({best.label}, trained {best.loop.value} loop{count}) models {best.mapping}.",
+        headline=f"{best.name} ({best.label}, trained in {best.loop.value} loop{count}) models {best.mapping}.",
         tiles=_tiles(best, cases),
         points=tuple(points),
         warnings=_warnings(results, best),
@@ -88,10 +88,10 @@ def _tiles(fit: FitRecord, cases: Dict[str, CaseRecord]) -> tuple[Tile, ...]:
     errors = [case.free_run.max_abs_error for case in cases.values()]
     factor = min(real_time_factor(case) for case in cases.values())
     return (
-        Tile(figure=f"{number(mean, missing='diverged')} {fit.unit}²", words="mean mse, free run"),
-        Tile(figure=f"{number(min(fits), digits=4)} %" if fits else "not defined", words="lowest fit, free run"),
-        Tile(figure=f"{number(_largest(errors), missing='diverged')} {fit.unit}", words="largest error of any sample"),
-        Tile(figure=f"{number(factor, digits=2)} ×", words="faster than real time, at least"),
+        Tile(figure=quantity(mean, f"{fit.unit}²", missing="diverged"), words="mean mse, free run"),
+        Tile(figure=quantity(min(fits), "%", digits=4) if fits else "not defined", words="lowest fit, free run"),
+        Tile(figure=quantity(_largest(errors), fit.unit, missing="diverged"), words="largest error of any sample"),
+        Tile(figure=times(factor), words="faster than real time, at least"),
     )
 
 
@@ -100,7 +100,7 @@ def _largest(values: Sequence[float]) -> float:
 
 
 def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord]) -> str:
-    unit = fit.unit
+    squared = f"{fit.unit}²"
     kind = "that it was neither fitted to nor chosen on" if scored_cases(fit) else "of this run"
     finite = {name: case for name, case in cases.items() if math.isfinite(case.free_run.mse)}
     if not finite:
@@ -109,13 +109,14 @@ def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord]) -> str:
     high = max(finite, key=lambda name: finite[name].free_run.mse)
     text = (
         f"In free run on the {_count(len(cases), 'case')} {kind}, the mse lies between "
-        f"{number(finite[low].free_run.mse)} {unit}² ({low}) and {number(finite[high].free_run.mse)} {unit}² ({high})"
+        f"{quantity(finite[low].free_run.mse, squared)} ({low}) and "
+        f"{quantity(finite[high].free_run.mse, squared)} ({high})"
     )
     if len(finite) < len(cases):
         return f"{text}; on {', '.join(sorted(set(cases) - set(finite)))} it diverges."
-    text += f", on average {number(mean_mse(fit, 'free_run'))} {unit}²" if scored_cases(fit) else ""
-    rms = number(math.sqrt(finite[high].free_run.mse))
-    return f"{text}. The root mean square error of the worst case is {rms} {unit}."
+    text += f", on average {quantity(mean_mse(fit, 'free_run'), squared)}" if scored_cases(fit) else ""
+    rms = quantity(math.sqrt(finite[high].free_run.mse), fit.unit)
+    return f"{text}. The root mean square error of the worst case is {rms}."
 
 
 def _published(cases: Dict[str, CaseRecord], comparability: str) -> str:
@@ -139,7 +140,7 @@ def _speed(cases: Dict[str, CaseRecord], results: Results) -> str:
     case = cases[slow]
     machine = results.environment.get("cpu") or "the machine named below"
     return (
-        f"A free run of {number(case.simulated_s)} s ({slow}) takes {seconds(case.run_time_s)}: "
+        f"A free run of {quantity(case.simulated_s, 's')} ({slow}) takes {seconds(case.run_time_s)}: "
         f"{number(real_time_factor(case), digits=2)} times faster than real time on {machine}."
     )
 
@@ -149,13 +150,13 @@ def _weakness(fit: FitRecord, cases: Dict[str, CaseRecord], moments: Sequence[Mo
     if diverging:
         return f"The free run diverges on {', '.join(diverging)}: do not use this model there."
     worst = max(cases, key=lambda name: cases[name].free_run.mse)
-    text = f"Weakest on {worst} (mse {number(cases[worst].free_run.mse)} {fit.unit}²)."
+    text = f"Weakest on {worst} (mse {quantity(cases[worst].free_run.mse, fit.unit + '²')})."
     if moments:
         moment = moments[0]
         text += (
-            f" The largest error, {number(moment.error)} {fit.unit}, occurs in {moment.case} at {moment.time:g} s, "
-            f"where the target is {number(moment.target, digits=5)} {fit.unit} and the free run "
-            f"{number(moment.simulated, digits=5)} {fit.unit}."
+            f" The largest error, {quantity(moment.error, fit.unit)}, occurs in {moment.case} at "
+            f"{moment.time:g}\u00a0s, where the target is {quantity(moment.target, fit.unit, digits=5)} and "
+            f"the free run {quantity(moment.simulated, fit.unit, digits=5)}."
         )
     return text
 
@@ -167,7 +168,7 @@ def _export(fit: FitRecord) -> str:
     formats = ", ".join(dict.fromkeys(export.format for export in fit.exports))
     return (
         f"Frozen as {formats}; the files differ from the model by at most "
-        f"{number(worst.largest_difference)} {fit.unit} on any case (allowed: {number(worst.tolerance)})."
+        f"{quantity(worst.largest_difference, fit.unit)} on any case (allowed: {number(worst.tolerance)})."
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -116,9 +116,16 @@ def _null(value: Any) -> Any:
 def make_run() -> Callable[..., Path]:
     """Writes a run folder; ``edit`` changes the results before they are written."""
 
-    def make(folder: Path, *, samples: int = 2000, edit: Callable[[dict[str, Any]], None] | None = None) -> Path:
+    def make(
+        folder: Path,
+        *,
+        samples: int = 2000,
+        names: Sequence[str] = tuple(FITS),
+        edit: Callable[[dict[str, Any]], None] | None = None,
+    ) -> Path:
         fits = []
-        for number, (name, (slug, _, _, noise)) in enumerate(FITS.items()):
+        for number, name in enumerate(names):
+            slug, _, _, noise = FITS[name]
             signals = _signals(noise, samples, seed=number)
             place = folder / "fits" / slug
             place.mkdir(parents=True)

@@ -1,0 +1,50 @@
+"""The worst moments: the right ones, and no two of the same."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sysid.reporting.moments import worst_moments
+from sysid.reporting.signals import CaseSignals
+
+
+def _case(errors: dict[int, float], samples: int = 1000) -> CaseSignals:
+    simulated = np.zeros(samples)
+    for sample, error in errors.items():
+        simulated[sample] = error
+    zero = np.zeros(samples)
+    return CaseSignals(time=0.5 * np.arange(samples), target=zero, simulated=simulated, predicted=zero)
+
+
+def test_the_largest_errors_of_all_cases_come_first_whatever_their_sign() -> None:
+    moments = worst_moments({"A": _case({100: 1.0, 500: -3.0}), "B": _case({700: 2.0})}, 5)
+    assert [(m.case, m.sample, m.time, m.error) for m in moments] == [
+        ("A", 500, 250.0, -3.0),
+        ("B", 700, 350.0, 2.0),
+        ("A", 100, 50.0, 1.0),
+    ]
+
+
+def test_neighbours_of_a_moment_are_part_of_it() -> None:
+    moments = worst_moments({"A": _case({500: 3.0, 501: 2.9, 530: 2.8, 600: 1.0})}, 5)
+    assert [m.sample for m in moments] == [500, 600]
+    assert (moments[0].first, moments[0].last) == (480, 520)
+
+
+def test_a_window_stays_inside_its_case() -> None:
+    (first, last) = worst_moments({"A": _case({0: 1.0, 999: 2.0})}, 5)
+    assert (first.first, first.last) == (979, 999)
+    assert (last.first, last.last) == (0, 20)
+
+
+def test_where_the_free_run_is_not_finite_is_worse_than_anything() -> None:
+    moments = worst_moments({"A": _case({100: 1e9}), "B": _case({300: np.nan})}, 1)
+    assert [(m.case, m.sample) for m in moments] == [("B", 300)]
+
+
+def test_no_more_than_asked_for() -> None:
+    assert len(worst_moments({"A": _case(dict.fromkeys(range(0, 1000, 100), 1.0))}, 3)) == 3
+
+
+def test_a_perfect_free_run_has_no_worst_moment() -> None:
+    assert worst_moments({"A": _case({})}, 5) == []
