@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, Training
 from sysid.reporting.published import read_published
-from sysid.reporting.results import Results, parse_results, write_results
+from sysid.reporting.results import Results, parse_results, read_results, write_results
 from sysid.workbench import events, steps
 from sysid.workbench.config import FitConfig, Pipeline
 from sysid.workbench.environment import environment
@@ -24,7 +25,7 @@ from sysid.workbench.record import (
     write_fit,
     write_scores,
 )
-from sysid.workbench.store import RunFolder, strict, write_bytes, write_json
+from sysid.workbench.store import RunFolder, code_digest, digest, strict, write_bytes, write_json
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,7 +112,7 @@ class _Run:
         choice = steps.choose({name: (one.ready.fit, one.scores) for name, one in fitted.items()}, asked)
         exports = self._export(fitted[choice.name], data) if config.export else ()
         results = self._write_results(data, fitted, choice=choice, exports=exports)
-        self._report(fitted[choice.name])
+        self._report(fitted[choice.name], results)
         self._tell(events.RunDone(results=results))
         return results
 
@@ -208,13 +209,17 @@ class _Run:
         self._tell(events.BundleReady(of=best.ready, folder=folder, exports=tuple(exports), stored=stored))
         return tuple(exports)
 
-    def _report(self, best: _Fitted) -> None:
-        from sysid.reporting.report import write_report
+    def _report(self, best: _Fitted, results: Results) -> None:
+        from sysid.reporting import report
 
-        step = "Writing the report"
+        step, page = "Writing the report", self.store.path / "report" / "index.html"
+        key = digest({"results": results.model_dump(mode="json"), "code": code_digest("reporting")})
         self._tell(events.StepStarted(step=step))
-        page = write_report(self.store.path)
-        self._tell(events.StepDone(step=step, stored=False, detail=str(page)))
+        stored = self._done("report", key)
+        if not stored:
+            page = report.write_report(self.store.path)
+            self.store.mark_done("report", key, [page])
+        self._tell(events.StepDone(step=step, stored=stored, detail=str(page)))
         self._tell(events.ReportReady(page=page, results=self.store.results, of=best.ready))
 
     def _write_results(
@@ -235,8 +240,24 @@ class _Run:
             exports=exports,
         )
         results = parse_results(strict(document), where=self.store.results)
+        before = self._stored_results()
+        if before is not None and _undated(before) == _undated(results):
+            # Nothing is new, so that what was made then keeps its date.
+            return before
         write_results(self.store.path, results)
         return results
+
+    def _stored_results(self) -> Results | None:
+        try:
+            return read_results(self.store.path)
+        except ConfigError:
+            # None yet, or damaged: either way they are written anew.
+            return None
+
+
+def _undated(results: Results) -> str:
+    """Results without their date; as text, because NaN differs from itself as a number."""
+    return results.model_copy(update={"created": ""}).model_dump_json()
 
 
 def _outcome(fit: FitResult, scores: steps.Scores) -> str:

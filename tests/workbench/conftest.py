@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ channels:
   - {name: inlet, unit: kPa, reference: gauge}
   - {name: valve, unit: V}
   - {name: outlet, unit: kPa, reference: gauge}
-source: {files: {}}
+source: {files: {references: gauge}}
 cases:
   run-1: {role: estimation, file: run-1.csv}
   run-2: {role: selection, file: run-2.csv}
@@ -54,7 +55,7 @@ def rig_record(seed: int, n_samples: int = 400) -> tuple[np.ndarray, ...]:
     return 0.05 * np.arange(n_samples), inlet, valve, outlet
 
 
-def write_rig(folder: Path) -> None:
+def fill(folder: Path) -> None:
     """The data set and the pipeline of a workspace."""
     data = folder / "datasets" / "rig"
     data.mkdir(parents=True)
@@ -67,10 +68,16 @@ def write_rig(folder: Path) -> None:
     (folder / "pipelines" / "first.yaml").write_text(PIPELINE, encoding="utf-8")
 
 
+@pytest.fixture(scope="session")
+def write_rig() -> Callable[[Path], None]:
+    """Fills a folder with a user's data set and pipeline."""
+    return fill
+
+
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user's workspace, and the current folder."""
-    write_rig(tmp_path)
+    fill(tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     return tmp_path

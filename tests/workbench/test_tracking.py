@@ -1,0 +1,187 @@
+"""Tracking, read back from a store of its own: what an engineer finds there, and what its failure costs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.reporting.results import Results
+from sysid.workbench import tracked, tracking
+from sysid.workbench.config import read_pipeline
+from sysid.workbench.pipeline import run_pipeline
+from sysid.workbench.tracking import KEY_TAG, Tracker, latest_experiment, store_uri
+
+
+def track(workspace: Path, name: str = "first", *, fresh: bool = False) -> tuple[Tracker, Results]:
+    """Run a pipeline of the workspace with a tracker."""
+    told: list[str] = []
+    tracker = Tracker.of_workspace(workspace, told.append)
+    read = read_pipeline(workspace / "pipelines" / f"{name}.yaml")
+    results = run_pipeline(read, workspace / "run", command=f"sysid run {name}", fresh=fresh, watchers=[tracker])
+    assert len(told) == len(tracker.failures)
+    return tracker, results
+
+
+def runs_of(client) -> dict[str, object]:
+    """Runs by the name of their fit."""
+    experiment = client.get_experiment_by_name("inlet+valve -> outlet")
+    return {run.data.tags["fit"]: run for run in client.search_runs([experiment.experiment_id])}
+
+
+@pytest.fixture(scope="module")
+def tracked_once(tmp_path_factory: pytest.TempPathFactory, write_rig):
+    """One run with export, tracked; and the client that reads it back."""
+    workspace = tmp_path_factory.mktemp("tracked")
+    write_rig(workspace)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(workspace)
+        patch.delenv("MLFLOW_TRACKING_URI", raising=False)
+        file = workspace / "pipelines" / "first.yaml"
+        file.write_text(file.read_text().replace("export: null", "export: {formats: [onnx]}"), encoding="utf-8")
+        tracker, results = track(workspace)
+        assert tracker.failures == []
+        yield workspace, tracker.client, results
+
+
+def test_fits_stand_flat_in_the_experiment_of_their_mapping(tracked_once) -> None:
+    _, client, _ = tracked_once
+    found = runs_of(client)
+    assert {run.info.run_name for run in found.values()} == {
+        "inlet+valve -> outlet · ARX [1; 1 1; 1 1] · open",
+        "inlet+valve -> outlet · NARX 1/1/2 · open",
+        "inlet+valve -> outlet · NARX 1/1/2 · closed",
+    }
+    assert {run.info.status for run in found.values()} == {"FINISHED"}
+    assert not any("mlflow.parentRunId" in run.data.tags for run in found.values())
+    assert len({run.data.tags["pipeline_run"] for run in found.values()}) == 1
+
+
+def test_parameters_and_figures_are_those_of_the_results(tracked_once) -> None:
+    _, client, results = tracked_once
+    closed = runs_of(client)["closed loop"]
+    record = results.fits[2]
+    assert closed.data.params["neurons"] == "2"
+    assert closed.data.params["training.max_iterations"] == "8"
+    assert closed.data.params["training.loop"] == "closed"
+    for name, case in record.cases.items():
+        assert closed.data.metrics[f"free_run_mse/{name}"] == case.free_run.mse
+        assert closed.data.metrics[f"one_step_mse/{name}"] == case.one_step.mse
+    assert closed.data.metrics["mean_free_run_mse"] == record.cases["run-3"].free_run.mse
+    assert closed.data.metrics["parameters"] == record.n_parameters
+    assert "training.loop" not in runs_of(client)["ARX"].data.params
+
+
+def test_the_learning_curve_is_a_stepped_metric(tracked_once) -> None:
+    _, client, results = tracked_once
+    history = client.get_metric_history(runs_of(client)["closed loop"].info.run_id, "learning_curve_mse")
+    curve = results.fits[2].learning_curve
+    assert curve is not None
+    assert [(entry.step, entry.value) for entry in sorted(history, key=lambda entry: entry.step)] == [
+        (int(step), mse) for step, mse in zip(curve.iteration, curve.mse, strict=True)
+    ]
+
+
+def test_the_data_set_is_an_input_with_its_digest(tracked_once) -> None:
+    _, client, results = tracked_once
+    for run in runs_of(client).values():
+        (entry,) = run.inputs.dataset_inputs
+        assert entry.dataset.name == "rig"
+        assert results.data.digest.startswith(entry.dataset.digest)
+        assert run.data.tags["data_digest"] == results.data.digest
+        assert "outlet [kPa gauge]" in entry.dataset.schema
+
+
+def test_pictures_have_the_same_key_in_every_fit(tracked_once) -> None:
+    _, client, _ = tracked_once
+    keys = {}
+    for name, run in runs_of(client).items():
+        files = [entry.path for entry in client.list_artifacts(run.info.run_id, "images")]
+        keys[name] = {Path(file).name.split("+step+")[0] for file in files}
+        assert run.data.tags["mlflow.loggedImages"] == "True"
+    assert set(map(frozenset, keys.values())) == {
+        frozenset({"target and output~run-1", "target and output~run-2", "target and output~run-3"})
+    }
+
+
+def test_the_best_fit_has_bundle_report_and_a_model_that_runs(tracked_once) -> None:
+    workspace, client, results = tracked_once
+    run = runs_of(client)[results.best.name]
+    bundled = {Path(entry.path).name for entry in client.list_artifacts(run.info.run_id, "bundle")}
+    assert {"model.json", "step.onnx", "sequence.onnx"} <= bundled
+    assert {Path(entry.path).name for entry in client.list_artifacts(run.info.run_id, "report")} == {
+        "index.html",
+        "results.json",
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # MLflow's own deprecations
+        import mlflow
+
+        mlflow.set_tracking_uri(store_uri(workspace))
+        (model_id,) = [output.model_id for output in run.outputs.model_outputs]
+        loaded = mlflow.pyfunc.load_model(f"models:/{model_id}")
+        inputs = {name: np.zeros((5, 1, 2)) if name == "u" else np.zeros((1, 3)) for name in ("u", "state")}
+        output = loaded.predict(inputs)
+    assert loaded.metadata.signature.inputs.input_names() == ["u", "state"]
+    assert output["y"].shape == (5, 1, 1)
+    assert np.isfinite(output["y"]).all()
+
+
+def test_what_is_tracked_already_is_not_tracked_twice(tracked_once) -> None:
+    workspace, client, _ = tracked_once
+    before = {name: run.info.run_id for name, run in runs_of(client).items()}
+    tracker, _ = track(workspace)
+    assert tracker.failures == []
+    experiment = client.get_experiment_by_name("inlet+valve -> outlet")
+    assert len(client.search_runs([experiment.experiment_id])) == len(before)
+    assert latest_experiment(store_uri(workspace)) == experiment.experiment_id
+
+
+def test_a_run_left_open_by_a_kill_is_closed_and_logged_again(tracked_once) -> None:
+    workspace, client, _ = tracked_once
+    run = runs_of(client)["ARX"]
+    client.update_run(run.info.run_id, status="RUNNING")
+    track(workspace)
+    experiment = client.get_experiment_by_name("inlet+valve -> outlet")
+    twins = client.search_runs(
+        [experiment.experiment_id], filter_string=f"tags.`{KEY_TAG}` = '{run.data.tags[KEY_TAG]}'"
+    )
+    assert sorted(twin.info.status for twin in twins) == ["FINISHED", "KILLED"]
+
+
+def test_a_deleted_experiment_comes_back(tracked_once) -> None:
+    workspace, client, _ = tracked_once
+    experiment = client.get_experiment_by_name("inlet+valve -> outlet")
+    client.delete_experiment(experiment.experiment_id)
+    tracker, _ = track(workspace)
+    assert tracker.failures == []
+    assert client.get_experiment(experiment.experiment_id).lifecycle_stage == "active"
+
+
+@pytest.mark.parametrize("step", ["connect", "pictures"])
+def test_a_failing_store_costs_no_fit(workspace: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
+    def fail(*_: object) -> object:
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(tracking if step == "connect" else tracked, step, fail)
+    tracker, results = track(workspace)
+    assert len(results.fits) == 3
+    assert (workspace / "run" / "report" / "index.html").is_file()
+    assert tracker.failures
+    assert all("the disk is full" in text for text in tracker.failures)
+
+
+def test_processes_may_touch_a_new_store_at_once(tmp_path: Path) -> None:
+    script = "import sys; from sysid.workbench.tracking import connect; connect(sys.argv[1]).search_experiments()"
+    uri = f"sqlite:///{tmp_path / 'mlflow.db'}"
+    processes = [subprocess.Popen([sys.executable, "-c", script, uri], stderr=subprocess.PIPE) for _ in range(3)]
+    told = [process.communicate()[1].decode() for process in processes]
+    assert [process.returncode for process in processes] == [0, 0, 0], told
+
+
+def test_names_that_a_store_refuses_are_changed() -> None:
+    assert tracked.key("VAL 1 (µ=0.3)/a") == "VAL 1 ___0.3__a"
