@@ -23,7 +23,7 @@ def reference(
             if inside:
                 out[row] = np.mean([values[i] for i in inside], axis=0)
             continue
-        last = max(i for i, s in enumerate(stamps) if s <= t + 1e-9)
+        last = max(i for i, s in enumerate(stamps) if s <= t + 1e-6 * width)  # on the point counts as before it
         if method == "hold" or last == len(stamps) - 1:
             out[row] = values[last]
         else:
