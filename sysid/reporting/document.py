@@ -14,7 +14,7 @@ from sysid.reporting import figures
 from sysid.reporting.moments import Moment, worst_moments
 from sysid.reporting.numbers import number
 from sysid.reporting.published import PublishedTable
-from sysid.reporting.results import FitRecord, LearningCurve, Results
+from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.style import svg
 from sysid.reporting.tables import (
@@ -228,14 +228,14 @@ def _tried(results: Results) -> Section:
     if results.selection is not None:
         parts.append(f"Traces that choose: {results.selection.name} ({', '.join(results.selection.cases)}).")
     parts.append(ranking_table(results))
-    curves: dict[str, dict[str, LearningCurve]] = {}
-    for fit in results.fits:
-        if fit.learning_curve is not None and len(fit.learning_curve.mse) > 1:
-            curves.setdefault(fit.unit, {})[fit.name] = fit.learning_curve
-    for index, (unit, group) in enumerate(curves.items()):
-        caption = "Learning curves on the estimation records; an open-loop fit learns the error of one step."
+    for index, fits in enumerate(results.mappings().values()):
+        curves = {fit.name: fit.learning_curve for fit in fits}
+        if not any(curve is not None and len(curve.mse) > 1 for curve in curves.values()):
+            continue
+        unit, mapping = fits[0].unit, fits[0].mapping
+        caption = f"Learning curves on the estimation records, {mapping}; open loop learns the error of one step."
         parts.append(
-            _picture(figures.learning_figure(group, unit=unit), "Learning curves", caption, f"learning-{index}")
+            _picture(figures.learning_figure(curves, unit=unit), "Learning curves", caption, f"learning-{index}")
         )
     notes = [(fit.name, " ".join(fit.notes)) for fit in results.fits if fit.notes]
     if notes:

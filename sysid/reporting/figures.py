@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from sysid.reporting.moments import Moment
+from sysid.reporting.numbers import number
 from sysid.reporting.results import LearningCurve
 from sysid.reporting.signals import CaseSignals
 from sysid.reporting.style import DASHES, PALETTE, PUBLISHED, TARGET, new_figure, series_style, styled
@@ -175,11 +176,12 @@ def regression_figure(signals: Dict[str, CaseSignals], r: Dict[str, float], *, l
         return figure
 
 
-def learning_figure(curves: Dict[str, LearningCurve], *, unit: str) -> Figure:
+def learning_figure(curves: Dict[str, LearningCurve | None], *, unit: str) -> Figure:
     """Learning curves of all fits.
 
     Args:
-        curves: By name of the fit.
+        curves: By name of the fit; a fit without one is left out, and the others keep the colours that they
+            have in charts of all fits.
         unit: The output's unit.
 
     Returns:
@@ -189,6 +191,8 @@ def learning_figure(curves: Dict[str, LearningCurve], *, unit: str) -> Figure:
         figure = new_figure(7.6, 3.3)
         axes = figure.subplots()
         for index, (name, curve) in enumerate(curves.items()):
+            if curve is None or len(curve.mse) < 2:
+                continue
             style = series_style(index)
             mse = np.array(curve.mse, dtype=np.float64)
             x, y = thin(np.array(curve.iteration, dtype=np.float64), np.where(mse > 0.0, mse, np.nan), _COLUMNS)
@@ -247,7 +251,7 @@ def run_time_figure(seconds: Dict[str, float], *, quantity: str) -> Figure:
         axes = figure.subplots()
         names, values = list(seconds), [value if np.isfinite(value) else 0.0 for value in seconds.values()]
         bars = axes.barh(names, values, height=0.6, color=PALETTE[0])
-        axes.bar_label(bars, labels=[f"{value:.3g}" for value in seconds.values()], padding=3)
+        axes.bar_label(bars, labels=[number(value, missing="not measured") for value in seconds.values()], padding=3)
         axes.margins(x=0.12)
         axes.invert_yaxis()
         axes.grid(visible=False, axis="y")

@@ -221,7 +221,7 @@ def ranking_table(results: Results) -> Table:
             ("trained", "loop"),
             ("parameters", ""),
             ("training", ""),
-            ("selection mse", "free run"),
+            ("selection mse", _selection_words(results)),
             ("how it ended", ""),
         ),
         rows=tuple(rows),
@@ -303,6 +303,7 @@ def _words(value: Any) -> str:
 
 def _sentence(text: str) -> str:
     text = text.strip()
+    text = text[:1].upper() + text[1:]
     return text if text.endswith((".", "!", "?")) else text + "."
 
 
@@ -310,6 +311,11 @@ def _name_cell(fit: FitRecord, best: str | None) -> Cell:
     chosen = fit.name == best
     below = f"{fit.label}, trained in {fit.loop.value} loop" + ("; chosen" if chosen else "")
     return Cell(text=fit.name, below=below, header=True, mark=_mark(fit, best))
+
+
+def _selection_words(results: Results) -> str:
+    units = {fit.unit for fit in results.fits}
+    return f"{units.pop()}², free run" if len(units) == 1 else "free run"
 
 
 def _mark(fit: FitRecord, best: str | None) -> str:

@@ -186,11 +186,33 @@ def _warnings(results: Results, best: FitRecord | None) -> tuple[str, ...]:
             for export in best.exports
             if not export.largest_difference <= export.tolerance
         ]
+        found += _overtaken(results, best)
     for fit in results.fits:
         diverging = [name for name, case in fit.cases.items() if not math.isfinite(case.free_run.mse)]
         if diverging and fit is not best:
             found.append(f"{fit.name}: the free run diverges on {', '.join(diverging)}.")
     return tuple(found)
+
+
+def _overtaken(results: Results, best: FitRecord) -> list[str]:
+    """Say so where the traces that choose and the cases that score do not agree."""
+    rivals = [fit for fit in results.fits if fit.mapping == best.mapping and mean_mse(fit, "free_run") < _mean(best)]
+    if not rivals:
+        return []
+    ahead = min(rivals, key=lambda fit: mean_mse(fit, "free_run"))
+    squared = f"{best.unit}²"
+    theirs = quantity(mean_mse(ahead, "free_run"), squared)
+    ours = quantity(mean_mse(best, "free_run"), squared, missing="diverged")
+    return [
+        f"{ahead.name} has a lower mean free-run mse on the unseen cases ({theirs} against {ours}); "
+        "the choice rests on other traces, so that these cases stay unseen."
+    ]
+
+
+def _mean(fit: FitRecord) -> float:
+    """Mean free-run mse on the unseen cases; infinite where it diverges."""
+    mean = mean_mse(fit, "free_run")
+    return math.inf if math.isnan(mean) and scored_cases(fit) else mean
 
 
 def _count(n: int, noun: str) -> str:

@@ -275,6 +275,10 @@ def _least(document: dict[str, Any]) -> None:
         del document["fits"][0][key]
 
 
+def _worse_is_chosen(document: dict[str, Any]) -> None:
+    document["best"]["name"] = "ARX"
+
+
 def _two_mappings(document: dict[str, Any]) -> None:
     document["fits"][0]["mapping"] = "pump -> flow"
 
@@ -286,6 +290,9 @@ def _two_mappings(document: dict[str, Any]) -> None:
         pytest.param(_only_estimation, "There is no validation or test case", id="no-validation-case"),
         pytest.param(_all_diverge, "The free run diverges on every one of the 4 cases", id="everything-diverges"),
         pytest.param(_bad_export, "bundle/step.onnx differs from its model by more than", id="export-not-finite"),
+        pytest.param(
+            _worse_is_chosen, "NARX free run has a lower mean free-run mse on the unseen", id="another-is-better"
+        ),
         pytest.param(_least, "none was marked as the best", id="only-the-required-keys"),
         pytest.param(_two_mappings, "by case. pump → flow.", id="two-mappings"),
     ],
