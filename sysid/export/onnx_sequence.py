@@ -1,9 +1,10 @@
 """A whole free run as an ONNX graph: one ``Scan`` of any length, for any number of cars at once.
 
 The past inputs of all samples are laid side by side before the loop, and the body is left with few nodes:
-in a network of this size a node costs more than its arithmetic. Doing the inputs' share of the matrix
-product before the loop was measured too: a tenth faster for one car, but twice slower for a hundred, because
-the result for all samples no longer fits into the cache.
+in a network of this size a node costs more than its arithmetic. Two other forms were measured on 20,000 samples
+of a 4/4/20 network. With the inputs' share of the matrix product before the loop one car is a tenth faster, but
+a hundred cars are slower by a fifth and more, because the products of all samples do not fit into the cache. With
+the delay lines of the inputs inside the loop a hundred cars are a tenth faster, but one car is slower by a third.
 """
 
 from __future__ import annotations

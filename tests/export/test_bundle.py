@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -189,6 +190,24 @@ def test_an_earlier_bundle_survives_an_export_that_fails(fit, traces, start, tmp
     earlier = content(export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onnx"]).folder)
     with pytest.raises(ParityError):
         export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onnx"], tolerance=1e-30)
+    assert content(tmp_path / "b") == earlier
+    assert [path.name for path in tmp_path.iterdir()] == ["b"]
+
+
+def test_an_earlier_bundle_is_put_back_if_the_new_one_cannot_take_its_place(
+    *, fit, traces, start, tmp_path, monkeypatch
+):
+    earlier = content(export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onnx"]).folder)
+    rename = Path.rename
+
+    def full_disk(self, target):
+        if self.name == "new":
+            raise OSError(28, "No space left on device")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onnx"])
     assert content(tmp_path / "b") == earlier
     assert [path.name for path in tmp_path.iterdir()] == ["b"]
 
