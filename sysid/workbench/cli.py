@@ -175,7 +175,7 @@ def ui(
     raise typer.Exit(ui_command(port, browser=not no_browser))
 
 
-@app.command(epilog="Example: sysid init brakes")
+@app.command(epilog="Example: sysid init mine")
 def init(
     folder: Annotated[Path, typer.Argument(help="Folder to make.")],
 ) -> None:

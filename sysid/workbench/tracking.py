@@ -22,6 +22,7 @@ import numpy as np
 from filelock import FileLock
 from numpy.typing import NDArray
 
+from sysid.atomic import replacing
 from sysid.workbench import tracked
 from sysid.workbench.events import BundleReady, DataLoaded, Event, FitReady, ReportReady, RunStarted
 from sysid.workbench.naming import slug
@@ -31,6 +32,8 @@ KEY_TAG = "sysid.key"
 
 SEQUENCE_FILE = "sequence.onnx"
 """The exported file that runs a whole record, which is what a caller of a tracked model wants."""
+
+SQLITE = "sqlite:///"
 
 MAX_METRICS = 1000
 """Metrics that MLflow takes in one batch (``mlflow.utils.validation.MAX_METRICS_PER_BATCH``)."""
@@ -53,7 +56,7 @@ def store_uri(workspace: Path) -> str:
     Returns:
         A tracking URI.
     """
-    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{(workspace / 'mlflow.db').resolve().as_posix()}"
+    return os.environ.get("MLFLOW_TRACKING_URI") or f"{SQLITE}{(workspace / 'mlflow.db').resolve().as_posix()}"
 
 
 def connect(uri: str) -> Any:
@@ -72,15 +75,23 @@ def connect(uri: str) -> Any:
 
         for name in ("mlflow", "alembic"):
             logging.getLogger(name).setLevel(logging.WARNING)
-        client = MlflowClient(uri)
-        if not uri.startswith("sqlite:///"):
-            return client
+        if not uri.startswith(SQLITE):
+            return MlflowClient(uri)
         # Processes that touch a new SQLite store at the same moment break each other's migrations (measured: 7 of 8
-        # failed): the first one makes it, the others wait.
-        database = Path(uri.removeprefix("sqlite:///"))
+        # failed), and so does one that is killed among them: it is made under another name, by one, and renamed.
+        database = Path(uri.removeprefix(SQLITE))
         with FileLock(database.with_name(f"{database.name}.lock")):
-            client.search_experiments(max_results=1)
-    return client
+            if not database.exists():
+                with replacing(database) as draft:
+                    _make_store(draft)
+            return MlflowClient(uri)
+
+
+def _make_store(database: Path) -> None:
+    from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
+
+    store = SqlAlchemyStore(f"{SQLITE}{database.as_posix()}", "mlartifacts")
+    store.engine.dispose()
 
 
 @contextmanager
@@ -124,7 +135,7 @@ class Tracker:
             The tracker; nothing is opened yet.
         """
         uri = store_uri(workspace)
-        return cls(uri=uri, artifacts=workspace / "mlartifacts" if uri.startswith("sqlite:") else None, warn=warn)
+        return cls(uri=uri, artifacts=workspace / "mlartifacts" if uri.startswith(SQLITE) else None, warn=warn)
 
     def __call__(self, event: Event) -> None:
         """Log an event; never raises."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import warnings
@@ -34,10 +35,11 @@ def runs_of(client) -> dict[str, object]:
 
 
 @pytest.fixture(scope="module")
-def tracked_once(tmp_path_factory: pytest.TempPathFactory, write_rig):
+def tracked_once(tmp_path_factory: pytest.TempPathFactory, write_rig, empty_store: Path):
     """One run with export, tracked; and the client that reads it back."""
     workspace = tmp_path_factory.mktemp("tracked")
     write_rig(workspace)
+    shutil.copyfile(empty_store, workspace / "mlflow.db")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(workspace)
         patch.delenv("MLFLOW_TRACKING_URI", raising=False)
@@ -163,7 +165,11 @@ def test_a_deleted_experiment_comes_back(tracked_once) -> None:
 
 
 @pytest.mark.parametrize("step", ["connect", "pictures"])
-def test_a_failing_store_costs_no_fit(workspace: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
+def test_a_failing_store_costs_no_fit(
+    workspace: Path, empty_store: Path, monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    shutil.copyfile(empty_store, workspace / "mlflow.db")
+
     def fail(*_: object) -> object:
         raise OSError("the disk is full")
 
@@ -178,9 +184,25 @@ def test_a_failing_store_costs_no_fit(workspace: Path, monkeypatch: pytest.Monke
 def test_processes_may_touch_a_new_store_at_once(tmp_path: Path) -> None:
     script = "import sys; from sysid.workbench.tracking import connect; connect(sys.argv[1]).search_experiments()"
     uri = f"sqlite:///{tmp_path / 'mlflow.db'}"
-    processes = [subprocess.Popen([sys.executable, "-c", script, uri], stderr=subprocess.PIPE) for _ in range(3)]
+    processes = [subprocess.Popen([sys.executable, "-c", script, uri], stderr=subprocess.PIPE) for _ in range(2)]
     told = [process.communicate()[1].decode() for process in processes]
-    assert [process.returncode for process in processes] == [0, 0, 0], told
+    assert [process.returncode for process in processes] == [0, 0], told
+
+
+def test_a_store_whose_making_was_stopped_is_made_again(
+    tmp_path: Path, empty_store: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(draft: Path) -> None:
+        draft.write_bytes(empty_store.read_bytes()[:8192])
+        raise KeyboardInterrupt
+
+    uri = f"sqlite:///{tmp_path / 'mlflow.db'}"
+    monkeypatch.setattr(tracking, "_make_store", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        tracking.connect(uri)
+    assert not (tmp_path / "mlflow.db").exists()
+    monkeypatch.setattr(tracking, "_make_store", lambda draft: shutil.copyfile(empty_store, draft))
+    assert [experiment.name for experiment in tracking.connect(uri).search_experiments()] == ["Default"]
 
 
 def test_names_that_a_store_refuses_are_changed() -> None:

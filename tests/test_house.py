@@ -1,0 +1,172 @@
+"""The rules of the house: which room may know which, how large a file may be, what the wheel brings."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "sysid"
+FILES = sorted(file for file in PACKAGE.rglob("*.py"))
+
+WORDS = {"errors", "atomic", "units", "traces", "content", "yaml_files"}
+"""Single files that every room may use."""
+
+MAY_IMPORT: dict[str, set[str]] = {
+    "kernels": set(),
+    "models": {"kernels"},
+    "ingest": set(),
+    "airbrake": set(),
+    "estimation": {"models", "kernels"},
+    "validation": {"estimation", "models", "kernels"},
+    "export": {"estimation", "models", "kernels"},
+    "reporting": {"validation", "export", "estimation", "models"},
+    "rail": {"export", "models"},
+    "workbench": {"reporting", "validation", "export", "estimation", "models", "kernels", "ingest"},
+}
+"""Room by room, which others it may import; imports point one way."""
+
+FIELDS = {"airbrake", "rail"}
+"""Rooms that know a field of application."""
+
+ONLY_IN = {"mlflow": "workbench/tracking.py", "optuna": "workbench/sweep.py"}
+"""Packages that one file alone may import."""
+
+BRAKE_WORDS = re.compile(r"brak|abdx|railway|wagon|locomotive|dissertation", re.IGNORECASE)
+
+NAMED_IN_HELP = {"workbench/cli.py": "service-brake"}
+"""A built-in pipeline is named in the examples of the help."""
+
+MAX_LINES, MANY_LINES = 600, 400
+
+
+def imports(file: Path) -> Iterator[str]:
+    """Full names of what a file imports, wherever in it."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file} imports relatively"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def name_of(file: Path) -> str:
+    return file.relative_to(PACKAGE).as_posix()
+
+
+@pytest.mark.parametrize("file", FILES, ids=name_of)
+def test_imports_point_one_way(file: Path) -> None:
+    parts = file.relative_to(PACKAGE).parts
+    room = parts[0].removesuffix(".py")
+    own = {name.split(".")[1] for name in imports(file) if name.startswith("sysid.") and name.count(".") >= 1}
+    # `from sysid import errors` and `from sysid.errors import X` both name the room second.
+    others = own - {room} - WORDS - {"__version__"}
+    if len(parts) == 1:
+        assert others == set(), f"{file.name} is for every room and may import none"
+    else:
+        assert others <= MAY_IMPORT[room], f"{room} may not import {', '.join(sorted(others - MAY_IMPORT[room]))}"
+
+
+def test_every_room_has_its_rule() -> None:
+    rooms = {file.relative_to(PACKAGE).parts[0] for file in FILES if len(file.relative_to(PACKAGE).parts) > 1}
+    assert rooms <= set(MAY_IMPORT)
+
+
+def test_the_rules_have_no_circle() -> None:
+    done: set[str] = set()
+    while len(done) < len(MAY_IMPORT):
+        free = {room for room, others in MAY_IMPORT.items() if room not in done and others <= done}
+        assert free, f"a circle among {set(MAY_IMPORT) - done}"
+        done |= free
+
+
+@pytest.mark.parametrize("package", ONLY_IN)
+def test_one_file_alone_imports(package: str) -> None:
+    found = {name_of(file) for file in FILES if any(name.split(".")[0] == package for name in imports(file))}
+    assert found <= {ONLY_IN[package]}
+
+
+@pytest.mark.parametrize("file", FILES, ids=name_of)
+def test_files_are_of_a_size_that_is_read(file: Path) -> None:
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= MAX_LINES
+
+
+def long_files() -> list[tuple[str, int]]:
+    """Files with more lines than one likes to read at a sitting."""
+    counted = [(name_of(file), len(file.read_text(encoding="utf-8").splitlines())) for file in FILES]
+    return sorted((name, lines) for name, lines in counted if lines > MANY_LINES)
+
+
+def test_long_files_are_few() -> None:
+    """More than a tenth of all files above 400 lines means that the rooms want dividing."""
+    print(f"files above {MANY_LINES} lines: {long_files()}")  # noqa: T201 - shown by pytest -rP, and when this fails
+    assert len(long_files()) <= len(FILES) / 10
+
+
+def code_of(file: Path) -> str:
+    """A file without comments and docstrings: prose may take its examples from the first field."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [
+                entry
+                for entry in body
+                if not (
+                    isinstance(entry, ast.Expr)
+                    and isinstance(entry.value, ast.Constant)
+                    and isinstance(entry.value.value, str)
+                )
+            ] or [ast.Pass()]
+    return ast.unparse(tree)
+
+
+@pytest.mark.parametrize("file", [file for file in FILES if file.parts[len(PACKAGE.parts)] not in FIELDS], ids=name_of)
+def test_nobody_else_knows_what_a_brake_is(file: Path) -> None:
+    code = code_of(file).replace(NAMED_IN_HELP.get(name_of(file), "\0"), "")
+    assert [line.strip() for line in code.splitlines() if BRAKE_WORDS.search(line)] == []
+
+
+def test_the_word_list_knows_a_brake_when_it_sees_one() -> None:
+    assert BRAKE_WORDS.search(code_of(PACKAGE / "airbrake" / "consist.py"))
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Names of the files in a wheel that was built just now."""
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+    subprocess.run(command, check=True, capture_output=True)
+    (file,) = folder.glob("*.whl")
+    return zipfile.ZipFile(file).namelist()
+
+
+def test_the_wheel_has_one_top_level_name(wheel: list[str]) -> None:
+    tops = {name.split("/")[0] for name in wheel}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"sysid"}
+
+
+def test_the_wheel_brings_the_content(wheel: list[str]) -> None:
+    for folder in ("datasets", "pipelines"):
+        for file in (ROOT / folder).rglob("*.yaml"):
+            assert f"sysid/content/{file.relative_to(ROOT).as_posix()}" in wheel
+    assert "sysid/workbench/template/pipelines/tank.yaml" in wheel
+    assert "sysid/py.typed" in wheel
+
+
+def test_entry_points_are_there() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    targets = [*project["scripts"].values(), *project["entry-points"]["sysid.generators"].values()]
+    for target in targets:
+        module, _, function = target.partition(":")
+        file = ROOT / (module.replace(".", "/") + ".py")
+        names = {node.name for node in ast.parse(file.read_text(encoding="utf-8")).body if hasattr(node, "name")}
+        assert function in names

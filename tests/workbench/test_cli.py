@@ -1,0 +1,209 @@
+"""The command line: exit codes, words, help, and every command on a user's own data."""
+
+from __future__ import annotations
+
+import signal
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.export import read_bundle
+from sysid.ingest import read_trace
+from sysid.workbench import cli
+from sysid.workbench.cli import run_cli
+
+SYSID = [str(Path(sys.executable).with_name("sysid"))]
+COMMANDS = ("run", "ingest", "simulate", "export", "report", "ui", "init")
+
+
+def test_help_is_quick() -> None:
+    seconds = []
+    for _ in range(5):
+        began = time.perf_counter()
+        subprocess.run([*SYSID, "--help"], check=True, stdout=subprocess.DEVNULL)
+        seconds.append(time.perf_counter() - began)
+    # The least of five: the machine may be busy with something else meanwhile.
+    assert min(seconds) < 0.5, statistics.median(seconds)
+
+
+def test_help_imports_nothing_heavy() -> None:
+    script = (
+        "import sys; from sysid.workbench.cli import run_cli; code = run_cli(['--help']); "
+        "print(sorted({'numpy', 'torch', 'mlflow', 'numba', 'pandas', 'pydantic'} & set(sys.modules)), code)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "[] 0"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_a_line_of_help_and_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_cli([command, "--help"]) == 0
+    text = capsys.readouterr().out
+    assert f"Example: sysid {command}" in text
+    assert run_cli(["--help"]) == 0
+    assert command in capsys.readouterr().out
+
+
+def test_no_tracking_command_names_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_cli(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("sysid ")
+
+
+USER_ERRORS = [
+    pytest.param(["run", "frist"], "did you mean first?", id="unknown pipeline"),
+    pytest.param(["run", "no.yaml"], "there is no such pipeline file", id="no such file"),
+    pytest.param(["run", "bad.yaml"], "did you mean mapping?", id="misspelt field"),
+    pytest.param(["run", "broken.yaml"], "not valid YAML", id="no YAML"),
+    pytest.param(["ingest", "no.csv"], "there is no data set", id="no file to ingest"),
+    pytest.param(["ingest", "empty.csv"], "empty.csv", id="empty file"),
+    pytest.param(["simulate", "nowhere", "run-1.csv", "--out", "out.csv"], "no model.json", id="no bundle"),
+    pytest.param(["export", "first", "--fit", "none"], "one of ARX, open loop, closed loop", id="unknown fit"),
+    pytest.param(["export", "first", "--fit", "ARX"], "run it first: sysid run first", id="fit that was not run"),
+    pytest.param(["report", "nowhere"], "holds no results", id="no run"),
+    pytest.param(["init", "."], "files of a workspace already", id="workspace that is there"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), USER_ERRORS)
+def test_a_users_mistake_has_code_2_and_no_trace(
+    workspace: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    (workspace / "bad.yaml").write_text("name: a\ndata: rig\nmaping: a -> b\n", encoding="utf-8")
+    (workspace / "broken.yaml").write_text("name: [", encoding="utf-8")
+    (workspace / "empty.csv").write_text("", encoding="utf-8")
+    (workspace / "README.md").write_text("mine", encoding="utf-8")
+    assert run_cli(arguments) == 2
+    told = capsys.readouterr().err
+    assert words in told
+    assert "Traceback" not in told
+    assert run_cli([*arguments, "--debug"]) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["bogus"], ["run"], ["run", "first", "--bogus"], ["ui", "--port", "many"]],
+    ids=["unknown command", "missing argument", "unknown option", "text for a number"],
+)
+def test_a_wrong_command_line_has_code_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_cli(arguments) == 2
+    told = capsys.readouterr().err
+    assert "Traceback" not in told
+    assert "Usage" in told
+
+
+def test_a_fault_of_ours_has_code_1_and_its_trace(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fault(*_: object, **__: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(cli, "app", fault)
+    assert run_cli(["run", "first"]) == 1
+    told = capsys.readouterr().err
+    assert "ZeroDivisionError" in told
+    assert "please report it" in told
+
+
+def test_stopping_has_the_code_of_the_signal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "app", stop)
+    assert run_cli(["run", "first"]) == 130
+    assert "goes on where this one was" in capsys.readouterr().err
+
+
+def sysid(workspace: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*SYSID, *arguments], cwd=workspace, capture_output=True, text=True, check=False)
+
+
+def test_a_workspace_of_ones_own_from_first_to_last(tmp_path: Path) -> None:
+    """What the workspace's README tells: init, run, simulate, export, report, each a process of its own."""
+    made = sysid(tmp_path, "init", "mine")
+    assert (made.returncode, made.stderr) == (0, "")
+    mine = tmp_path / "mine"
+    run = sysid(mine, "run", "tank", "--no-tracking")
+    assert (run.returncode, run.stderr) == (0, "")
+    lines = run.stdout.splitlines()
+    assert [line.split()[1] for line in lines if line.startswith("│") and "closed" in line] == ["free"]
+    assert "Report:  runs/tank/report/index.html" in lines
+    assert (mine / "runs/tank/report/index.html").is_file()
+    assert not (mine / "mlflow.db").exists()
+
+    simulated = sysid(mine, "simulate", "runs/tank/bundle", "datasets/tank/val.csv", "--out", "out.csv")
+    assert (simulated.returncode, simulated.stderr) == (0, "")
+    output, bundle = read_trace(mine / "out.csv"), read_bundle(mine / "runs/tank/bundle")
+    inputs = read_trace(mine / "datasets/tank/val.csv")
+    assert output.channel_names == ("pump", "level")
+    np.testing.assert_array_equal(output["level"], bundle.model.simulate(inputs.columns(["pump"])))
+
+    exported = sysid(mine, "export", "tank", "--fit", "ARX", "--out", "linear")
+    assert (exported.returncode, exported.stderr) == (0, "")
+    assert read_bundle(mine / "linear").model.structure.label == "ARX [2; 2; 1]"
+    assert read_bundle(mine / "runs/tank/bundle").model.structure.label == "NARX 2/2/5"
+
+    (mine / "runs/tank/report/index.html").unlink()
+    assert sysid(mine, "report", "runs/tank").returncode == 0
+    assert (mine / "runs/tank/report/index.html").is_file()
+
+
+def test_a_file_is_shown_and_a_data_set_proposed(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_cli(["ingest", "datasets/rig/run-1.csv"]) == 0
+    told = capsys.readouterr().out
+    assert "one sample every 0.05 s" in told
+    assert "outlet" in told
+    assert "sample_time: 0.05" in told
+    proposal = workspace / "datasets" / "rig" / "proposed.yaml"
+    assert run_cli(["ingest", "datasets/rig/run-1.csv", "--propose", str(proposal)]) == 0
+    assert run_cli(["ingest", str(proposal)]) == 0
+    assert "400" in capsys.readouterr().out
+    assert run_cli(["ingest", "datasets/rig/run-1.csv", "--propose", str(proposal)]) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
+def test_a_data_set_is_summed_up(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_cli(["ingest", "rig"]) == 0
+    told = capsys.readouterr().out
+    for word in ("run-2", "selection", "outlet [kPa gauge]", "400", "digest"):
+        assert word in told
+
+
+def test_untracked_results_are_done_but_not_code_0(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (workspace / "file").write_text("no folder", encoding="utf-8")
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", f"sqlite:///{workspace}/file/mlflow.db")
+    assert run_cli(["run", "first"]) == 1
+    told = capsys.readouterr().out
+    assert "not all of it is tracked" in told
+    assert (workspace / "runs" / "first" / "report" / "index.html").is_file()
+
+
+def test_ctrl_c_ends_a_fit_and_keeps_its_model(workspace: Path) -> None:
+    file = workspace / "pipelines" / "first.yaml"
+    # Some 1,600 parameters: an iteration takes a tenth of a second, and hundreds of them are needed.
+    text = file.read_text(encoding="utf-8").replace("    initial: open loop\n", "")
+    for old, new in (("delays: 1", "delays: 8"), ("neurons: 2", "neurons: 60"), ("8}", "100000}")):
+        text = text.replace(old, new, 2 if old == "delays: 1" else 1)
+    file.write_text(text, encoding="utf-8")
+    process = subprocess.Popen([*SYSID, "run", "first", "--no-tracking"], stdout=subprocess.PIPE, text=True)
+    log = workspace / "runs" / "first" / "log.txt"
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline and not (
+        log.exists() and "Fitting open loop, NARX 8/8/60 ..." in log.read_text()
+    ):
+        time.sleep(0.05)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    told, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "closed loop" in told
+    assert '"status": "INTERRUPTED"' in (workspace / "runs" / "first" / "results.json").read_text()
