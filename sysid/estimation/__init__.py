@@ -1,7 +1,22 @@
 """Traces and a structure in, a FitResult out."""
 
 from sysid.estimation.arx import fit_arx
+from sysid.estimation.instrumental import fit_iv4
 from sysid.estimation.narx import FitProgress, Training, fit_narx
+from sysid.estimation.operating_point import OperatingPoint
 from sysid.estimation.result import Evidence, FitResult, Loop, Status
+from sysid.estimation.uncertainty import Uncertainty
 
-__all__ = ["Evidence", "FitProgress", "FitResult", "Loop", "Status", "Training", "fit_arx", "fit_narx"]
+__all__ = [
+    "Evidence",
+    "FitProgress",
+    "FitResult",
+    "Loop",
+    "OperatingPoint",
+    "Status",
+    "Training",
+    "Uncertainty",
+    "fit_arx",
+    "fit_iv4",
+    "fit_narx",
+]

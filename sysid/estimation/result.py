@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import AbstractModel, model_from_dict
 
 
@@ -48,6 +49,7 @@ class Evidence:
         alphas: Precision of the prior of each group of weights.
         effective_parameters: Number of parameters that the data determine, per group.
         parameters: Number of parameters, per group.
+        correlation_time: Samples after which a residual counted as new information.
     """
 
     log_evidence: float
@@ -55,6 +57,7 @@ class Evidence:
     alphas: Dict[str, float]
     effective_parameters: Dict[str, float]
     parameters: Dict[str, int]
+    correlation_time: float = 1.0
 
     @property
     def total_effective_parameters(self) -> float:
@@ -75,6 +78,7 @@ class FitResult:
         train_time_s: Wall time of the fit in seconds.
         seed: Seed of its random start; ``None`` where nothing is random.
         evidence: From Bayesian regularisation, where it was used.
+        uncertainty: Of the parameters, where the estimator knows it.
         notes: Sentences worth knowing: choices made, restarts compared, stability.
     """
 
@@ -85,6 +89,7 @@ class FitResult:
     train_time_s: float
     seed: int | None = None
     evidence: Evidence | None = None
+    uncertainty: Uncertainty | None = None
     notes: tuple[str, ...] = field(default=())
 
     def to_dict(self) -> dict[str, Any]:
@@ -105,7 +110,9 @@ class FitResult:
                 "alphas": dict(evidence.alphas),
                 "effective_parameters": dict(evidence.effective_parameters),
                 "parameters": dict(evidence.parameters),
+                "correlation_time": evidence.correlation_time,
             },
+            "uncertainty": None if self.uncertainty is None else self.uncertainty.to_dict(),
             "notes": list(self.notes),
         }
 
@@ -127,5 +134,6 @@ class FitResult:
             train_time_s=fields["train_time_s"],
             seed=fields["seed"],
             evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
+            uncertainty=None if fields.get("uncertainty") is None else Uncertainty.from_dict(fields["uncertainty"]),
             notes=tuple(fields["notes"]),
         )

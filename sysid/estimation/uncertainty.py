@@ -1,0 +1,76 @@
+"""Uncertainty: how well the data determine the parameters of a linear model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Uncertainty:
+    r"""Estimates with their covariance, under white residuals and a true structure.
+
+    Args:
+        names: What each parameter is.
+        values: Estimates, shape ``(n_parameters,)``.
+        covariance: Shape ``(n_parameters, n_parameters)``; NaN in rows of parameters that the data do not determine.
+        noise_variance: Variance of the residuals, :math:`\sum e^2 / (N - p)`, in the output's unit squared.
+
+    Example:
+        >>> u = Uncertainty(names=("a1",), values=np.array([0.5]), covariance=np.array([[0.01]]), noise_variance=1.0)
+        >>> u.interval(0.95).round(3).tolist()
+        [[0.304, 0.696]]
+    """
+
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    noise_variance: float
+
+    @property
+    def standard_deviations(self) -> NDArray[np.float64]:
+        """One standard deviation of each estimate, shape ``(n_parameters,)``."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def interval(self, probability: float = 0.95) -> NDArray[np.float64]:
+        """Two-sided interval of each parameter, from the normal distribution.
+
+        Args:
+            probability: That it holds the true value.
+
+        Returns:
+            Shape ``(n_parameters, 2)``.
+        """
+        half = stats.norm.ppf(0.5 + 0.5 * probability) * self.standard_deviations
+        return np.column_stack([self.values - half, self.values + half])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        return {
+            "names": list(self.names),
+            "values": self.values.tolist(),
+            "covariance": self.covariance.tolist(),
+            "noise_variance": self.noise_variance,
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> Uncertainty:
+        """The uncertainty that :meth:`to_dict` wrote.
+
+        Args:
+            fields: What it wrote.
+
+        Returns:
+            The uncertainty.
+        """
+        return cls(
+            names=tuple(fields["names"]),
+            values=np.asarray(fields["values"], dtype=np.float64),
+            covariance=np.asarray(fields["covariance"], dtype=np.float64),
+            noise_variance=float(fields["noise_variance"]),
+        )

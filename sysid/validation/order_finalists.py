@@ -1,0 +1,142 @@
+"""The second half of an ARX order search: the free run of a shortlist on every case, and the best kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.arx import fit_arx
+from sysid.estimation.order_search import OrderLosses
+from sysid.estimation.result import FitResult
+from sysid.models import Mapping, Start
+from sysid.traces import Trace
+from sysid.validation.metrics import Figures, figures
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Finalist:
+    """One candidate in free run.
+
+    Args:
+        fit: The fitted model.
+        cases: Figures of the free run by name of the case.
+        one_step_mse: Mean squared one-step error on the estimation traces.
+    """
+
+    fit: FitResult
+    cases: dict[str, Figures]
+    one_step_mse: float
+
+    @property
+    def mean_fit(self) -> float:
+        """Mean NRMSE fit over the cases in percent; minus infinity where a free run is not finite."""
+        return float(np.mean([case.nrmse_fit for case in self.cases.values()]))
+
+    @property
+    def std_fit(self) -> float:
+        """Standard deviation of the NRMSE fit over the cases in percent; NaN where a free run is not finite."""
+        fits = np.array([case.nrmse_fit for case in self.cases.values()])
+        return float(np.std(fits)) if np.isfinite(fits).all() else float("nan")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figures and the structure as JSON values."""
+        return {
+            "structure": self.fit.model.structure.to_dict(),
+            "n_parameters": self.fit.model.n_parameters,
+            "one_step_mse": self.one_step_mse,
+            "cases": {name: case.to_dict() for name, case in self.cases.items()},
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Finalists:
+    """A shortlist, the best mean fit first.
+
+    Args:
+        ranked: The candidates.
+        unstable: How many of them ran away on some case.
+    """
+
+    ranked: tuple[Finalist, ...]
+    unstable: int
+
+    @property
+    def best(self) -> Finalist:
+        """The candidate with the highest mean fit over the cases."""
+        return self.ranked[0]
+
+
+def _ignore(_done: int, _total: int) -> None:
+    """The callback of those who do not watch."""
+
+
+def run_finalists(
+    losses: OrderLosses,
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    cases: Sequence[Trace],
+    *,
+    count: int = 500,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    workers: int = 2,
+    on_progress: Callable[[int, int], None] = _ignore,
+) -> Finalists:
+    """Fit a shortlist and run each model freely over every case.
+
+    Args:
+        losses: All candidates.
+        traces: Estimation traces, those of the search.
+        mapping: Which channels go in, which comes out.
+        cases: What chooses. A score on a case counts only if nothing was chosen on it: give selection traces.
+        count: Length of the shortlist.
+        start: How each free run begins, as in the search.
+        rest_output: Output at rest in its unit, as in the search.
+        workers: Threads.
+        on_progress: Told after each candidate how many are done, and of how many.
+
+    Returns:
+        The candidates, best mean fit first.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+    """
+    chosen = losses.shortlist(count)
+    begin = start or Start()
+
+    def one(index: int) -> Finalist:
+        fit = fit_arx(traces, mapping, losses.orders(index), start=begin, rest_output=rest_output)
+        runs = {case.name: free_run_figures(fit, case, begin) for case in cases}
+        return Finalist(fit=fit, cases=runs, one_step_mse=float(losses.mse[index]))
+
+    finalists = []
+    with ThreadPoolExecutor(workers) as pool:
+        for finalist in pool.map(one, chosen.tolist()):
+            finalists.append(finalist)
+            on_progress(len(finalists), len(chosen))
+    ranked = sorted(finalists, key=lambda entry: -entry.mean_fit)
+    return Finalists(ranked=tuple(ranked), unstable=sum(not np.isfinite(entry.mean_fit) for entry in ranked))
+
+
+def free_run_figures(fit: FitResult, case: Trace, start: Start) -> Figures:
+    """Figures of one free run.
+
+    Args:
+        fit: The fitted model.
+        case: The trace.
+        start: How the free run begins, and from which sample on it is scored.
+
+    Returns:
+        The figures.
+    """
+    model = fit.model
+    inputs, target = case.columns(model.mapping.inputs), case.columns([model.mapping.output])[:, 0]
+    history = start.history(inputs, target, model.rest_output)
+    scored = slice(start.n_measured, None)
+    output: NDArray[np.float64] = model.simulate(inputs[scored], history)
+    return figures(target[scored], output, model.output_unit, case.usable_samples[scored])
