@@ -4,11 +4,13 @@ torch, onnx and onnxruntime are imported when a file is written or run, not here
 """
 
 from sysid.export.bundle import Bundle, BundleFile, export_bundle
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, run_sequence
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run
 from sysid.export.exporters import EXPORTERS, exporter
+from sysid.export.flags import Flag, expected_flags
 from sysid.export.layout import DelayLine, StateLayout
-from sysid.export.parity import Parity, ParityCase, check_parity, parity_cases
+from sysid.export.parity import Parity, ParityCase, check_parity, parity_cases, random_cases
 from sysid.export.reading import read_bundle
+from sysid.export.surrogate import Port, Stage, Surrogate
 
 __all__ = [
     "EXPORTERS",
@@ -17,15 +19,20 @@ __all__ = [
     "BundleFile",
     "DelayLine",
     "ExportedFile",
+    "Flag",
     "Kind",
     "Parity",
     "ParityCase",
+    "Port",
     "Run",
+    "Stage",
     "StateLayout",
+    "Surrogate",
     "check_parity",
+    "expected_flags",
     "export_bundle",
     "exporter",
     "parity_cases",
+    "random_cases",
     "read_bundle",
-    "run_sequence",
 ]

@@ -17,8 +17,19 @@ from sysid.errors import ConfigError
 from sysid.estimation.result import FitResult
 from sysid.export.card import model_card
 from sysid.export.exporters import exporter
-from sysid.export.manifest import CARD, MANIFEST, Metrics, describe, file_entry, seal, sha256
-from sysid.export.parity import check_parity, parity_cases
+from sysid.export.manifest import (
+    CARD,
+    MANIFEST,
+    Metrics,
+    amplification,
+    declared_ranges,
+    describe,
+    file_entry,
+    seal,
+    sha256,
+)
+from sysid.export.parity import check_parity, parity_cases, random_cases
+from sysid.export.surrogate import Surrogate
 from sysid.models import AbstractModel, Start
 from sysid.traces import TraceSet
 
@@ -33,8 +44,8 @@ class BundleFile:
         kind: ``"step"`` or ``"sequence"``.
         dtype: Of the numbers.
         sha256: Of the bytes.
-        largest_difference: From the model, over all cases, in the output's unit.
-        case: Where it occurred.
+        largest_difference: From the model, over all cases and random sequences, in the output's unit.
+        case: The case with the largest difference.
         tolerance: What was allowed.
     """
 
@@ -73,6 +84,7 @@ def export_bundle(
     start: Start,
     formats: Sequence[str] = ("onnx", "torchscript"),
     tolerance: float = 1e-9,
+    tolerance_float32: float = 1e-3,
     metrics: Metrics | None = None,
     provenance: Dict[str, Any] | None = None,
 ) -> Bundle:
@@ -88,6 +100,7 @@ def export_bundle(
         start: How the free run over each case begins.
         formats: Names of exporters.
         tolerance: Largest difference from the model allowed, in the output's unit.
+        tolerance_float32: The same for files that compute in float32.
         metrics: The model's figures on the cases, as :func:`sysid.validation.evaluate` gives them.
         provenance: JSON values about where the fit comes from, kept as they are.
 
@@ -102,12 +115,19 @@ def export_bundle(
     """
     writers = [exporter(name) for name in dict.fromkeys(formats)]
     _check_finite(fit.model)
-    model, cases = fit.model, parity_cases(fit.model, traces, start)
+    model = fit.model
+    surrogate = Surrogate.of(model, declared_ranges(model, traces))
+    cases, sequences = parity_cases(model, traces, start), random_cases(surrogate)
+    allowed = {"float64": tolerance, "float32": max(tolerance, tolerance_float32)}
     with _published(Path(folder)) as draft:
-        written = [file for writer in writers for file in writer.write(model, draft)]
-        checked = [(file, check_parity(file, draft, model, cases, tolerance)) for file in written]
+        written = [file for writer in writers for file in writer.write(surrogate, draft)]
+        checked = [
+            check_parity(file, draft, cases, sequences, tolerance=allowed[file.dtype], unit=model.output_unit)
+            for file in written
+        ]
         manifest = describe(fit, traces, start, metrics, provenance or {})
-        manifest["files"] = [file_entry(file, parity, draft) for file, parity in checked]
+        manifest["amplification"] = amplification(cases, sequences)
+        manifest["files"] = [file_entry(file, parity, draft) for file, parity in zip(written, checked, strict=True)]
         (draft / CARD).write_text(model_card(manifest), encoding="utf-8", newline="\n")
         manifest["card"] = {"name": CARD, "sha256": sha256(draft / CARD)}
         (draft / MANIFEST).write_text(seal(manifest), encoding="utf-8", newline="\n")
@@ -130,7 +150,9 @@ def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
             kind=entry["kind"],
             dtype=entry["dtype"],
             sha256=entry["sha256"],
-            largest_difference=entry["parity"]["largest_difference"],
+            largest_difference=max(
+                entry["parity"]["largest_difference"], entry["parity"].get("random_difference", 0.0)
+            ),
             case=entry["parity"]["case"],
             tolerance=entry["parity"]["tolerance"],
         )

@@ -1,4 +1,4 @@
-"""What an exporter is: it writes files for a model, and can run the files that it wrote."""
+"""What an exporter is: it writes files for a surrogate, and can run the files that it wrote."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models import AbstractModel
+from sysid.export.surrogate import Surrogate
 
 
 class Kind(enum.Enum):
@@ -32,6 +32,7 @@ class ExportedFile:
         kind: What one call does.
         dtype: ``"float64"`` or ``"float32"``: of inputs, outputs and arithmetic.
         details: What a receiver must know, such as the opset.
+        companions: Names of files that it needs beside it, such as a header.
     """
 
     name: str
@@ -39,24 +40,27 @@ class ExportedFile:
     kind: Kind
     dtype: str = "float64"
     details: dict[str, Any] = field(default_factory=dict)
+    companions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """What one call of an exported file gives.
+    """What a run of an exported file gives.
 
     Args:
-        output: In its unit, shape ``(n_samples, n_cars, 1)``; a step file's has no time axis.
+        output: In its unit, shape ``(n_samples, n_cars, n_outputs)``.
         state: State after the last sample, shape ``(n_cars, n_state)``.
+        flags: Bits of :class:`sysid.export.Flag`, shape ``(n_samples, n_cars)``.
     """
 
     output: NDArray[Any]
     state: NDArray[Any]
+    flags: NDArray[Any]
 
 
 Runner = Callable[[NDArray[Any], NDArray[Any]], Run]
 """Runs a loaded file on inputs in their units, ``(n_samples, n_cars, n_inputs)``, and a state,
-``(n_cars, n_state)``. A step file's takes and gives one sample, without the time axis."""
+``(n_cars, n_state)``."""
 
 
 class AbstractExporter(ABC):
@@ -66,11 +70,11 @@ class AbstractExporter(ABC):
     """Name in the table, in pipelines and in ``model.json``."""
 
     @abstractmethod
-    def write(self, model: AbstractModel, folder: Path) -> tuple[ExportedFile, ...]:
-        """Write the model's files.
+    def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
+        """Write the surrogate's files.
 
         Args:
-            model: The model.
+            surrogate: What to write.
             folder: Where to; it exists.
 
         Returns:
@@ -78,34 +82,36 @@ class AbstractExporter(ABC):
         """
 
     @abstractmethod
-    def load(self, path: Path) -> Runner:
+    def load(self, file: ExportedFile, folder: Path) -> Runner:
         """Make a file of this format ready to run.
 
         Args:
-            path: The file.
+            file: The file, as :meth:`write` described it.
+            folder: Where it lies.
 
         Returns:
             What runs it, on one thread.
         """
 
 
-def run_sequence(runner: Runner, kind: Kind, inputs: NDArray[Any], state: NDArray[Any]) -> Run:
-    """Run a file over a whole record, calling a step file once a sample.
+def step_by_step(step: Runner) -> Runner:
+    """A runner that calls a file once a sample and hands the state on.
 
     Args:
-        runner: The loaded file.
-        kind: What one call of it does.
-        inputs: Shape ``(n_samples, n_cars, n_inputs)``, in their units.
-        state: Shape ``(n_cars, n_state)``.
+        step: Runs one sample: ``(n_cars, n_inputs)`` in, an output of ``(n_cars, n_outputs)`` and flags of
+            ``(n_cars,)`` out.
 
     Returns:
-        The output of every sample, and the last state.
+        What runs whole records.
     """
-    if kind is Kind.SEQUENCE:
-        return runner(inputs, state)
-    outputs = []
-    for sample in inputs:
-        run = runner(sample, state)
-        outputs.append(run.output)
-        state = run.state
-    return Run(output=np.stack(outputs), state=state)
+
+    def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+        outputs, flags = [], []
+        for sample in inputs:
+            one = step(sample, state)
+            outputs.append(one.output)
+            flags.append(one.flags)
+            state = one.state
+        return Run(output=np.stack(outputs), state=state, flags=np.stack(flags))
+
+    return run

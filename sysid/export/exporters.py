@@ -11,6 +11,7 @@ EXPORTERS: dict[str, AbstractExporter] = {
     exporter.name: exporter
     for exporter in (
         OnnxExporter(),
+        OnnxExporter(name="onnx-float32", dtype="float32"),
         TorchScriptExporter(),
     )
 }

@@ -7,6 +7,7 @@ import json
 import math
 import platform
 from collections.abc import Mapping as Dict
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,8 +16,9 @@ import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
 from sysid.export.layout import StateLayout
-from sysid.export.parity import Parity
-from sysid.models import History, Start
+from sysid.export.parity import Parity, ParityCase
+from sysid.export.surrogate import Range
+from sysid.models import AbstractModel, History, Start
 from sysid.traces import Role, Trace, TraceSet
 
 SCHEMA_VERSION = 1
@@ -117,6 +119,7 @@ def file_entry(file: ExportedFile, parity: Parity, folder: Path) -> dict[str, An
         "kind": file.kind.value,
         "dtype": file.dtype,
         "details": dict(file.details),
+        "companions": list(file.companions),
         "sha256": sha256(folder / file.name),
         "parity": parity.to_dict(),
     }
@@ -160,16 +163,54 @@ def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def declared_ranges(model: AbstractModel, traces: TraceSet) -> dict[str, Range]:
+    """The range that each input has in the estimation traces, which is what a bundle is declared for.
+
+    Args:
+        model: The model.
+        traces: The cases.
+
+    Returns:
+        By channel; empty without estimation traces.
+    """
+    estimation = traces.with_role(Role.ESTIMATION)
+    return {name: found for name in model.mapping.inputs if (found := _range(name, estimation))}
+
+
+def amplification(cases: Sequence[ParityCase], sequences: Sequence[ParityCase]) -> dict[str, Any]:
+    """How much the model's free run makes of a small change of its output before the first sample.
+
+    Args:
+        cases: The cases.
+        sequences: The random sequences.
+
+    Returns:
+        JSON values.
+    """
+    worst = max((*cases, *sequences), key=lambda case: case.amplification)
+    return {
+        "largest": worst.amplification if math.isfinite(worst.amplification) else None,
+        "case": worst.name,
+        "meaning": "largest change of an output over the change of the output before the first sample that caused it; "
+        "a difference in the last digit of a number grows by as much",
+    }
+
+
+def _range(name: str, estimation: tuple[Trace, ...]) -> Range | None:
+    if not estimation:
+        return None
+    return min(float(t[name].min()) for t in estimation), max(float(t[name].max()) for t in estimation)
+
+
 def _channel(name: str, unit: str, traces: TraceSet, estimation: tuple[Trace, ...]) -> dict[str, Any]:
     channel = traces.traces[0].channel(name)
+    found = _range(name, estimation)
     return {
         "name": name,
         "unit": unit,
         "reference": channel.reference.value,
         "description": channel.description,
-        "range": [min(float(t[name].min()) for t in estimation), max(float(t[name].max()) for t in estimation)]
-        if estimation
-        else None,
+        "range": None if found is None else list(found),
     }
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sysid
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner
-from sysid.models import AbstractModel
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
+from sysid.export.surrogate import Surrogate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +19,7 @@ class OnnxExporter(AbstractExporter):
     """Writes ``step.onnx`` and ``sequence.onnx``.
 
     Args:
-        name: Name in the table.
+        name: Name in the table; both number types are in it.
         dtype: ``"float64"`` or ``"float32"``, of inputs, outputs and arithmetic; it stands in the file name if
             it is not the first.
     """
@@ -27,7 +27,7 @@ class OnnxExporter(AbstractExporter):
     name: str = "onnx"
     dtype: str = "float64"
 
-    def write(self, model: AbstractModel, folder: Path) -> tuple[ExportedFile, ...]:
+    def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
         """Write both graphs; both have passed the full checker."""
         from sysid.export.onnx_nodes import IR_VERSION, OPSET, checked_model
         from sysid.export.onnx_sequence import sequence_graph
@@ -36,25 +36,25 @@ class OnnxExporter(AbstractExporter):
         files = []
         suffix = "" if self.dtype == "float64" else f".{self.dtype}"
         for kind, build in ((Kind.STEP, step_graph), (Kind.SEQUENCE, sequence_graph)):
-            proto = checked_model(build(model, self.dtype), model, sysid.__version__)
+            proto = checked_model(build(surrogate, self.dtype), surrogate, sysid.__version__)
             name = f"{kind.value}{suffix}.onnx"
             (folder / name).write_bytes(proto.SerializeToString(deterministic=True))
             details = {"opset": OPSET, "domain": "ai.onnx", "ir_version": IR_VERSION}
             files.append(ExportedFile(name=name, format=self.name, kind=kind, dtype=self.dtype, details=details))
         return tuple(files)
 
-    def load(self, path: Path) -> Runner:
+    def load(self, file: ExportedFile, folder: Path) -> Runner:
         """Open the file in onnxruntime on one thread: the graph is a chain of small steps."""
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
-        session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
-        dtype = np.dtype(self.dtype)
+        session = onnxruntime.InferenceSession(folder / file.name, options, providers=["CPUExecutionProvider"])
+        dtype = np.dtype(file.dtype)
 
         def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
             feed = {"u": np.asarray(inputs, dtype=dtype), "state": np.asarray(state, dtype=dtype)}
-            output, state_out = session.run(["y", "state_out"], feed)
-            return Run(output=output, state=state_out)
+            output, state_out, flags = session.run(["y", "state_out", "flags"], feed)
+            return Run(output=output, state=state_out, flags=flags[..., 0])
 
-        return run
+        return run if file.kind is Kind.SEQUENCE else step_by_step(run)

@@ -10,7 +10,7 @@ import onnx
 from numpy.typing import ArrayLike, DTypeLike
 from onnx import helper, numpy_helper
 
-from sysid.models import AbstractModel
+from sysid.export.surrogate import Surrogate
 
 OPSET = 17
 """Old enough for runtimes from 2022 on (onnxruntime 1.12), and it has every operator used, Clip and Scan in float64."""
@@ -34,6 +34,12 @@ class Nodes:
         self.nodes: list[Any] = []
         self.constants: dict[str, Any] = {}
 
+    def within(self, prefix: str) -> Nodes:
+        """The same graph, with other names: for one of several stages."""
+        part = Nodes(self.dtype, prefix)
+        part.nodes, part.constants = self.nodes, self.constants
+        return part
+
     def numbers(self, name: str, values: ArrayLike) -> str:
         """Add a constant of the graph's number type."""
         return self._constant(name, np.asarray(values, dtype=self.dtype))
@@ -43,6 +49,10 @@ class Nodes:
         array = np.asarray(values, dtype=np.int64)
         text = "_".join("end" if value == TO_END else str(value) for value in array.ravel())
         return self._constant(f"index{array.ndim}_{text}", array)
+
+    def whole(self, value: int) -> str:
+        """Add an int32 constant."""
+        return self._constant(f"whole_{value}", np.asarray(value, dtype=np.int32))
 
     def _constant(self, name: str, array: Any) -> str:
         name = self.prefix + name
@@ -59,16 +69,18 @@ class Nodes:
         self, states: Sequence[str], scanned: Sequence[str], ends: Sequence[str], output: str, body: Any
     ) -> str:
         """Add a loop over the first axis of ``scanned``; gives back the name of its one output by sample."""
-        outputs = [*ends, output]
+        outputs = [self.prefix + name for name in (*ends, output)]
         inputs = [*states, *scanned]
         self.nodes.append(
-            helper.make_node("Scan", inputs, outputs, name="loop", body=body, num_scan_inputs=len(scanned))
+            helper.make_node(
+                "Scan", inputs, outputs, name=f"{self.prefix}loop", body=body, num_scan_inputs=len(scanned)
+            )
         )
-        return output
+        return outputs[-1]
 
-    def value(self, name: str, shape: Sequence[int | str], doc: str = "") -> Any:
+    def value(self, name: str, shape: Sequence[int | str], doc: str = "", dtype: DTypeLike | None = None) -> Any:
         """Describe an input or output of the graph."""
-        kind = helper.np_dtype_to_tensor_dtype(self.dtype)
+        kind = helper.np_dtype_to_tensor_dtype(np.dtype(dtype or self.dtype))
         return helper.make_tensor_value_info(self.prefix + name, kind, list(shape), doc_string=doc)
 
     def graph(self, name: str, inputs: Sequence[Any], outputs: Sequence[Any]) -> Any:
@@ -76,12 +88,12 @@ class Nodes:
         return helper.make_graph(self.nodes, name, list(inputs), list(outputs), list(self.constants.values()))
 
 
-def checked_model(graph: Any, model: AbstractModel, version: str) -> Any:
+def checked_model(graph: Any, surrogate: Surrogate, version: str) -> Any:
     """A complete ONNX model that has passed the full checker.
 
     Args:
         graph: Its graph.
-        model: The model it came from, whose units are written into its metadata.
+        surrogate: What it came from; channels, units and ranges are written into the metadata.
         version: Of the workbench.
 
     Returns:
@@ -97,11 +109,12 @@ def checked_model(graph: Any, model: AbstractModel, version: str) -> Any:
     helper.set_model_props(
         proto,
         {
-            "mapping": str(model.mapping),
-            "structure": model.structure.label,
-            "sample_time_s": repr(model.sample_time),
-            "input_units": ", ".join(model.input_units),
-            "output_unit": model.output_unit,
+            "mapping": surrogate.mapping,
+            "structure": surrogate.label,
+            "sample_time_s": repr(surrogate.sample_time),
+            "input_units": ", ".join(port.unit for port in surrogate.inputs),
+            "input_ranges": ", ".join(f"{port.low!r} to {port.high!r}" for port in surrogate.inputs),
+            "output_unit": ", ".join(port.unit for port in surrogate.outputs),
         },
     )
     onnx.checker.check_model(proto, full_check=True)

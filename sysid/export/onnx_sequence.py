@@ -13,50 +13,47 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
+from onnx import numpy_helper
 
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import TO_END, Nodes
-from sysid.export.onnx_step import STATE_TEXT, clipped, input_text, output_text, scaled_inputs, unscaled_output
-from sysid.models import AbstractModel, Lags, Recursion
+from sysid.export.onnx_step import clipped, ends, run_stages, scaled_inputs, unscaled_output
+from sysid.export.surrogate import Stage, Surrogate
+from sysid.models import Lags
 
 
-def sequence_graph(model: AbstractModel, dtype: DTypeLike) -> Any:
+def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     """The graph of a free run.
 
-    Inputs ``u (time, batch, n_inputs)`` in units and ``state (batch, n_state)``; outputs ``y (time, batch, 1)``
-    in its unit and ``state_out (batch, n_state)``, so that a run in pieces equals one long run.
+    Inputs ``u (time, batch, n_inputs)`` in units and ``state (batch, n_state)``; outputs ``y (time, batch,
+    n_outputs)`` in their units, ``state_out (batch, n_state)``, so that a run in pieces equals one long run, and
+    ``flags (time, batch, 1)``. Each stage of a cascade runs over all samples before the next one does.
 
     Args:
-        model: The model.
+        surrogate: What to write.
         dtype: Of the numbers.
 
     Returns:
         The ``GraphProto``.
     """
-    layout, recursion, nodes = StateLayout.of(model), model.recursion, Nodes(dtype)
+    nodes = Nodes(dtype)
+    run_stages(nodes, surrogate, _stage)
+    return nodes.graph("sequence", *ends(nodes, surrogate, ["time", "batch"]))
+
+
+def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, str, str]:
+    layout, recursion = stage.layout, stage.recursion
     n_inputs, longest = recursion.lags.n_inputs, max(line.length for line in layout.inputs)
-    scaled = scaled_inputs(nodes, "u", recursion)
-    history = _with_past(nodes, layout, scaled, longest)
+    scaled = scaled_inputs(nodes, inputs, recursion)
+    history = _with_past(nodes, layout, scaled, state, longest)
     columns = _input_columns(recursion.lags)
     regressors = _input_regressors(nodes, columns, history, n_inputs, longest)
     line = layout.output
     span = [nodes.integers([line.first]), nodes.integers([TO_END]), nodes.integers([1])]
-    past = nodes.add("Slice", ["state", *span], "output_line")
-    body = _scan_body(recursion, columns, line.length, nodes.dtype)
+    past = nodes.add("Slice", [state, *span], "output_line")
+    body = _scan_body(stage, columns, line.length, nodes)
     output = nodes.add_scan([past], [regressors], ["output_line_end"], "y_scaled", body)
-    unscaled_output(nodes, output, recursion)
-    _state_out(nodes, layout, history, longest)
-    return nodes.graph(
-        "sequence",
-        [
-            nodes.value("u", ["time", "batch", n_inputs], input_text(model)),
-            nodes.value("state", ["batch", layout.size], STATE_TEXT),
-        ],
-        [
-            nodes.value("y", ["time", "batch", 1], output_text(model)),
-            nodes.value("state_out", ["batch", layout.size], STATE_TEXT),
-        ],
-    )
+    return output, unscaled_output(nodes, output, recursion), _state_out(nodes, layout, history, longest)
 
 
 def _input_columns(lags: Lags) -> list[tuple[int, int, int]]:
@@ -65,14 +62,14 @@ def _input_columns(lags: Lags) -> list[tuple[int, int, int]]:
     return sorted((lag, i, place) for place, (lag, i) in enumerate(pairs))
 
 
-def _with_past(nodes: Nodes, layout: StateLayout, scaled: str, longest: int) -> str:
+def _with_past(nodes: Nodes, layout: StateLayout, scaled: str, state: str, longest: int) -> str:
     """The inputs with ``longest`` samples before them, oldest first: ``(longest + time, batch, n_inputs)``."""
     if longest == 0:
         return scaled
     # An input with a shorter line is filled up with its oldest sample, which no regressor reads.
     lags = range(longest, 0, -1)
     columns = [line.column(min(lag, line.length)) if line.length else 0 for lag in lags for line in layout.inputs]
-    past = nodes.add("Gather", ["state", nodes.integers(columns)], "past_inputs_by_car", axis=1)
+    past = nodes.add("Gather", [state, nodes.integers(columns)], "past_inputs_by_car", axis=1)
     shape = nodes.integers([0, longest, len(layout.inputs)])
     past = nodes.add("Reshape", [past, shape], "past_inputs_table")
     past = nodes.add("Transpose", [past], "past_inputs", perm=[1, 0, 2])
@@ -89,7 +86,12 @@ def _input_regressors(
         bounds = [nodes.integers([longest - lag]), nodes.integers([-lag if lag else TO_END]), nodes.integers([0])]
         cuts.append(nodes.add("Slice", [history, *bounds], f"u_lag_{lag}"))
     table = nodes.add("Concat", cuts, "u_lagged", axis=2)
-    if not columns or len(columns) == len(lags) * n_inputs:
+    if not columns:
+        # The loop needs something to run over; zeros, because an input that the model does not read may be NaN.
+        shape = nodes.add("Shape", [table], "u_lagged_shape")
+        zero = numpy_helper.from_array(np.zeros(1, dtype=nodes.dtype))
+        return nodes.add("ConstantOfShape", [shape], "nothing_used", value=zero)
+    if len(columns) == len(lags) * n_inputs:
         return table
     used = nodes.integers([lags.index(lag) * n_inputs + i for lag, i, _ in columns])
     return nodes.add("Gather", [table, used], "u_used", axis=2)
@@ -97,7 +99,7 @@ def _input_regressors(
 
 def _state_out(nodes: Nodes, layout: StateLayout, history: str, longest: int) -> str:
     """The state after the last sample, from the ends of the inputs and of the output."""
-    ends, n_inputs = ["output_line_end"], len(layout.inputs)
+    ends, n_inputs = [f"{nodes.prefix}output_line_end"], len(layout.inputs)
     columns = [lag - 1 for lag in range(1, layout.output.length + 1)]
     if longest:
         back = [nodes.integers([-1]), nodes.integers([-longest - 1]), nodes.integers([0]), nodes.integers([-1])]
@@ -111,10 +113,10 @@ def _state_out(nodes: Nodes, layout: StateLayout, history: str, longest: int) ->
     return nodes.add("Gather", [row, nodes.integers(columns)], "state_out", axis=1)
 
 
-def _scan_body(recursion: Recursion, columns: list[tuple[int, int, int]], length: int, dtype: DTypeLike) -> Any:
+def _scan_body(stage: Stage, columns: list[tuple[int, int, int]], length: int, outer: Nodes) -> Any:
     """One step: the output's past and the input regressors in, the shifted past and the output out."""
-    nodes, lags = Nodes(dtype, prefix="body_"), recursion.lags
-    past, x = "body_past", "body_x"
+    recursion, nodes = stage.recursion, Nodes(outer.dtype, prefix=f"{outer.prefix}body_")
+    lags, past, x = recursion.lags, f"{nodes.prefix}past", f"{nodes.prefix}x"
     if lags.output:
         lagged = past
         if lags.output != tuple(range(1, length + 1)):
@@ -130,7 +132,7 @@ def _scan_body(recursion: Recursion, columns: list[tuple[int, int, int]], length
         x = nodes.add("Concat", [hidden, x], "neurons_and_regressors", axis=1)
         w = np.concatenate([recursion.readout[np.newaxis], w], axis=1)
     constant = nodes.numbers("c", [recursion.constant])
-    output = clipped(nodes, nodes.add("Gemm", [x, nodes.numbers("v_and_w", w.T), constant], "output"), recursion)
+    output = clipped(nodes, nodes.add("Gemm", [x, nodes.numbers("v_and_w", w.T), constant], "output"), stage)
     span = [nodes.integers([0]), nodes.integers([length - 1]), nodes.integers([1])]
     nodes.add("Concat", [output, nodes.add("Slice", [past, *span], "kept")], "past_out", axis=1)
     n_columns = len(columns) or lags.n_inputs

@@ -1,8 +1,11 @@
-"""Parity: every exported file is run against the model that it came from, on every case, before it is published."""
+"""Parity: every exported file is run against the model that it came from, on every case and on random sequences.
+
+How much a free run makes of a difference is the model's own property, and decides what parity can be had at all: a
+number rounded otherwise in its last digit comes out larger by :attr:`ParityCase.amplification`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ParityError
-from sysid.export.exporter import ExportedFile, run_sequence
+from sysid.export.exporter import ExportedFile, Runner
 from sysid.export.exporters import exporter
 from sysid.export.layout import StateLayout
+from sysid.export.surrogate import Surrogate
 from sysid.models import AbstractModel, History, Start
 from sysid.traces import TraceSet
+
+RANDOM_SEQUENCES = 100
+RANDOM_SAMPLES = 400
+RANDOM_SEED = 7
+DISTURBANCE = 1e-6
+"""Change of the output before the first sample, as a share of its scale, by which amplification is measured: far
+above rounding, far below what would reach a network's bends."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -23,16 +34,18 @@ class ParityCase:
     """A free run of the model that an exported file has to reproduce.
 
     Args:
-        name: Name of the trace.
+        name: Name of the trace, or of the random sequence.
         inputs: In their units, shape ``(n_samples, n_inputs)``.
-        history: The samples before the first.
-        output: The model's output, shape ``(n_samples,)``.
+        state: Before the first sample, shape ``(n_state,)``.
+        output: The model's outputs, shape ``(n_samples, n_outputs)``.
+        amplification: Largest change of an output in the run over the change before its first sample that caused it.
     """
 
     name: str
     inputs: NDArray[np.float64]
-    history: History
+    state: NDArray[np.float64]
     output: NDArray[np.float64]
+    amplification: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,13 +55,17 @@ class Parity:
     Args:
         largest_difference: Over all samples of all cases, in the output's unit.
         case: Where it occurred.
-        tolerance: What is allowed, in the same unit.
+        random_difference: The same over the random sequences.
+        random_sequences: Their number.
+        tolerance: What is allowed, in the same unit, in cases and sequences.
         unit: The output's unit.
         samples: Number of samples compared.
     """
 
     largest_difference: float
     case: str
+    random_difference: float
+    random_sequences: int
     tolerance: float
     unit: str
     samples: int
@@ -58,6 +75,8 @@ class Parity:
         return {
             "largest_difference": self.largest_difference,
             "case": self.case,
+            "random_difference": self.random_difference,
+            "random_sequences": self.random_sequences,
             "tolerance": self.tolerance,
             "unit": self.unit,
             "samples": self.samples,
@@ -79,53 +98,142 @@ def parity_cases(model: AbstractModel, traces: TraceSet, start: Start) -> tuple[
         ChannelError: If a trace lacks a channel of the mapping.
         TraceError: If a trace is not longer than its measured start.
     """
-    cases = []
+    cases, layout = [], StateLayout.of(model)
+    change = DISTURBANCE * model.recursion.scaling.output_scale
     for trace in traces:
         inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
         history = start.history(inputs, target, model.rest_output)
         inputs = inputs[start.n_measured :]
         output = model.simulate(inputs, history)
-        cases.append(ParityCase(name=trace.name, inputs=inputs, history=history, output=output))
+        disturbed = model.simulate(inputs, History(inputs=history.inputs, output=history.output + change))
+        cases.append(
+            ParityCase(
+                name=trace.name,
+                inputs=inputs,
+                state=layout.from_history(history),
+                output=output[:, np.newaxis],
+                amplification=largest_difference(disturbed, output) / change,
+            )
+        )
     return tuple(cases)
 
 
+def random_cases(
+    surrogate: Surrogate, *, sequences: int = RANDOM_SEQUENCES, samples: int = RANDOM_SAMPLES, seed: int = RANDOM_SEED
+) -> tuple[ParityCase, ...]:
+    """The models' free runs from rest on random inputs within the declared ranges: steps, ramps and noise.
+
+    Args:
+        surrogate: What is exported. An input without a declared range moves over its scaling's (offset plus and
+            minus scale).
+        sequences: How many.
+        samples: Length of each.
+        seed: Of the random numbers.
+
+    Returns:
+        One case per sequence.
+    """
+    rng = np.random.default_rng(seed)
+    low, high = _ranges(surrogate)
+    change = DISTURBANCE * np.array([stage.recursion.scaling.output_scale for stage in surrogate.stages])
+    cases = []
+    for number in range(sequences):
+        inputs = low + (high - low) * _excitation(rng, samples, len(low))
+        output = surrogate.simulate(inputs)
+        disturbed = surrogate.simulate(inputs, rest_outputs=surrogate.rest_outputs + change)
+        cases.append(
+            ParityCase(
+                name=f"random {number + 1}",
+                inputs=inputs,
+                state=surrogate.at_rest(inputs[0]),
+                output=output,
+                amplification=largest_difference(disturbed / change, output / change),
+            )
+        )
+    return tuple(cases)
+
+
+def _ranges(surrogate: Surrogate) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    scale: dict[int, tuple[float, float]] = {}
+    for stage in surrogate.stages:
+        scaling = stage.recursion.scaling
+        for column, offset, half in zip(stage.sources, scaling.input_offset, scaling.input_scale, strict=True):
+            scale.setdefault(column, (offset - half, offset + half))
+    ranges = [port.range or scale[i] for i, port in enumerate(surrogate.inputs)]
+    return np.array([low for low, _ in ranges]), np.array([high for _, high in ranges])
+
+
+def _excitation(rng: np.random.Generator, samples: int, n_inputs: int) -> NDArray[np.float64]:
+    """Between 0 and 1, both reached now and then: levels held for a random time, with ramps between some of them."""
+    columns = []
+    for _ in range(n_inputs):
+        count = int(rng.integers(2, 20))
+        corners = np.sort(rng.choice(np.arange(1, samples), size=count - 1, replace=False))
+        levels = np.clip(rng.uniform(-0.1, 1.1, count + 1), 0.0, 1.0)
+        held = np.repeat(levels[:-1], np.diff([0, *corners, samples]))
+        ramped = np.interp(np.arange(samples), [0, *corners, samples], levels)
+        noise = 0.01 * rng.uniform(-1.0, 1.0, samples)
+        columns.append(np.clip((held if rng.random() < 0.5 else ramped) + noise, 0.0, 1.0))
+    return np.column_stack(columns)
+
+
 def check_parity(
-    file: ExportedFile, folder: Path, model: AbstractModel, cases: Iterable[ParityCase], tolerance: float
+    file: ExportedFile,
+    folder: Path,
+    cases: tuple[ParityCase, ...],
+    sequences: tuple[ParityCase, ...],
+    *,
+    tolerance: float,
+    unit: str,
 ) -> Parity:
-    """Run an exported file on every case.
+    """Run an exported file on every case and on the random sequences.
 
     Args:
         file: The file.
         folder: Where it lies.
-        model: The model it came from.
         cases: From :func:`parity_cases`; at least one.
+        sequences: From :func:`random_cases`, all of one length; may be empty.
         tolerance: Largest difference allowed, in the output's unit.
+        unit: The output's unit.
 
     Returns:
-        The largest difference, and where it occurred.
+        The largest differences, and where they occurred.
 
     Raises:
         ParityError: If a difference is larger than the tolerance, or not a number.
     """
-    runner, layout = exporter(file.format).load(folder / file.name), StateLayout.of(model)
-    worst, where, samples = -1.0, "", 0
-    for case in cases:
-        state = layout.from_history(case.history)[np.newaxis]
-        run = run_sequence(runner, file.kind, case.inputs[:, np.newaxis], state)
-        difference = largest_difference(run.output[:, 0, 0], case.output)
-        samples += len(case.output)
-        if difference > worst:
-            worst, where = difference, case.name
-    if not worst <= tolerance:
-        raise ParityError(file.name, where, worst, tolerance, model.output_unit)
-    return Parity(largest_difference=worst, case=where, tolerance=tolerance, unit=model.output_unit, samples=samples)
+    runner = exporter(file.format).load(file, folder)
+    differences = {case.name: _compare(runner, (case,))[0] for case in cases}
+    drawn = _compare(runner, sequences)
+    differences_drawn = {case.name: difference for case, difference in zip(sequences, drawn, strict=True)}
+    for found in (differences, differences_drawn):
+        where = max(found, key=lambda name: found[name], default="")
+        if where and not found[where] <= tolerance:
+            raise ParityError(file.name, where, found[where], tolerance, unit)
+    return Parity(
+        largest_difference=max(differences.values()),
+        case=max(differences, key=lambda name: differences[name]),
+        random_difference=max(drawn, default=0.0),
+        random_sequences=len(sequences),
+        tolerance=tolerance,
+        unit=unit,
+        samples=sum(len(case.output) for case in (*cases, *sequences)),
+    )
+
+
+def _compare(runner: Runner, cases: tuple[ParityCase, ...]) -> list[float]:
+    """The largest difference of each case, all run side by side as cars."""
+    if not cases:
+        return []
+    run = runner(np.stack([case.inputs for case in cases], axis=1), np.stack([case.state for case in cases]))
+    return [largest_difference(run.output[:, i], case.output) for i, case in enumerate(cases)]
 
 
 def largest_difference(output: NDArray[Any], expected: NDArray[np.float64]) -> float:
     """The largest absolute difference of two records.
 
     Args:
-        output: Shape ``(n_samples,)``.
+        output: Any shape.
         expected: The same shape.
 
     Returns:

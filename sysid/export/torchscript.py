@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner
-from sysid.models import AbstractModel
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
+from sysid.export.surrogate import Surrogate
 
 
 @contextmanager
@@ -32,41 +32,41 @@ class TorchScriptExporter(AbstractExporter):
 
     name: str = "torchscript"
 
-    def write(self, model: AbstractModel, folder: Path) -> tuple[ExportedFile, ...]:
+    def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
         """Script both modules and save them."""
         import torch
 
-        from sysid.export.torch_module import RecursionSequence, RecursionStep
+        from sysid.export.torch_module import SurrogateSequence, SurrogateStep
 
         files = []
-        for kind, module in ((Kind.STEP, RecursionStep(model)), (Kind.SEQUENCE, RecursionSequence(model))):
+        for kind, module in ((Kind.STEP, SurrogateStep(surrogate)), (Kind.SEQUENCE, SurrogateSequence(surrogate))):
             name = f"{kind.value}.torchscript.pt"
             buffer = io.BytesIO()
             with _deprecation_known():
                 torch.jit.save(torch.jit.script(module.eval()), buffer)
-            (folder / name).write_bytes(_reproducible(buffer.getvalue()))
+            (folder / name).write_bytes(reproducible_archive(buffer.getvalue()))
             details = {"torch": torch.__version__.partition("+")[0]}
             files.append(ExportedFile(name=name, format=self.name, kind=kind, details=details))
         return tuple(files)
 
-    def load(self, path: Path) -> Runner:
+    def load(self, file: ExportedFile, folder: Path) -> Runner:
         """Load the file on the CPU. TorchScript code can compute, but not reach the file system or network."""
         import torch
 
         with _deprecation_known():
-            module = torch.jit.load(path, map_location="cpu")  # type: ignore[no-untyped-call]  # torch.jit has no types
+            module = torch.jit.load(folder / file.name, map_location="cpu")  # type: ignore[no-untyped-call]  # torch.jit has no types
 
         def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
             with torch.inference_mode():
-                output, state_out = module(
+                output, state_out, flags = module(
                     torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(state))
                 )
-            return Run(output=output.numpy(), state=state_out.numpy())
+            return Run(output=output.numpy(), state=state_out.numpy(), flags=flags.numpy()[..., 0])
 
-        return run
+        return run if file.kind is Kind.SEQUENCE else step_by_step(run)
 
 
-def _reproducible(archive: bytes) -> bytes:
+def reproducible_archive(archive: bytes) -> bytes:
     """The same archive without what belongs to the machine that wrote it.
 
     Beside the code torch stores its source lines with the path of this checkout (``.debug_pkl``), and a hash over

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sysid.estimation.result import FitResult, Loop, Status
-from sysid.export import EXPORTERS, AbstractExporter, Kind, Run, StateLayout, run_sequence
+from sysid.export import EXPORTERS, AbstractExporter, ExportedFile, Run, StateLayout, Surrogate
 from sysid.models import (
     ARX,
     NARX,
@@ -112,12 +112,35 @@ def narx() -> Callable[..., NARXModel]:
     return build_narx
 
 
-FORMATS = ("onnx", "torchscript")
+RANGES = {"BP": (0.0, 95.0), "AR": (0.0, 95.0)}
+"""Declared in every test: what :func:`random_inputs` keeps to."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """A file that a format writes for a model, by what sets it apart."""
+
+    format: str
+    name: str
+    dtype: str = "float64"
+    tolerance: float = 1e-9
+
+
+ROWS = {
+    "ONNX, step": Row(format="onnx", name="step.onnx"),
+    "ONNX, sequence": Row(format="onnx", name="sequence.onnx"),
+    "ONNX float32, step": Row(format="onnx-float32", name="step.float32.onnx", dtype="float32", tolerance=1e-3),
+    "ONNX float32, sequence": Row(format="onnx-float32", name="sequence.float32.onnx", dtype="float32", tolerance=1e-3),
+    "TorchScript, step": Row(format="torchscript", name="step.torchscript.pt"),
+    "TorchScript, sequence": Row(format="torchscript", name="sequence.torchscript.pt"),
+}
+"""Every file of every format: the table of the contract."""
+FORMATS = tuple(dict.fromkeys(row.format for row in ROWS.values()))
 
 
 @pytest.fixture(scope="session")
-def formats() -> tuple[str, ...]:
-    return FORMATS
+def rows() -> dict[str, Row]:
+    return ROWS
 
 
 @pytest.fixture(params=FORMATS, scope="session")
@@ -125,31 +148,54 @@ def format_name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-@pytest.fixture(params=list(Kind), ids=lambda kind: kind.value, scope="session")
-def kind(request: pytest.FixtureRequest) -> Kind:
-    return Kind(request.param)
+@pytest.fixture(params=ROWS, scope="session")
+def row(request: pytest.FixtureRequest) -> Row:
+    return ROWS[request.param]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Exported:
-    """A model and a file of it, ready to run."""
+    """A surrogate and a file of it, ready to run."""
 
-    model: AbstractModel
-    path: Path
+    surrogate: Surrogate
+    file: ExportedFile
+    folder: Path
     run: Callable[[np.ndarray, np.ndarray], Run]
+    tolerance: float
+
+    @property
+    def model(self) -> AbstractModel:
+        return self.surrogate.stages[0].model
 
     @property
     def layout(self) -> StateLayout:
         return StateLayout.of(self.model)
 
+    @property
+    def path(self) -> Path:
+        return self.folder / self.file.name
 
-def open_file(exporter: AbstractExporter, model: AbstractModel, kind: Kind, folder: Path) -> Exported:
-    """Write a model and load the file of one kind."""
-    (file,) = [file for file in exporter.write(model, folder) if file.kind is kind]
-    runner = exporter.load(folder / file.name)
-    return Exported(
-        model=model, path=folder / file.name, run=lambda inputs, state: run_sequence(runner, kind, inputs, state)
-    )
+
+def surrogate_of(model: AbstractModel) -> Surrogate:
+    return Surrogate.of(model, RANGES)
+
+
+@pytest.fixture(scope="session")
+def declared() -> Callable[[AbstractModel], Surrogate]:
+    return surrogate_of
+
+
+def open_file(row: Row, surrogate: Surrogate, folder: Path) -> Exported:
+    """Write a surrogate and load one of its files."""
+    exporter: AbstractExporter = EXPORTERS[row.format]
+    written = exporter.write(surrogate, folder)
+    (file,) = [file for file in written if (matches(row, file, surrogate))]
+    run = exporter.load(file, folder)
+    return Exported(surrogate=surrogate, file=file, folder=folder, run=run, tolerance=row.tolerance)
+
+
+def matches(row: Row, file: ExportedFile, surrogate: Surrogate) -> bool:
+    return (file.name, file.dtype) == (row.name.format(name=surrogate.identifier), row.dtype)
 
 
 @pytest.fixture(scope="session")
@@ -158,8 +204,8 @@ def opened() -> Callable[..., Exported]:
 
 
 @pytest.fixture(scope="session")
-def exported(model: AbstractModel, format_name: str, kind: Kind, tmp_path_factory: pytest.TempPathFactory) -> Exported:
-    return open_file(EXPORTERS[format_name], model, kind, tmp_path_factory.mktemp("exported"))
+def exported(model: AbstractModel, row: Row, tmp_path_factory: pytest.TempPathFactory) -> Exported:
+    return open_file(row, surrogate_of(model), tmp_path_factory.mktemp("exported"))
 
 
 def random_inputs(n_samples: int, n_inputs: int, *, seed: int = 3) -> np.ndarray:
@@ -222,3 +268,42 @@ def traces(fit: FitResult) -> TraceSet:
 @pytest.fixture(scope="session")
 def start() -> Start:
     return Start()
+
+
+def build_cascade() -> Surrogate:
+    """Three models: the first computes BP, the second reads it, the third reads both outputs and the command."""
+
+    def stage(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) -> NARXModel:
+        rng = np.random.default_rng(seed)
+        parsed = Mapping.parse(mapping)
+        n_inputs = len(parsed.inputs)
+        lags = structure.lags(n_inputs)
+        theta = rng.normal(size=parameter_count(lags, structure.neurons, linear=True))
+        theta *= 0.4 / np.sqrt(len(theta))
+        return NARXModel(
+            network=structure,
+            theta=theta,
+            scaling=Scaling(
+                input_offset=(45.0,) * n_inputs, input_scale=(45.0,) * n_inputs, output_offset=40.0, output_scale=38.0
+            ),
+            mapping=parsed,
+            sample_time=0.1,
+            input_units=("psi",) * n_inputs,
+            output_unit="psi",
+            rest_output=3.0,
+            clamp=clamp,
+        )
+
+    return Surrogate.wired(
+        [
+            stage("STP+FLOW -> BP", NARX(input_delays="0:3", output_delays=[1, 2, 5], neurons=6), 1),
+            stage("BP -> AR", NARX(input_delays=2, output_delays=3, neurons=4), 2),
+            stage("BP+AR+STP -> BC", NARX(input_delays=[[0], [1, 3], [2]], output_delays=2, neurons=5), 3, clamp=0.05),
+        ],
+        {"STP": (0.0, 80.0)},
+    )
+
+
+@pytest.fixture(scope="session")
+def cascade() -> Surrogate:
+    return build_cascade()

@@ -135,9 +135,11 @@ def test_same_fit_gives_the_same_bytes(*, bundle, fit, traces, start, metrics, t
 
 def test_a_process_of_its_own_gives_the_same_bytes(bundle, tmp_path):
     script = (
-        "import sys, pathlib; from sysid.export import EXPORTERS, read_bundle\n"
-        "model = read_bundle(pathlib.Path(sys.argv[1])).model\n"
-        "for exporter in EXPORTERS.values(): exporter.write(model, pathlib.Path(sys.argv[2]))"
+        "import sys, pathlib; from sysid.export import EXPORTERS, Surrogate, read_bundle\n"
+        "bundle = read_bundle(pathlib.Path(sys.argv[1]))\n"
+        "ranges = {channel['name']: tuple(channel['range']) for channel in bundle.metadata['inputs']}\n"
+        "surrogate = Surrogate.of(bundle.model, ranges)\n"
+        "for name in ('onnx', 'torchscript'): EXPORTERS[name].write(surrogate, pathlib.Path(sys.argv[2]))"
     )
     subprocess.run([sys.executable, "-c", script, bundle.folder, tmp_path], check=True, env={"PYTHONHASHSEED": "1"})
     assert content(tmp_path) == {name: (bundle.folder / name).read_bytes() for name in FILES}
@@ -233,7 +235,7 @@ def test_what_is_not_a_bundle_is_never_replaced(fit, traces, start, tmp_path, ki
 
 
 def test_unknown_format_is_refused_with_those_there_are(fit, traces, start, tmp_path):
-    with pytest.raises(ConfigError, match=r"(?s)unknown export format.*one of onnx, torchscript.*onyx"):
+    with pytest.raises(ConfigError, match=r"(?s)unknown export format.*one of onnx, onnx-float32, torchscript.*onyx"):
         export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onyx"])
 
 

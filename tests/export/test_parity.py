@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sysid.errors import ParityError
-from sysid.export import EXPORTERS, check_parity, parity_cases
+from sysid.export import EXPORTERS, Surrogate, check_parity, parity_cases, random_cases
 from sysid.export.parity import largest_difference
-from sysid.models import NARX, Start, StartKind
+from sysid.models import ARX, NARX, ARXModel, Mapping, Start, StartKind
 
 
 @pytest.mark.parametrize(
@@ -33,20 +33,61 @@ def test_largest_difference(output, expected, difference):
     [Start(), Start(kind=StartKind.FIRST_SAMPLE), Start(kind=StartKind.MEASURED, n_measured=2)],
     ids=["at rest", "first sample", "measured, shorter than the lags"],
 )
-def test_files_of_the_model_pass_for_every_start(format_name, fit, traces, begin, tmp_path):
-    cases = parity_cases(fit.model, traces, begin)
-    for file in EXPORTERS[format_name].write(fit.model, tmp_path):
-        parity = check_parity(file, tmp_path, fit.model, cases, 1e-9)
-        assert parity.largest_difference <= parity.tolerance == 1e-9
+def test_files_of_the_model_pass_for_every_start(*, row, fit, declared, traces, begin, tmp_path):
+    surrogate = declared(fit.model)
+    cases, sequences = parity_cases(fit.model, traces, begin), random_cases(surrogate, sequences=3, samples=50)
+    for file in EXPORTERS[row.format].write(surrogate, tmp_path):
+        parity = check_parity(file, tmp_path, cases, sequences, tolerance=row.tolerance, unit="psi")
+        assert max(parity.largest_difference, parity.random_difference) <= parity.tolerance == row.tolerance
         assert parity.case in traces.names
-        assert parity.unit == "psi"
-        assert parity.samples == sum(len(trace) for trace in traces) - 3 * begin.n_measured
+        assert (parity.unit, parity.random_sequences) == ("psi", 3)
+        assert parity.samples == sum(len(trace) for trace in traces) - 3 * begin.n_measured + 3 * 50
 
 
-def test_files_of_another_model_are_refused_with_the_worst_case(format_name, fit, traces, narx, tmp_path):
+def test_files_of_another_model_are_refused_with_the_worst_case(*, row, fit, declared, traces, narx, tmp_path):
     other = narx(NARX(input_delays=4, output_delays=4, neurons=20), seed=99)
     cases = parity_cases(fit.model, traces, Start())
-    worst = max(cases, key=lambda case: np.abs(other.simulate(case.inputs, case.history) - case.output).max())
-    for file in EXPORTERS[format_name].write(other, tmp_path):
-        with pytest.raises(ParityError, match=f"(?s){file.name} does not reproduce.*case {worst.name}"):
-            check_parity(file, tmp_path, fit.model, cases, 1e-9)
+    expected = {case.name: np.abs(other.simulate(case.inputs) - case.output[:, 0]).max() for case in cases}
+    worst = max(expected, key=expected.get)
+    for file in EXPORTERS[row.format].write(declared(other), tmp_path):
+        with pytest.raises(ParityError, match=f"(?s){file.name} does not reproduce.*case {worst}"):
+            check_parity(file, tmp_path, cases, (), tolerance=row.tolerance, unit="psi")
+
+
+def test_a_difference_on_a_random_sequence_alone_is_refused(fit, declared, traces, tmp_path):
+    surrogate = declared(fit.model)
+    cases, sequences = parity_cases(fit.model, traces, Start()), random_cases(surrogate, sequences=2, samples=20)
+    sequences[1].output[7] += 1e-6
+    (file, _) = EXPORTERS["onnx"].write(surrogate, tmp_path)
+    with pytest.raises(ParityError, match=r"(?s)case random 2.*1e-06 psi"):
+        check_parity(file, tmp_path, cases, sequences, tolerance=1e-9, unit="psi")
+
+
+def test_random_sequences_fill_the_declared_range_and_never_leave_it(fit, declared):
+    surrogate = declared(fit.model)
+    drawn = np.stack([case.inputs for case in random_cases(surrogate)])
+    assert drawn.shape == (100, 400, 2)
+    assert (drawn.min(axis=(0, 1)) == [0.0, 0.0]).all()
+    assert (drawn.max(axis=(0, 1)) == [95.0, 95.0]).all()
+
+
+def test_without_a_declared_range_sequences_keep_to_the_scaling(fit):
+    drawn = np.stack([case.inputs for case in random_cases(Surrogate.of(fit.model), sequences=20)])
+    np.testing.assert_allclose(drawn.min(axis=(0, 1)), [0.0, 50.0], atol=1e-12)
+    np.testing.assert_allclose(drawn.max(axis=(0, 1)), [90.0, 90.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("pole", "expected"), [(0.5, 0.5), (0.99, 0.99), (1.02, 1.02**400)])
+def test_amplification_is_what_becomes_of_a_small_change(pole, expected):
+    model = ARXModel(
+        orders=ARX(na=1, nb=(1,), nk=(0,)),
+        coefficients=np.array([0.0, -pole]),
+        intercept=0.0,
+        mapping=Mapping.parse("BP -> BC"),
+        sample_time=0.1,
+        input_units=("psi",),
+        output_unit="psi",
+        rest_output=0.0,
+    )
+    case = random_cases(Surrogate.of(model), sequences=1)[0]
+    assert case.amplification == pytest.approx(expected, rel=1e-6)

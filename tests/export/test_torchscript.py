@@ -8,27 +8,29 @@ import numpy as np
 import torch
 
 from sysid.export import EXPORTERS, StateLayout
-from sysid.export.torch_module import RecursionSequence
+from sysid.export.torch_module import SurrogateSequence
 from sysid.models import NARX
 
 
-def test_archive_tells_nothing_about_the_machine_that_wrote_it(narx, tmp_path):
-    for file in EXPORTERS["torchscript"].write(narx(NARX(input_delays=1, output_delays=1, neurons=1)), tmp_path):
+def test_archive_tells_nothing_about_the_machine_that_wrote_it(narx, declared, tmp_path):
+    surrogate = declared(narx(NARX(input_delays=1, output_delays=1, neurons=1)))
+    for file in EXPORTERS["torchscript"].write(surrogate, tmp_path):
         with zipfile.ZipFile(tmp_path / file.name) as archive:
             assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
             assert not [entry.filename for entry in archive.infolist() if "debug" in entry.filename]
             assert not [name for name in archive.namelist() if __file__.encode()[:10] in archive.read(name)]
 
 
-def test_module_keeps_derivatives(narx, inputs, past):
+def test_module_keeps_derivatives(narx, declared, inputs, past):
     model = narx(NARX(input_delays=2, output_delays=2, neurons=3))
-    module = RecursionSequence(model)
+    module = SurrogateSequence(declared(model))
     u = torch.tensor(inputs(6, 2)[:, np.newaxis])
     state = torch.tensor(StateLayout.of(model).from_history(past(model))[np.newaxis], requires_grad=True)
     assert torch.autograd.gradcheck(lambda start: module(u, start)[0], (state,))
 
 
-def test_number_type_can_be_chosen(narx):
-    module = RecursionSequence(narx(NARX(input_delays=2, output_delays=2, neurons=3)), dtype=torch.float32)
-    y, state = module(torch.zeros(3, 1, 2, dtype=torch.float32), torch.zeros(1, 6, dtype=torch.float32))
+def test_number_type_can_be_chosen(narx, declared):
+    model = narx(NARX(input_delays=2, output_delays=2, neurons=3))
+    module = SurrogateSequence(declared(model), dtype=torch.float32)
+    y, state, _ = module(torch.zeros(3, 1, 2, dtype=torch.float32), torch.zeros(1, 6, dtype=torch.float32))
     assert (y.dtype, state.dtype) == (torch.float32, torch.float32)

@@ -1,0 +1,59 @@
+"""What a surrogate says about each of its steps: a small set of flags, the same in every format.
+
+A flag never changes the numbers: outside the declared range the step still answers, held within the output's bounds
+where the model has them. The caller decides what to do.
+"""
+
+from __future__ import annotations
+
+import enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.export.surrogate import Surrogate
+
+
+class Flag(enum.IntFlag):
+    """Bits of the flags of one step; 0 is a step within everything that was declared."""
+
+    OUTSIDE_RANGE = 1
+    """An input is outside the range that it is declared for: nothing is known about the accuracy."""
+    AT_BOUND = 2
+    """An output is held at one of its bounds: it is wrong."""
+    NOT_A_NUMBER = 4
+    """An input or an output is not a number: set the state anew before relying on what follows."""
+
+
+MEANING = {
+    Flag.OUTSIDE_RANGE: "an input is outside its declared range; the accuracy is unknown",
+    Flag.AT_BOUND: "an output is held at one of its bounds; it is wrong",
+    Flag.NOT_A_NUMBER: "an input or an output is not a number; set the state anew",
+}
+"""Each flag as a sentence, for the files and the model card."""
+
+
+def expected_flags(
+    surrogate: Surrogate, inputs: NDArray[np.float64], outputs: NDArray[np.float64]
+) -> NDArray[np.int32]:
+    """The flags that a free run has to raise, from its inputs and outputs alone.
+
+    Args:
+        surrogate: What is run.
+        inputs: Shape ``(n_samples, n_inputs)``, in their units.
+        outputs: Shape ``(n_samples, n_outputs)``, in their units.
+
+    Returns:
+        Shape ``(n_samples,)``.
+    """
+    low, high = (np.array([getattr(port, side) for port in surrogate.inputs]) for side in ("low", "high"))
+    outside = ((inputs < low) | (inputs > high)).any(axis=1)
+    lost = np.isnan(inputs).any(axis=1) | np.isnan(outputs).any(axis=1)
+    held = np.zeros(len(inputs), dtype=bool)
+    for stage, output in zip(surrogate.stages, outputs.T, strict=True):
+        scaling = stage.recursion.scaling
+        for bound in (stage.recursion.low, stage.recursion.high):
+            if np.isfinite(bound):
+                held |= output == bound * scaling.output_scale + scaling.output_offset
+    flags = outside * int(Flag.OUTSIDE_RANGE) + held * int(Flag.AT_BOUND) + lost * int(Flag.NOT_A_NUMBER)
+    return np.asarray(flags, dtype=np.int32)

@@ -1,0 +1,96 @@
+"""Models as stages: what is wired to what, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.export import Surrogate
+from sysid.models import ARX, NARX, ARXModel, Mapping
+
+
+def linear(mapping, **changes):
+    parsed = Mapping.parse(mapping)
+    n_inputs = len(parsed.inputs)
+    model = ARXModel(
+        orders=ARX(na=1, nb=(1,) * n_inputs, nk=(0,) * n_inputs),
+        coefficients=np.array([1.0] * n_inputs + [0.5]),
+        intercept=0.0,
+        mapping=parsed,
+        sample_time=0.1,
+        input_units=("psi",) * n_inputs,
+        output_unit="psi",
+        rest_output=0.0,
+    )
+    return replace(model, **changes)
+
+
+def test_inputs_are_what_no_stage_computes(cascade):
+    assert [port.name for port in cascade.inputs] == ["STP", "FLOW"]
+    assert [port.name for port in cascade.outputs] == ["BP", "AR", "BC"]
+    assert cascade.mapping == "STP+FLOW -> BP, AR, BC"
+    assert [port.range for port in cascade.inputs] == [(0.0, 80.0), None]
+
+
+def test_stages_read_inputs_and_earlier_outputs(cascade):
+    assert [stage.sources for stage in cascade.stages] == [(0, 1), (2,), (2, 3, 0)]
+
+
+def test_states_lie_end_to_end(cascade):
+    lines = cascade.lines
+    assert [line.first for line in lines] == [0, *np.cumsum([line.length for line in lines])[:-1]]
+    assert cascade.state_size == sum(line.length for line in lines)
+    assert cascade.at_rest(np.array([10.0, 20.0])).shape == (cascade.state_size,)
+
+
+def test_cascade_is_its_models_one_after_the_other():
+    first, second = linear("STP -> BP"), linear("BP+STP -> BC")
+    u = np.arange(5.0)[:, np.newaxis]
+    bp = first.simulate(u)
+    bc = second.simulate(np.column_stack([bp, u[:, 0]]))
+    np.testing.assert_array_equal(Surrogate.wired([first, second]).simulate(u), np.column_stack([bp, bc]))
+
+
+@pytest.mark.parametrize(
+    ("models", "match"),
+    [
+        pytest.param([], "there is no model", id="none"),
+        pytest.param(["u -> y", "v -> y"], "y is computed twice", id="two models of one channel"),
+        pytest.param(["y -> z", "u -> y"], "y is read before it is computed", id="wrong order"),
+        pytest.param(["y -> z", "z -> y"], "y is read before it is computed", id="loop"),
+        pytest.param(["u -> y", {"mapping": "y -> z", "sample_time": 0.2}], "sample times differ", id="sample times"),
+        pytest.param(["u -> y", {"mapping": "y -> z", "input_units": ("kPa",)}], "y is in psi and in kPa", id="units"),
+    ],
+)
+def test_wiring_that_cannot_run_is_refused(models, match):
+    built = [
+        linear(m) if isinstance(m, str) else linear(m["mapping"], **{k: m[k] for k in m if k != "mapping"})
+        for m in models
+    ]
+    with pytest.raises(ConfigError, match=match):
+        Surrogate.wired(built)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "identifier"),
+    [
+        ("BP+AR -> BC", "bp_ar_to_bc"),
+        ("p in [1]+Δp -> 2nd", "p_in_1_p_to_c2nd"),
+        ("a b+a-b -> a_b", "a_b_a_b_2_to_a_b_3"),
+        ("é -> ü", "channel_to_channel_2"),
+    ],
+)
+def test_identifiers_are_c_names_and_all_different(mapping, identifier):
+    surrogate = Surrogate.of(linear(mapping))
+    assert surrogate.identifier == identifier
+    names = [port.identifier for port in (*surrogate.inputs, *surrogate.outputs)]
+    assert len(set(names)) == len(names)
+    assert all(name.isascii() and name.isidentifier() for name in names)
+
+
+def test_state_of_a_single_model_is_the_models_own(narx, declared):
+    surrogate = declared(narx(NARX(input_delays=2, output_delays=3, neurons=1)))
+    assert surrogate.state_text() == surrogate.stages[0].layout.to_dict()
