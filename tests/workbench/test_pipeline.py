@@ -19,7 +19,7 @@ from sysid.workbench import events, steps
 from sysid.workbench.config import read_pipeline
 from sysid.workbench.pipeline import run_pipeline
 from sysid.workbench.record import read_fit, read_scores
-from sysid.workbench.store import RunFolder
+from sysid.workbench.store import RunFolder, code_digest
 
 FITS = ("ARX", "open loop", "closed loop")
 
@@ -195,6 +195,8 @@ run_pipeline(read_pipeline(Path("pipelines/first.yaml")), Path("run"), command="
 def test_a_killed_run_goes_on_where_it_was(workspace: Path, about_to_write: str, kept: tuple[str, ...]) -> None:
     done = subprocess.run([sys.executable, "-c", KILLER, about_to_write], check=False)
     assert done.returncode == -signal.SIGKILL
+    # Both runs shall see the same code, also while somebody is working on it.
+    code_digest.cache_clear()
     results, stored = run(workspace)
     assert stored == {name: name in kept for name in FITS}
     assert [fit.name for fit in results.fits] == list(FITS)

@@ -7,11 +7,13 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 import urllib.error
 import urllib.request
 import webbrowser
 from pathlib import Path
+from typing import IO
 
 from sysid.errors import SysidError
 from sysid.workbench.commands.run import console
@@ -41,19 +43,23 @@ def ui_command(port: int, *, browser: bool) -> int:
         return 0
     address = f"http://127.0.0.1:{free_port(port)}"
     target.print("Starting MLflow; this takes some ten seconds.")
-    process = subprocess.Popen(server_command(uri, address), env=server_environment(), start_new_session=True)  # noqa: S603 - our own words
-    # The end is asked for in several ways; all of them shall end the server with us.
-    previous = signal.signal(signal.SIGTERM, _interrupt)
-    try:
-        _wait_until_up(process, address)
-        _open(f"{address}/{page(experiment)}", browser=browser)
-        target.print("Ctrl-C ends it.")
-        return process.wait()
-    except KeyboardInterrupt:
-        return 0
-    finally:
-        signal.signal(signal.SIGTERM, previous)
-        stop(process)
+    # What the server says is for those who look for a fault; it is kept until then and no longer.
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(  # noqa: S603 - our own words
+            server_command(uri, address), env=server_environment(), start_new_session=True, stdout=log, stderr=log
+        )
+        # The end is asked for in several ways; all of them shall end the server with us.
+        previous = signal.signal(signal.SIGTERM, _interrupt)
+        try:
+            _wait_until_up(process, address, log)
+            _open(f"{address}/{page(experiment)}", browser=browser)
+            target.print("Ctrl-C ends it.")
+            return process.wait()
+        except KeyboardInterrupt:
+            return 0
+        finally:
+            signal.signal(signal.SIGTERM, previous)
+            stop(process)
 
 
 def page(experiment: str | None) -> str:
@@ -138,7 +144,7 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-def _wait_until_up(process: subprocess.Popen[bytes], address: str) -> None:
+def _wait_until_up(process: subprocess.Popen[bytes], address: str, log: IO[bytes]) -> None:
     deadline = time.monotonic() + START_LIMIT_S
     while time.monotonic() < deadline and process.poll() is None:
         try:
@@ -146,12 +152,14 @@ def _wait_until_up(process: subprocess.Popen[bytes], address: str) -> None:
                 return
         except (urllib.error.URLError, OSError):
             time.sleep(0.2)
+    log.seek(0)
+    last = log.read().decode(errors="replace").strip().splitlines()[-5:]
     raise SysidError(
         "the MLflow server did not come up",
         where=address,
         expected=f"an answer within {START_LIMIT_S:.0f} s",
         got="no answer" if process.poll() is None else f"it ended with code {process.returncode}",
-        remedy="its own messages stand above; the store may be of a newer MLflow",
+        remedy="its last words were: " + " | ".join(last) if last else "start it by hand: mlflow server",
     )
 
 

@@ -1,0 +1,191 @@
+"""Fields of the pipeline's YAML that are objects of other rooms: read from the words that people write."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import inspect
+import typing
+from collections.abc import Mapping as Dict
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, create_model
+
+from sysid.errors import ConfigError
+from sysid.estimation import Training
+from sysid.export.exporters import EXPORTERS
+from sysid.models import ARX, NARX, AbstractStructure, Mapping, Start, StartKind, structure_from_dict
+from sysid.yaml_files import FieldError
+
+STRICT = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+"""A field that is not known is an error; nothing changes once it is read."""
+
+STRUCTURES: dict[str, type[AbstractStructure]] = {ARX.kind: ARX, NARX.kind: NARX}
+"""Structures that a pipeline can fit; their fields are those of the classes."""
+
+
+def as_field_error(error: ConfigError) -> FieldError:
+    """A ConfigError of a deeper room, so that pydantic adds where in the YAML it happened."""
+    return FieldError(error.what, expected=error.expected, got=error.got, remedy=error.remedy or "correct the value")
+
+
+def _structure(value: object) -> AbstractStructure:
+    """A structure from its fields, with the fields of its kind named where one is wrong."""
+    if isinstance(value, AbstractStructure):
+        return value
+    kinds = ", ".join(STRUCTURES)
+    if not isinstance(value, Dict) or "kind" not in value:
+        raise FieldError(
+            "not a structure",
+            expected=f"fields with a kind: one of {kinds}",
+            got=repr(value),
+            remedy="write for example {kind: NARX, input_delays: 4, output_delays: 4, neurons: 20}",
+        )
+    kind = value["kind"]
+    if kind not in STRUCTURES:
+        near = difflib.get_close_matches(str(kind), STRUCTURES, n=1)
+        remedy = f"did you mean {near[0]}?" if near else "choose one of these kinds"
+        raise FieldError("unknown kind of structure", expected=f"one of {kinds}", got=repr(kind), remedy=remedy)
+    parameters = inspect.signature(STRUCTURES[kind]).parameters
+    for name in value:
+        if name != "kind" and name not in parameters:
+            near = difflib.get_close_matches(str(name), parameters, n=1)
+            raise FieldError(
+                f"unknown field {name!r} of the structure {kind}",
+                expected=f"one of {', '.join(parameters)}",
+                got=str(name),
+                remedy=f"did you mean {near[0]}?" if near else "remove it",
+            )
+    missing = [p.name for p in parameters.values() if p.default is p.empty and p.name not in value]
+    if missing:
+        raise FieldError(
+            f"the structure {kind} lacks {', '.join(missing)}",
+            expected=", ".join(parameters),
+            got=", ".join(str(name) for name in value),
+            remedy=f"add {missing[0]}: ...",
+        )
+    try:
+        return structure_from_dict(value)
+    except ConfigError as error:
+        raise as_field_error(error) from error
+    except (TypeError, ValueError) as error:
+        raise FieldError(
+            f"a field of the structure {kind} has the wrong type",
+            expected="numbers or lists of numbers",
+            got=repr(dict(value)),
+            remedy=f"correct it ({error})",
+        ) from error
+
+
+def _structure_schema() -> dict[str, Any]:
+    """JSON schema of all structures, for editors that complete the YAML."""
+    choices = []
+    for kind, structure in STRUCTURES.items():
+        parameters = inspect.signature(structure).parameters
+        choices.append(
+            {
+                "type": "object",
+                "title": kind,
+                "properties": {"kind": {"const": kind}} | {name: {} for name in parameters},
+                "required": ["kind", *(p.name for p in parameters.values() if p.default is p.empty)],
+                "additionalProperties": False,
+            }
+        )
+    return {"oneOf": choices}
+
+
+def _start(value: object) -> Start:
+    """How a free run starts: a word, or ``{measured: n}``."""
+    if isinstance(value, Start):
+        return value
+    try:
+        if isinstance(value, str) and value != StartKind.MEASURED.value:
+            return Start(kind=StartKind(value))
+        if isinstance(value, Dict) and set(value) == {StartKind.MEASURED.value} and type(value["measured"]) is int:
+            return Start(kind=StartKind.MEASURED, n_measured=value["measured"])
+    except ConfigError as error:
+        raise as_field_error(error) from error
+    except ValueError:
+        pass
+    raise FieldError(
+        "not a way to start a free run",
+        expected="rest, first-sample, or {measured: 50} for 50 measured samples",
+        got=repr(value),
+        remedy="choose one of the three",
+    )
+
+
+def _start_text(start: Start) -> str | dict[str, int]:
+    return {"measured": start.n_measured} if start.kind is StartKind.MEASURED else start.kind.value
+
+
+def _mapping(value: object) -> Mapping:
+    """A mapping from its text."""
+    if isinstance(value, Mapping):
+        return value
+    try:
+        return Mapping.parse(str(value))
+    except ConfigError as error:
+        raise as_field_error(error) from error
+
+
+StructureField = Annotated[
+    AbstractStructure,
+    PlainValidator(_structure),
+    PlainSerializer(lambda structure: structure.to_dict()),
+    WithJsonSchema(_structure_schema()),
+]
+StartField = Annotated[
+    Start,
+    PlainValidator(_start),
+    PlainSerializer(_start_text),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"enum": ["rest", "first-sample"]},
+                {"type": "object", "properties": {"measured": {"type": "integer", "minimum": 1}}},
+            ]
+        }
+    ),
+]
+MappingField = Annotated[
+    Mapping, PlainValidator(_mapping), PlainSerializer(str), WithJsonSchema({"type": "string", "pattern": "->"})
+]
+
+
+def _format(value: object) -> str:
+    """The name of an exporter."""
+    if isinstance(value, str) and value in EXPORTERS:
+        return value
+    near = difflib.get_close_matches(str(value), EXPORTERS, n=1)
+    raise FieldError(
+        "unknown export format",
+        expected=f"one of {', '.join(EXPORTERS)}",
+        got=repr(value),
+        remedy=f"did you mean {near[0]}?" if near else "choose one of these formats",
+    )
+
+
+FormatField = Annotated[str, PlainValidator(_format), WithJsonSchema({"enum": list(EXPORTERS)})]
+
+
+def _fields_of(dataclass: type) -> dict[str, Any]:
+    """A dataclass's fields as pydantic wants them, so that the YAML has exactly the options the code has."""
+    hints = typing.get_type_hints(dataclass)
+    fields: dict[str, Any] = {}
+    for field in dataclasses.fields(dataclass):
+        if field.default_factory is not dataclasses.MISSING:
+            fields[field.name] = (hints[field.name], Field(default_factory=field.default_factory))
+        else:
+            fields[field.name] = (hints[field.name], ... if field.default is dataclasses.MISSING else field.default)
+    return fields
+
+
+if TYPE_CHECKING:
+
+    class TrainingConfig(BaseModel):
+        """Options of a network's training, field by field those of :class:`sysid.estimation.Training`."""
+
+else:
+    # The fields are read off the dataclass: an option added to the training appears in the YAML by itself.
+    TrainingConfig = create_model("TrainingConfig", __config__=STRICT, **_fields_of(Training))
