@@ -277,14 +277,16 @@ class _Progress:
     tell: events.Watcher
     shares: dict[int, float] = field(default_factory=dict)
     guard: threading.Lock = field(default_factory=threading.Lock)
+    began: float = field(default_factory=time.perf_counter)
 
     def report(self, entry: FitProgress) -> None:
         """Told after every iteration of every start."""
-        share = max(entry.iteration / entry.max_iterations, entry.elapsed_s / self.training.max_time_s)
+        share = min(entry.iteration / entry.max_iterations, 1.0)
+        spent = (time.perf_counter() - self.began) / self.training.max_time_s
         with self.guard:
-            # The iterations in open loop come before those that count: the share never falls.
-            self.shares[entry.start] = max(min(share, 1.0), self.shares.get(entry.start, 0.0))
-            fraction = sum(self.shares.values()) / entry.starts
+            # Starts are told about in any order, and some begin again: the share never falls.
+            self.shares[entry.start] = max(share, self.shares.get(entry.start, 0.0))
+            fraction = min(max(sum(self.shares.values()) / entry.starts, spent), 1.0)
             start = f"start {entry.start} of {entry.starts}, " if entry.starts > 1 else ""
             detail = f"{start}{entry.stage}, iteration {entry.iteration}, mse {entry.mse:.3g}"
             self.tell(events.StepProgress(step=self.step, fraction=fraction, detail=detail))

@@ -246,7 +246,7 @@ def test_progress_of_several_starts_never_falls(workspace: Path) -> None:
     rewrite(
         workspace,
         "loop: closed, max_iterations: 8}\n    initial: open loop",
-        "loop: closed, max_iterations: 8, starts: 3, open_iterations: 4}",
+        "loop: closed, max_iterations: 8, starts: 3}",
     )
     shares: list[float] = []
 
