@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sysid.errors import ConfigError
+from sysid.export.c_exporter import CExporter
 from sysid.export.exporter import AbstractExporter
 from sysid.export.onnx_exporter import OnnxExporter
 from sysid.export.torchscript import TorchScriptExporter
@@ -13,6 +14,7 @@ EXPORTERS: dict[str, AbstractExporter] = {
         OnnxExporter(),
         OnnxExporter(name="onnx-float32", dtype="float32"),
         TorchScriptExporter(),
+        CExporter(),
     )
 }
 """Every format by name."""

@@ -133,6 +133,8 @@ ROWS = {
     "ONNX float32, sequence": Row(format="onnx-float32", name="sequence.float32.onnx", dtype="float32", tolerance=1e-3),
     "TorchScript, step": Row(format="torchscript", name="step.torchscript.pt"),
     "TorchScript, sequence": Row(format="torchscript", name="sequence.torchscript.pt"),
+    "C": Row(format="c", name="{name}.c"),
+    "C, float": Row(format="c", name="{name}.c", dtype="float32", tolerance=1e-3),
 }
 """Every file of every format: the table of the contract."""
 FORMATS = tuple(dict.fromkeys(row.format for row in ROWS.values()))

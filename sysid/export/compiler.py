@@ -1,0 +1,68 @@
+"""The machine's C compiler: it builds what an exporter writes, so that it can be run and packed."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from sysid.errors import ConfigError, SysidError
+
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic")
+"""What the exported source is clean under."""
+FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
+
+
+class CompilerError(SysidError):
+    """C that we wrote and that the compiler refuses."""
+
+
+def compiler() -> list[str]:
+    """The command of the C compiler: ``CC`` if it is set, otherwise the first of cc, gcc and clang.
+
+    Returns:
+        The command, as words.
+
+    Raises:
+        ConfigError: If there is none.
+    """
+    chosen = shlex.split(os.environ.get("CC", ""))
+    found = [chosen] if chosen else [[name] for name in ("cc", "gcc", "clang")]
+    for command in found:
+        if shutil.which(command[0]):
+            return command
+    raise ConfigError(
+        "the formats c, fmi2 and fmi3 need a C compiler, which is not there",
+        expected=" or ".join(command[0] for command in found),
+        got="no such program",
+        remedy="install gcc or clang, set CC, or leave these formats out",
+    )
+
+
+def build_library(sources: Sequence[str], folder: Path, output: str, flags: Sequence[str] = ()) -> None:
+    """Build a shared library; the same bytes wherever the folder lies.
+
+    Args:
+        sources: File names in the folder.
+        folder: Where they lie, and where the library goes.
+        output: Its file name.
+        flags: More flags of the compiler.
+
+    Raises:
+        ConfigError: If there is no compiler.
+        CompilerError: If it reports an error.
+    """
+    command = [*compiler(), *FLAGS, *flags, "-o", output, *sources, "-lm"]
+    done = subprocess.run(  # noqa: S603 - the compiler of this machine on files that we wrote
+        command, cwd=folder, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise CompilerError(
+            "the compiler refuses the exported C source",
+            where=", ".join(sources),
+            got=done.stderr.strip()[-2000:],
+            remedy="please report this with the compiler's name and version",
+        )
