@@ -29,7 +29,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "validation": {"estimation", "models", "kernels"},
     "export": {"estimation", "models", "kernels"},
     "reporting": {"validation", "export", "estimation", "models"},
-    "rail": {"export", "models"},
+    "rail": {"airbrake", "validation", "estimation", "models", "kernels", "ingest"},
     "workbench": {"reporting", "validation", "export", "estimation", "models", "kernels", "ingest"},
 }
 """Room by room, which others it may import; imports point one way."""

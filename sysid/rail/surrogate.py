@@ -1,0 +1,178 @@
+"""A surrogate for every car: fitted models, chained output to input, advanced together with their states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.airbrake.consist import Consist
+from sysid.errors import ConfigError
+from sysid.models import AbstractModel
+from sysid.rail import kernel_bank
+from sysid.rail.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
+from sysid.units import PSI_IN_PA
+
+COMMAND, TAIL_VENT, SPEED, CYLINDER = "STP", "TV", "V", "BC"
+"""Channels that the train provides (psi gauge, m2, m/s), and the one that it wants (psi gauge)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stage:
+    """Models of one mapping, one per car, or one for all.
+
+    Args:
+        models: All with the same mapping, lags and neurons; parameters and scaling may differ.
+
+    Raises:
+        ConfigError: If they do not go together.
+    """
+
+    models: tuple[AbstractModel, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "models", tuple(self.models))
+        kinds = {
+            (m.mapping, m.sample_time, m.recursion.lags, m.recursion.neurons, len(m.recursion.theta))
+            for m in self.models
+        }
+        if len(kinds) != 1:
+            raise ConfigError(
+                "the models of a stage differ in more than their parameters",
+                where="stage",
+                expected="one mapping, one sample time, the same lags and neurons for every car",
+                got=f"{len(kinds)} kinds of model among {len(self.models)}",
+                remedy="fit the cars with one structure",
+            )
+
+
+class ModelBank:
+    """One stage for all cars: histories and parameters side by side, advanced by one compiled loop.
+
+    Args:
+        stage: The models.
+        cars: Number of cars; a single model is used for each.
+        rest_inputs: Value of each input at rest, in its unit.
+
+    Raises:
+        ConfigError: If the number of models does not fit.
+    """
+
+    def __init__(self, *, stage: Stage, cars: int, rest_inputs: Sequence[float]) -> None:
+        models = stage.models * cars if len(stage.models) == 1 else stage.models
+        if len(models) != cars:
+            raise ConfigError(
+                "the stage does not fit the train",
+                where=str(models[0].mapping),
+                expected=f"one model, or {cars}: one per car",
+                got=len(models),
+            )
+        self.mapping = models[0].mapping
+        recursions = [model.recursion for model in models]
+        self._lags, self._neurons = recursions[0].lags, recursions[0].neurons
+        self._theta = np.array([recursion.theta for recursion in recursions])
+        self._bounds = np.array([[recursion.low, recursion.high] for recursion in recursions])
+        scalings = [recursion.scaling for recursion in recursions]
+        self._input_offset = np.array([scaling.input_offset for scaling in scalings])
+        self._input_scale = np.array([scaling.input_scale for scaling in scalings])
+        self._output_offset = np.array([scaling.output_offset for scaling in scalings])
+        self._output_scale = np.array([scaling.output_scale for scaling in scalings])
+        depth = self._lags.depth
+        rest = np.array([model.rest_output for model in models])
+        self._inputs = np.empty((cars, depth, self._lags.n_inputs))
+        self._inputs[:] = ((np.asarray(rest_inputs) - self._input_offset) / self._input_scale)[:, None]
+        self._outputs = np.repeat(((rest - self._output_offset) / self._output_scale)[:, None], depth, axis=1)
+
+    def advance(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Advance every car.
+
+        Args:
+            inputs: In their units, shape ``(n_samples, n_cars, n_inputs)``.
+
+        Returns:
+            Outputs in their unit, shape ``(n_samples, n_cars)``.
+        """
+        samples, depth = len(inputs), self._lags.depth
+        scaled = (inputs.transpose(1, 0, 2) - self._input_offset[:, None]) / self._input_scale[:, None]
+        u = np.concatenate([self._inputs, scaled], axis=1)
+        y = np.concatenate([self._outputs, np.zeros((len(u), samples))], axis=1)
+        lags = self._lags
+        kernel_bank.advance(
+            u, y, depth, samples, lags.input_channel, lags.input_lag, lags.output_lag,
+            self._theta, self._neurons, self._bounds,
+        )  # fmt: skip
+        self._inputs, self._outputs = u[:, samples:].copy(), y[:, samples:].copy()
+        return np.ascontiguousarray((y[:, depth:] * self._output_scale[:, None] + self._output_offset[:, None]).T)
+
+
+class SurrogateBrake(AbstractBrake):
+    """A chain of fitted stages for every valve of a train: ``STP -> BP``, ``BP -> AR``, ``BP+AR -> BC`` or shorter.
+
+    An input is the command (``STP``), the tail vent (``TV``), the speed (``V``) or the output of an earlier stage. The
+    last stage gives ``BC``, in psi gauge, as the data sets have it.
+
+    Args:
+        stages: In order.
+        consist: The train: which vehicles hang on which valve.
+        rest: Value of every channel at rest, in its unit; those of stages are the rest values of their models.
+
+    Raises:
+        ConfigError: If a channel comes from nowhere or the chain does not end in ``BC``.
+    """
+
+    def __init__(self, *, stages: Sequence[Stage], consist: Consist, rest: Mapping[str, float] | None = None) -> None:
+        known: dict[str, float] = {COMMAND: consist.running_pressure, TAIL_VENT: 0.0, SPEED: 1.0, **(rest or {})}
+        self._banks: list[ModelBank] = []
+        for stage in stages:
+            model = stage.models[0]
+            missing = [name for name in model.mapping.inputs if name not in known]
+            if missing:
+                raise ConfigError(
+                    f"nothing provides {', '.join(missing)}",
+                    where=f"stage {model.mapping}",
+                    expected=f"inputs among {', '.join(known)}",
+                    got=", ".join(model.mapping.inputs),
+                    remedy="put the stage that provides it first",
+                )
+            rest_inputs = [known[name] for name in model.mapping.inputs]
+            self._banks.append(ModelBank(stage=stage, cars=consist.pairs, rest_inputs=rest_inputs))
+            known[model.mapping.output] = model.rest_output
+        if not stages or stages[-1].models[0].mapping.output != CYLINDER:
+            raise ConfigError(
+                "the chain does not end in the brake cylinder",
+                where="stages",
+                expected=f"a last stage with the output {CYLINDER}",
+                got=[str(stage.models[0].mapping) for stage in stages],
+            )
+        self.sample_time, self.vehicles, self.consist = stages[0].models[0].sample_time, consist.vehicles, consist
+        self._columns = valve_of_vehicle(consist)
+        self._knows_tail = any(TAIL_VENT in stage.models[0].mapping.inputs for stage in stages)
+
+    def advance(self, command: NDArray[np.float64], *, speed: Signal = 1.0, tail_vent: Signal = 0.0) -> BrakeOutput:
+        """Advance; see :meth:`AbstractBrake.advance`."""
+        if not self._knows_tail and np.any(np.asarray(tail_vent) > 0.0):
+            raise ConfigError(
+                "this surrogate does not know an open tail",
+                where="tail_vent",
+                expected=f"a stage with the input {TAIL_VENT}, or a closed tail",
+                got=float(np.max(tail_vent)),
+                remedy="fit on traces with a tail vent, or brake from the head only",
+            )
+        samples, cars = len(command), self.consist.pairs
+        given = {COMMAND: command, TAIL_VENT: tail_vent, SPEED: speed}
+        signals = {
+            name: np.broadcast_to(
+                np.broadcast_to(np.asarray(value, dtype=np.float64), (samples,))[:, None], (samples, cars)
+            )
+            for name, value in given.items()
+        }
+        for bank in self._banks:
+            inputs = np.stack([signals[name] for name in bank.mapping.inputs], axis=-1)
+            signals[bank.mapping.output] = bank.advance(inputs)
+        cylinders = np.zeros((samples, self.vehicles))
+        braked = self._columns >= 0
+        # A model may swing a little below the atmosphere, a cylinder cannot.
+        cylinders[:, braked] = np.maximum(signals[CYLINDER], 0.0)[:, self._columns[braked]] * PSI_IN_PA
+        return BrakeOutput(cylinders=cylinders)
