@@ -17,6 +17,7 @@ from sysid.errors import ConfigError
 from sysid.estimation.result import FitResult
 from sysid.export.card import model_card
 from sysid.export.exporters import exporter
+from sysid.export.layout import recursion_of
 from sysid.export.manifest import (
     CARD,
     MANIFEST,
@@ -161,7 +162,7 @@ def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
 
 
 def _check_finite(model: AbstractModel) -> None:
-    theta = model.recursion.theta
+    theta = recursion_of(model).theta
     lost = int(np.sum(~np.isfinite(theta)))
     if lost:  # such a file would reproduce its model: both compute nothing but NaN
         raise ConfigError(

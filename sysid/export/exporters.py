@@ -5,6 +5,7 @@ from __future__ import annotations
 from sysid.errors import ConfigError
 from sysid.export.c_exporter import CExporter
 from sysid.export.exporter import AbstractExporter
+from sysid.export.fmu_exporter import FmuExporter
 from sysid.export.onnx_exporter import OnnxExporter
 from sysid.export.torchscript import TorchScriptExporter
 
@@ -15,6 +16,8 @@ EXPORTERS: dict[str, AbstractExporter] = {
         OnnxExporter(name="onnx-float32", dtype="float32"),
         TorchScriptExporter(),
         CExporter(),
+        FmuExporter(name="fmi2", version=2),
+        FmuExporter(name="fmi3", version=3),
     )
 }
 """Every format by name."""

@@ -13,7 +13,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models import AbstractModel, History, Lags
+from sysid.errors import ConfigError
+from sysid.models import AbstractModel, History, Lags, Recursion
+
+
+def recursion_of(model: AbstractModel) -> Recursion:
+    """The recursion that a model lowers to, which is what every format is written from.
+
+    Args:
+        model: The model.
+
+    Returns:
+        The recursion.
+
+    Raises:
+        ConfigError: If it lowers to something else.
+    """
+    form = model.recursion
+    if isinstance(form, Recursion):
+        return form
+    raise ConfigError(
+        "no format can be written for this kind of model",
+        expected="a model over lagged inputs and outputs (ARX, NARX)",
+        got=model.structure.label,
+        remedy="export an ARX or NARX fit",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +110,7 @@ class StateLayout:
         Returns:
             Lines as long as the model's lags need.
         """
-        recursion = model.recursion
+        recursion = recursion_of(model)
         lengths = [max(lags, default=0) for lags in recursion.lags.inputs]
         first = [0, *accumulate(lengths)]
         scaling = recursion.scaling

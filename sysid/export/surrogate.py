@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.layout import DelayLine, StateLayout
+from sysid.export.layout import DelayLine, StateLayout, recursion_of
 from sysid.models import AbstractModel, History, Recursion
 
 Range = tuple[float, float]
@@ -33,12 +33,14 @@ class Port:
         unit: Its unit.
         identifier: The name as a lower-case C identifier.
         range: The values that an input is declared for; ``None`` where nothing is declared.
+        start: The value of an input that nobody sets.
     """
 
     name: str
     unit: str
     identifier: str
     range: Range | None = None
+    start: float = 0.0
 
     @property
     def low(self) -> float:
@@ -68,7 +70,7 @@ class Stage:
     @property
     def recursion(self) -> Recursion:
         """The form that is exported."""
-        return self.model.recursion
+        return recursion_of(self.model)
 
     @property
     def layout(self) -> StateLayout:
@@ -94,26 +96,36 @@ class Surrogate:
     stages: tuple[Stage, ...]
 
     @classmethod
-    def of(cls, model: AbstractModel, ranges: Dict[str, Range] | None = None) -> Surrogate:
+    def of(
+        cls, model: AbstractModel, ranges: Dict[str, Range] | None = None, starts: Dict[str, float] | None = None
+    ) -> Surrogate:
         """A single model as a surrogate.
 
         Args:
             model: The model.
             ranges: The values that its inputs are declared for, by channel.
+            starts: The values of inputs that nobody sets, by channel.
 
         Returns:
             A surrogate of one stage.
         """
-        return cls.wired([model], ranges)
+        return cls.wired([model], ranges, starts)
 
     @classmethod
-    def wired(cls, models: Sequence[AbstractModel], ranges: Dict[str, Range] | None = None) -> Surrogate:
+    def wired(
+        cls,
+        models: Sequence[AbstractModel],
+        ranges: Dict[str, Range] | None = None,
+        starts: Dict[str, float] | None = None,
+    ) -> Surrogate:
         """Models wired by the names of their channels.
 
         Args:
             models: In the order in which they run: a model reads an earlier one's output under its name, and
                 whatever no earlier model computes is an input of the whole.
             ranges: The values that inputs are declared for, by channel.
+            starts: The values of inputs that nobody sets, by channel; the middle of their range by default, 0
+                without one.
 
         Returns:
             The surrogate.
@@ -136,8 +148,15 @@ class Surrogate:
             )
             first += StateLayout.of(model).size
         identifiers = _identifiers(columns)
+        ranges, starts = ranges or {}, starts or {}
         ports = [
-            Port(name=name, unit=units[name], identifier=identifiers[name], range=(ranges or {}).get(name))
+            Port(
+                name=name,
+                unit=units[name],
+                identifier=identifiers[name],
+                range=ranges.get(name),
+                start=starts.get(name, sum(ranges.get(name, (0.0, 0.0))) / 2.0),
+            )
             for name in inputs
         ]
         return cls(inputs=tuple(ports), stages=tuple(stages))

@@ -22,7 +22,14 @@ def environment() -> Any:
         keep_trailing_newline=True,
         autoescape=False,  # noqa: S701 - Markdown and C; XML attributes go through their own filter
     )
-    found.filters |= {"number": _number, "real": c_real, "table": _table, "comment": _comment, "attribute": _attribute}
+    found.filters |= {
+        "number": _number,
+        "real": c_real,
+        "table": _table,
+        "comment": _comment,
+        "attribute": _attribute,
+        "c_string": _c_string,
+    }
     return found
 
 
@@ -74,6 +81,11 @@ def _comment(text: str) -> str:
 def _attribute(text: object) -> str:
     """An XML attribute's value with its quotes."""
     return quoteattr(str(text))
+
+
+def _c_string(text: str) -> str:
+    """A C string literal of printable ASCII."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _number(value: float | None, digits: int = 4) -> str:

@@ -135,6 +135,8 @@ ROWS = {
     "TorchScript, sequence": Row(format="torchscript", name="sequence.torchscript.pt"),
     "C": Row(format="c", name="{name}.c"),
     "C, float": Row(format="c", name="{name}.c", dtype="float32", tolerance=1e-3),
+    "FMI 2.0": Row(format="fmi2", name="{name}.fmi2.fmu"),
+    "FMI 3.0": Row(format="fmi3", name="{name}.fmi3.fmu"),
 }
 """Every file of every format: the table of the contract."""
 FORMATS = tuple(dict.fromkeys(row.format for row in ROWS.values()))
@@ -205,9 +207,15 @@ def opened() -> Callable[..., Exported]:
     return open_file
 
 
-@pytest.fixture(scope="session")
-def exported(model: AbstractModel, row: Row, tmp_path_factory: pytest.TempPathFactory) -> Exported:
-    return open_file(row, surrogate_of(model), tmp_path_factory.mktemp("exported"))
+FMU_MODELS = ("ARX, two inputs, dead times", "ARX, no input used", "NARX 4/4/20", "NARX against its bounds")
+"""An FMU is the C source, which meets every model, and functions around it that do not depend on the model."""
+PAIRS = [(m, r) for m in MODELS for r, row in ROWS.items() if not row.format.startswith("fmi") or m in FMU_MODELS]
+
+
+@pytest.fixture(params=PAIRS, ids=[" - ".join(pair) for pair in PAIRS], scope="session")
+def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Exported:
+    name, row = request.param
+    return open_file(ROWS[row], surrogate_of(MODELS[name]()), tmp_path_factory.mktemp("exported"))
 
 
 def random_inputs(n_samples: int, n_inputs: int, *, seed: int = 3) -> np.ndarray:

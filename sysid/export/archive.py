@@ -1,0 +1,23 @@
+"""Zip files whose bytes depend on nothing but their content."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping as Dict
+from pathlib import Path
+
+
+def write_archive(path: Path, content: Dict[str, bytes]) -> None:
+    """Write files into a zip, without date, user or machine.
+
+    Args:
+        path: The zip.
+        content: Bytes by path in the zip, in the order in which they are written.
+    """
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in content.items():
+            entry = zipfile.ZipInfo(name)
+            entry.create_system = 3  # Unix, wherever it is written
+            entry.external_attr = 0o644 << 16
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, data)

@@ -1,0 +1,194 @@
+"""The content of an FMU: the C source of the surrogate, the functions of FMI around it, and its description."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import sys
+import tempfile
+import zipfile
+from collections.abc import Mapping as Dict
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import sysid
+from sysid.errors import ConfigError
+from sysid.export.archive import write_archive
+from sysid.export.c_source import c_files
+from sysid.export.compiler import WARNINGS, build_library
+from sysid.export.flags import MEANING
+from sysid.export.fmi_units import unit_definitions
+from sysid.export.surrogate import Surrogate
+from sysid.export.templating import c_real, render
+
+HEADERS = {
+    2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
+}
+"""The standard's own headers (2-clause BSD licence, which stands in them)."""
+SYSTEMS = {"linux": ("linux", "so"), "darwin": ("darwin", "dylib"), "win32": ("win", "dll")}
+MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
+
+
+def platform_folder(version: int) -> tuple[str, str]:
+    """Where the binary of this machine lies in an FMU.
+
+    Args:
+        version: 2 or 3.
+
+    Returns:
+        The folder under ``binaries``, and the ending of the file.
+
+    Raises:
+        ConfigError: If the standard has no name for this machine.
+    """
+    system, ending = SYSTEMS.get(sys.platform, ("", ""))
+    machine = MACHINES.get(platform.machine().lower(), "")
+    if system and machine and (version == 3 or machine == "x86_64"):
+        return (f"{machine}-{'windows' if system == 'win' else system}" if version == 3 else f"{system}64"), ending
+    raise ConfigError(
+        f"FMI {version}.0 has no name for this kind of machine",
+        expected="Linux, macOS or Windows on x86_64; FMI 3.0 on aarch64 too",
+        got=f"{sys.platform} on {platform.machine()}",
+        remedy=f"leave the format fmi{version} out",
+    )
+
+
+def write_fmu(surrogate: Surrogate, version: int, path: Path) -> dict[str, Any]:
+    """Write an FMU for co-simulation, with its sources and with a binary for this machine.
+
+    Args:
+        surrogate: What to write.
+        version: 2 or 3.
+        path: The file.
+
+    Returns:
+        What a receiver must know.
+
+    Raises:
+        ConfigError: If there is no compiler, or no name for this machine.
+    """
+    folder, ending = platform_folder(version)
+    prefix = surrogate.identifier
+    variables = fmu_variables(surrogate)
+    texts, guid = _texts(surrogate, version, variables)
+    content = {name: text.encode() for name, text in texts.items()}
+    content[f"binaries/{folder}/{prefix}.{ending}"] = _binary(content, prefix, version, f"{prefix}.{ending}")
+    write_archive(path, content)
+    return {
+        "fmi": f"{version}.0",
+        "model_identifier": prefix,
+        "platforms": [folder],
+        "sources": True,
+        "guid": guid,
+        "output_offset": "after doStep(t, h) the outputs are those of the sample whose inputs were set at t",
+    }
+
+
+def fmu_variables(surrogate: Surrogate) -> list[dict[str, Any]]:
+    """The variables in the order of the model description, as it writes them.
+
+    Args:
+        surrogate: What is written.
+
+    Returns:
+        Inputs, outputs, outputs at rest, flags.
+    """
+    taken = {port.name for port in (*surrogate.inputs, *surrogate.outputs)}
+    rows: list[dict[str, Any]] = []
+    for port in surrogate.inputs:
+        told = "no range declared" if port.range is None else f"declared from {port.low!r} to {port.high!r}"
+        kind = {"causality": "input", "variability": "continuous", "initial": ""}
+        rows.append({"name": port.name, **kind, "unit": port.unit, "start": c_real(port.start), "description": told})
+    for port in surrogate.outputs:
+        kind = {"causality": "output", "variability": "continuous", "initial": "calculated"}
+        rows.append(
+            {"name": port.name, **kind, "unit": port.unit, "start": None, "description": "of the sample before"}
+        )
+    for port, rest in zip(surrogate.outputs, surrogate.rest_outputs, strict=True):
+        name, kind = _free(f"{port.name}_at_rest", taken), {"causality": "parameter", "variability": "fixed"}
+        text = f"{port.name} before the first sample: the system has stood at it and at the inputs for ever"
+        rows.append({"name": name, **kind, "initial": "exact", "unit": port.unit, "start": c_real(rest)})
+        rows[-1]["description"] = text
+    kind = {"causality": "output", "variability": "discrete", "initial": "exact"}
+    text = "0, or the sum of: " + "; ".join(f"{int(flag)}: {words}" for flag, words in MEANING.items())
+    rows.append({"name": _free("flags", taken), **kind, "unit": "1", "start": "0", "description": text})
+    return [
+        row | {"index": i, "reference": i, "integer": i == len(rows), "unit": "" if row["unit"] == "1" else row["unit"]}
+        for i, row in enumerate(rows, start=1)
+    ]
+
+
+def _free(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def _texts(surrogate: Surrogate, version: int, variables: list[dict[str, Any]]) -> tuple[dict[str, str], str]:
+    """The text files of the FMU by their paths, and the token that its binary asks for."""
+    prefix = surrogate.identifier
+    code = c_files(surrogate)
+    values = {
+        "p": prefix,
+        "P": prefix.upper(),
+        "version": sysid.__version__,
+        "tool": f"sysid-workbench {sysid.__version__}",
+        "name": prefix,
+        "description": f"{surrogate.mapping}: {surrogate.label}, one sample every {surrogate.sample_time!r} s",
+        "sample_time": surrogate.sample_time,
+        "sources": [f"{prefix}.c", f"fmi{version}.c"],
+        "variables": variables,
+        "time_name": _free("time", {row["name"] for row in variables}),
+        "units": unit_definitions(row["unit"] for row in variables if row["unit"]),
+        "starts": [c_real(port.start) for port in surrogate.inputs],
+        "rests": [c_real(value) for value in surrogate.rest_outputs],
+    }
+    whole = "".join(code.values()) + repr(sorted(values.items()))
+    token = hashlib.sha256(whole.encode()).hexdigest()
+    guid = f"{{{token[:8]}-{token[8:12]}-{token[12:16]}-{token[16:20]}-{token[20:32]}}}"
+    values |= {"token": token, "guid": guid}
+    texts = {"modelDescription.xml": render(f"fmi{version}.xml.j2", **values)}
+    for name, text in code.items():
+        texts[f"sources/{name}"] = text
+    texts["sources/fmu_instance.h"] = render("fmu_instance.h.j2", **values)
+    texts[f"sources/fmi{version}.c"] = render(f"fmi{version}.c.j2", **values)
+    if version == 3:
+        texts["sources/buildDescription.xml"] = render("fmi3_build.xml.j2", **values)
+    headers = resources.files("sysid.export") / "fmi_headers"
+    for name in HEADERS[version]:
+        texts[f"sources/{name}"] = (headers / name).read_text(encoding="utf-8")
+    return texts, guid
+
+
+def _binary(content: Dict[str, bytes], prefix: str, version: int, name: str) -> bytes:
+    with tempfile.TemporaryDirectory() as workplace:
+        folder = Path(workplace)
+        for path, data in content.items():
+            if path.startswith("sources/"):
+                (folder / Path(path).name).write_bytes(data)
+        # Two FMUs in one process must not see each other's functions: only those of FMI are visible.
+        flags = ("-fvisibility=hidden", *WARNINGS)
+        build_library([f"{prefix}.c", f"fmi{version}.c"], folder, name, flags)
+        return (folder / name).read_bytes()
+
+
+def unpack_binary(path: Path, version: int, target: Path) -> Path:
+    """Take the binary for this machine out of an FMU.
+
+    Args:
+        path: The FMU.
+        version: 2 or 3.
+        target: The folder to put it in.
+
+    Returns:
+        The file.
+    """
+    folder, ending = platform_folder(version)
+    with zipfile.ZipFile(path) as archive:
+        (member,) = [name for name in archive.namelist() if name.startswith(f"binaries/{folder}/")]
+        library = target / f"model.{ending}"
+        library.write_bytes(archive.read(member))
+    return library

@@ -1,0 +1,274 @@
+"""The FMUs in an importer that is not ours: valid, equal to the model, with a state that can be stored."""
+
+from __future__ import annotations
+
+import subprocess
+import zipfile
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
+
+from sysid.errors import ConfigError
+from sysid.export import EXPORTERS, Flag, expected_flags
+from sysid.export.fmi_units import unit_definitions
+from sysid.export.fmu import HEADERS, fmu_variables, platform_folder
+
+VERSIONS = {"fmi2": FMU2Slave, "fmi3": FMU3Slave}
+
+
+@pytest.fixture(scope="module", params=["a model", "a cascade"])
+def surrogate(request, models, declared, cascade):
+    return declared(models["NARX 4/4/20"]()) if request.param == "a model" else cascade
+
+
+@pytest.fixture(scope="module", params=VERSIONS)
+def fmu(request, surrogate, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fmu")
+    (file,) = EXPORTERS[request.param].write(surrogate, folder)
+    return folder / file.name
+
+
+@pytest.fixture
+def slave(fmu, tmp_path):
+    """An instance after its initialisation, with its inputs at 50."""
+    description = fmpy.read_model_description(fmu)
+    (kind,) = [kind for name, kind in VERSIONS.items() if name in fmu.name]
+    one = kind(
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(fmu, tmp_path / "x"),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="one",
+    )
+    one.instantiate()
+    variables = {variable.name: variable.valueReference for variable in description.modelVariables}
+    one.references = variables
+    one.inputs = [v.valueReference for v in description.modelVariables if v.causality == "input"]
+    one.outputs = [
+        v.valueReference for v in description.modelVariables if v.causality == "output" and v.name != "flags"
+    ]
+    one.set = one.setReal if "fmi2" in fmu.name else one.setFloat64
+    one.get = one.getReal if "fmi2" in fmu.name else one.getFloat64
+    one.flags = lambda: (one.getInteger if "fmi2" in fmu.name else one.getInt32)([variables["flags"]])[0]
+    initialise(one)
+    yield one
+    one.terminate()
+    one.freeInstance()
+
+
+def initialise(one):
+    if isinstance(one, FMU2Slave):
+        one.setupExperiment(startTime=0.0)
+    one.enterInitializationMode()
+    one.set(one.inputs, [50.0] * len(one.inputs))
+    one.exitInitializationMode()
+
+
+def walk(one, u, first=0):
+    """Steps of 0.1 s, one a row."""
+    rows, flags = [], []
+    for i, row in enumerate(u):
+        one.set(one.inputs, row.tolist())
+        one.doStep(currentCommunicationPoint=0.1 * (first + i), communicationStepSize=0.1)
+        rows.append(one.get(one.outputs))
+        flags.append(one.flags())
+    return np.array(rows), np.array(flags)
+
+
+def test_validation_finds_nothing(fmu):
+    assert validate_fmu(str(fmu)) == []
+
+
+def test_a_simulation_by_fmpy_equals_the_model_with_the_offset_of_one_step(fmu, surrogate, inputs):
+    u, names = inputs(500, len(surrogate.inputs)), [port.name for port in surrogate.inputs]
+    table = np.zeros(len(u), dtype=[("time", float), *((name, float) for name in names)])
+    table["time"] = 0.1 * np.arange(len(u))
+    for column, name in zip(u.T, names, strict=True):
+        table[name] = column
+    start = dict(zip(names, u[0].tolist(), strict=True))
+    result = fmpy.simulate_fmu(
+        str(fmu),
+        stop_time=0.1 * len(u),
+        output_interval=0.1,
+        input=table,
+        start_values=start,
+        set_input_derivatives=False,
+    )
+    found = np.column_stack([result[port.name] for port in surrogate.outputs])
+    np.testing.assert_array_equal(found[0], surrogate.rest_outputs)
+    expected = surrogate.simulate(u)
+    np.testing.assert_allclose(found[1:], expected, rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(result["flags"][1:], expected_flags(surrogate, u, expected))
+
+
+def test_description_has_units_start_values_and_meaning(fmu, surrogate):
+    description = fmpy.read_model_description(fmu)
+    variables = {variable.name: variable for variable in description.modelVariables}
+    for port in surrogate.inputs:
+        assert (variables[port.name].unit, float(variables[port.name].start)) == ("psi", port.start)
+    for port, rest in zip(surrogate.outputs, surrogate.rest_outputs, strict=True):
+        assert variables[port.name].unit == "psi"
+        assert float(variables[f"{port.name}_at_rest"].start) == rest
+    (unit,) = description.unitDefinitions
+    base = unit.baseUnit
+    assert (unit.name, base.kg, base.m, base.s) == ("psi", 1, -1, -2)
+    assert base.factor == pytest.approx(6894.757, rel=1e-6)
+    assert float(description.defaultExperiment.stepSize) == 0.1
+    assert "1: an input is outside its declared range" in variables["flags"].description
+
+
+def test_state_can_be_kept_set_stored_and_read(slave, surrogate, inputs):
+    u = inputs(60, len(surrogate.inputs))
+    fmi2 = isinstance(slave, FMU2Slave)
+    walk(slave, u[:20])
+    kept = slave.getFMUstate() if fmi2 else slave.getFMUState()
+    stored = slave.serializeFMUstate(kept) if fmi2 else slave.serializeFMUState(kept)
+    (slave.freeFMUstate if fmi2 else slave.freeFMUState)(kept)
+    once, _ = walk(slave, u[20:], first=20)
+    again = slave.deSerializeFMUstate(stored) if fmi2 else slave.deserializeFMUState(stored)
+    (slave.setFMUstate if fmi2 else slave.setFMUState)(again)
+    (slave.freeFMUstate if fmi2 else slave.freeFMUState)(again)
+    np.testing.assert_array_equal(walk(slave, u[20:], first=20)[0], once)
+
+
+@pytest.mark.parametrize("damage", ["cut", "of another model", "empty"])
+def test_bytes_that_are_no_state_are_refused(slave, damage):
+    fmi2 = isinstance(slave, FMU2Slave)
+    kept = slave.getFMUstate() if fmi2 else slave.getFMUState()
+    stored = slave.serializeFMUstate(kept) if fmi2 else slave.serializeFMUState(kept)
+    (slave.freeFMUstate if fmi2 else slave.freeFMUState)(kept)
+    bad = {"cut": stored[:-8], "of another model": b"\x00" * 8 + stored[8:], "empty": b"\x00"}[damage]
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        (slave.deSerializeFMUstate if fmi2 else slave.deserializeFMUState)(bad)
+
+
+def test_not_a_number_is_flagged_and_forgotten_on_reset(slave, surrogate, inputs):
+    u = inputs(30, len(surrogate.inputs))
+    clean, flags = walk(slave, u)
+    lost = u.copy()
+    lost[3, 0] = np.nan
+    slave.reset()
+    initialise(slave)
+    found, raised = walk(slave, lost)
+    assert raised[3] & Flag.NOT_A_NUMBER
+    assert np.isnan(found[-1]).any()
+    slave.reset()
+    initialise(slave)
+    again, same = walk(slave, u)
+    np.testing.assert_array_equal(again, clean)
+    np.testing.assert_array_equal(same, flags)
+
+
+def test_outside_the_declared_range_it_answers_and_says_so(slave, surrogate):
+    high = surrogate.inputs[0].high
+    values = np.full((2, len(surrogate.inputs)), 50.0)
+    values[1, 0] = np.nextafter(high, np.inf)
+    found, raised = walk(slave, values)
+    assert np.isfinite(found).all()
+    assert [bool(flag & Flag.OUTSIDE_RANGE) for flag in raised] == [False, True]
+
+
+def test_a_step_of_several_samples_holds_the_inputs(slave, surrogate):
+    slave.set(slave.inputs, [60.0] * len(surrogate.inputs))
+    slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.5)
+    long = slave.get(slave.outputs)
+    slave.reset()
+    initialise(slave)
+    short, _ = walk(slave, np.full((5, len(surrogate.inputs)), 60.0))
+    np.testing.assert_array_equal(long, short[-1])
+
+
+@pytest.mark.parametrize("step", [0.05, 0.15, 0.0, -0.1, float("nan")])
+def test_a_step_that_is_not_whole_samples_is_refused(slave, step):
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=step)
+
+
+def test_outputs_cannot_be_set_nor_rest_values_after_the_start(slave, surrogate):
+    rest = slave.references[f"{surrogate.outputs[0].name}_at_rest"]
+    for reference in (slave.outputs[0], rest, 999):
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            slave.set([reference], [1.0])
+
+
+def test_a_value_at_rest_set_before_the_start_is_where_the_run_begins(slave, surrogate):
+    rest = slave.references[f"{surrogate.outputs[0].name}_at_rest"]
+    slave.reset()
+    slave.set([rest], [12.5])
+    initialise(slave)
+    assert slave.get([slave.outputs[0]]) == [12.5]
+    u = np.full((3, len(surrogate.inputs)), 50.0)
+    changed = surrogate.rest_outputs.copy()
+    changed[0] = 12.5
+    np.testing.assert_allclose(walk(slave, u)[0], surrogate.simulate(u, rest_outputs=changed), rtol=0.0, atol=1e-9)
+
+
+def test_its_sources_compile_on_their_own_without_a_warning(fmu, tmp_path):
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(tmp_path, [name for name in archive.namelist() if name.startswith("sources/")])
+    sources = sorted(path.name for path in (tmp_path / "sources").glob("*.c"))
+    command = ["gcc", "-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-c", *sources]
+    subprocess.run(command, cwd=tmp_path / "sources", check=True)
+
+
+def test_headers_are_the_standards_own():
+    from pathlib import Path
+
+    import sysid.export
+
+    ours, theirs = Path(sysid.export.__file__).parent / "fmi_headers", Path(fmpy.__file__).parent / "c-code"
+    for names in HEADERS.values():
+        for name in names:
+            assert (ours / name).read_bytes() == (theirs / name).read_bytes()
+
+
+def test_names_that_would_meet_are_kept_apart(models, declared):
+    from dataclasses import replace
+
+    from sysid.export import Surrogate
+    from sysid.models import Mapping
+
+    model = replace(models["NARX 4/4/20"](), mapping=Mapping(inputs=("flags", "time"), output="flags_"))
+    names = [row["name"] for row in fmu_variables(Surrogate.of(model))]
+    assert names == ["flags", "time", "flags_", "flags__at_rest", "flags__"]
+
+
+@pytest.mark.parametrize("format_name", VERSIONS)
+def test_names_and_units_of_any_kind_validate(format_name, models, tmp_path):
+    from dataclasses import replace
+
+    from sysid.export import Surrogate
+    from sysid.models import Mapping
+
+    model = replace(
+        models["NARX 4/4/20"](),
+        mapping=Mapping(inputs=('a<b & "c"', "time"), output="Δp"),
+        input_units=("degC", "1"),
+        output_unit="kPa",
+    )
+    (file,) = EXPORTERS[format_name].write(Surrogate.of(model), tmp_path)
+    assert validate_fmu(str(tmp_path / file.name)) == []
+
+
+@pytest.mark.parametrize(
+    ("unit", "base"),
+    [
+        ("psi", {"kg": "1", "m": "-1", "s": "-2", "factor": "6894.75729316836"}),
+        ("bar", {"kg": "1", "m": "-1", "s": "-2", "factor": "100000.0"}),
+        ("V", {"kg": "1", "m": "2", "s": "-3", "A": "-1", "factor": "1.0"}),
+        ("degC", {"K": "1", "factor": "1.0", "offset": "273.15"}),
+        ("m/s", {"m": "1", "s": "-1", "factor": "1.0"}),
+        ("bit", None),
+    ],
+)
+def test_units_in_the_words_of_fmi(unit, base):
+    assert unit_definitions([unit, unit]) == [{"name": unit, "base": base}]
+
+
+def test_a_machine_without_a_name_in_the_standard_is_told(monkeypatch):
+    monkeypatch.setattr("platform.machine", lambda: "sparc")
+    with pytest.raises(ConfigError, match=r"(?s)no name for this kind of machine.*sparc"):
+        platform_folder(2)
