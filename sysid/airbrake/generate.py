@@ -53,6 +53,7 @@ class _Random(BaseModel):
     recharge: tuple[float, float] = (30.0, 300.0)
     partial_release: float = 0.15
     emergency: float = 0.0
+    positions: tuple[float, ...] | None = None
 
 
 class _Recipe(BaseModel):

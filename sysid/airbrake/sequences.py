@@ -28,6 +28,8 @@ class RandomCommand:
         recharge: Shortest and longest time released, in s.
         partial_release: Probability that an application is released in part first.
         emergency: Probability that an application is an emergency.
+        positions: Positions in psi gauge that applications are confined to, in one or several steps downwards;
+            ``None`` for any between minimum and full service.
 
     Raises:
         ConfigError: If a limit is not a limit.
@@ -47,6 +49,7 @@ class RandomCommand:
     recharge: tuple[float, float] = (30.0, 300.0)
     partial_release: float = 0.15
     emergency: float = 0.0
+    positions: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         limits = {
@@ -58,6 +61,8 @@ class RandomCommand:
             "partial_release": 0.0 <= self.partial_release <= 1.0,
             "emergency": 0.0 <= self.emergency <= 1.0,
             "duration": self.duration > 0.1,
+            "positions": self.positions is None
+            or (len(self.positions) > 0 and all(0.0 < p < self.running_pressure for p in self.positions)),
         }
         for name, holds in limits.items():
             if not holds:
@@ -93,6 +98,10 @@ class RandomCommand:
         released = (self.running_pressure, rng.uniform(*self.recharge))
         if rng.random() < self.emergency:
             return [(EMERGENCY, rng.uniform(*self.hold)), released]
+        if self.positions is not None:
+            count = int(rng.integers(1, min(self.steps, len(self.positions)) + 1))
+            chosen = sorted(rng.choice(self.positions, size=count, replace=False), reverse=True)
+            return [*((float(position), rng.uniform(*self.hold)) for position in chosen), released]
         kind = rng.integers(4)  # 0 minimum, 1 full, else between
         deepest = self.minimum_reduction if kind == 0 else self.full_reduction
         if kind > 1:

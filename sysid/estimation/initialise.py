@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid.estimation.regularisation import Group, Prior
 from sysid.models import Lags
 
-READOUT_SPREAD = 1e-2
+READOUT_SPREAD = 1e-3
 """Standard deviation of the initial readout. Small, so that the first free run is the linear part's: bounded, and
 with gradients that mean something."""
 
@@ -62,38 +62,45 @@ class Layout:
             centre[self.last_output] = 1.0
         return centre
 
-    def prior(self, *, alpha: float, beta: float) -> Prior:
+    def prior(self, centre: NDArray[np.float64], *, alpha: float, beta: float) -> Prior:
         """The prior a fit begins with.
 
+        The hidden weights of each regressor are a group of their own, so that the evidence can find a regressor
+        unimportant (automatic relevance determination, MacKay 1994); biases, readout and linear part are groups too.
+
         Args:
+            centre: What the parameters are drawn to, shape ``(n_parameters,)``.
             alpha: Precision of every group.
             beta: Precision of the residuals.
 
         Returns:
-            Groups ``hidden``, ``readout`` and ``linear`` around :meth:`centre`.
+            The prior.
         """
-        parts = {"hidden": self.hidden, "readout": self.readout, "linear": self.affine}
-        groups = tuple(
-            Group(name=name, members=np.arange(part.start, part.stop))
-            for name, part in parts.items()
-            if part.stop > part.start
-        )
-        return Prior(centre=self.centre(), groups=groups, alphas=np.full(len(groups), alpha), beta=beta)
+        r, k = self.lags.n_regressors, self.neurons
+        by_regressor = np.arange(k * r).reshape(k, r)
+        members = {f"hidden {i}": by_regressor[:, i] for i in range(r)} | {
+            "bias": np.arange(k * r, k * (r + 1)),
+            "readout": np.arange(self.readout.start, self.readout.stop),
+            "linear": np.arange(self.affine.start, self.affine.stop),
+        }
+        groups = tuple(Group(name=name, members=places) for name, places in members.items() if len(places))
+        return Prior(centre=centre, groups=groups, alphas=np.full(len(groups), alpha), beta=beta)
 
-    def draw(self, rng: np.random.Generator) -> NDArray[np.float64]:
+    def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
         """A random start after Nguyen and Widrow 1990.
 
         Directions are random, their length ``0.7 * neurons ** (1 / n_regressors)`` and the biases spread over it,
-        so that the active regions of the neurons tile the unit cube in which scaled data lie.
+        so that the active regions of the neurons tile the unit cube in which scaled regressors lie.
 
         Args:
             rng: Source of randomness.
+            centre: Where the linear part starts, shape ``(n_parameters,)``.
 
         Returns:
             Flat parameters.
         """
         r, k = self.lags.n_regressors, self.neurons
-        theta = self.centre()
+        theta = centre.copy()
         if k:
             directions = rng.uniform(-1.0, 1.0, (k, r))
             length = 0.7 * k ** (1.0 / r)

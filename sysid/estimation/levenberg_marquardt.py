@@ -77,20 +77,32 @@ class Solution:
     """Where a fit ended.
 
     Args:
-        theta: Flat parameters.
+        state: Where it stands; a later run can go on from here.
         status: Why it stopped.
-        curve: One entry per iteration, the start first.
-        prior: Precisions at the end.
-        evidence: From the last update; ``None`` if there was none.
-        at: Loss, gradient and Gauss-Newton matrix at ``theta``.
     """
 
-    theta: NDArray[np.float64]
+    state: State
     status: Status
-    curve: tuple[Iteration, ...]
-    prior: Prior
-    evidence: Evidence | None
-    at: Linearisation
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """Flat parameters."""
+        return self.state.theta
+
+    @property
+    def curve(self) -> tuple[Iteration, ...]:
+        """One entry per iteration, the start first."""
+        return self.state.curve
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """From the last update; ``None`` if there was none."""
+        return self.state.evidence
+
+    @property
+    def at(self) -> Linearisation:
+        """Loss, gradient and Gauss-Newton matrix at ``theta``."""
+        return self.state.at
 
 
 def _ignore(_: Iteration) -> None:
@@ -117,10 +129,7 @@ class LevenbergMarquardt:
     should_stop: Callable[[], bool] = lambda: False
 
     def minimise(self, provider: AbstractProvider, theta: NDArray[np.float64], prior: Prior) -> Solution:
-        """Fit the parameters.
-
-        An interruption from the keyboard ends the fit, not the program: the best parameters so far come
-        back with the status ``INTERRUPTED``.
+        """Fit the parameters from a start.
 
         Args:
             provider: Residuals and Jacobians.
@@ -130,37 +139,45 @@ class LevenbergMarquardt:
         Returns:
             The solution; it is never worse than the start.
         """
-        started = time.perf_counter()
         # BLAS threads that wake for matrices of this size cost more than they give (measured: 92 ms an epoch of
         # 20,000 x 281 with two threads, 45 ms with one); the second core is better spent on another start.
         with threadpool_limits(1, "blas"):
             state = State(theta=theta, at=provider.linearise(theta), damping=self.damping, prior=prior)
-            state = self._record(state, provider, started)
-            first = state
-            status: Status | None = None
+        return self.resume(provider, self._record(state, provider, 0.0))
+
+    def resume(self, provider: AbstractProvider, state: State) -> Solution:
+        """Go on with a fit.
+
+        An interruption from the keyboard ends the fit, not the program: the best parameters so far come
+        back with the status ``INTERRUPTED``.
+
+        Args:
+            provider: Residuals and Jacobians, as in the run before.
+            state: Where that run stood.
+
+        Returns:
+            The solution; it is never worse than the state.
+        """
+        first, before = state, state.curve[-1].elapsed_s
+        started = time.perf_counter()
+        status: Status | None = None
+        with threadpool_limits(1, "blas"):
             try:
                 while status is None:
-                    state = self._record(self._step(state, provider), provider, started)
+                    elapsed = time.perf_counter() - started
                     status = self.termination.check(
-                        iteration=state.iteration,
-                        started=started,
-                        losses=list(state.losses),
-                        damping=state.damping.factor,
+                        iteration=state.iteration, elapsed=elapsed, losses=state.losses, damping=state.damping.factor
                     )
-                    if status is None and self.should_stop():
+                    if status is None:
+                        state = self._step(state, provider)
+                        state = self._record(state, provider, before + time.perf_counter() - started)
+                    if self.should_stop():
                         status = Status.INTERRUPTED
             except KeyboardInterrupt:
                 status = Status.INTERRUPTED
         if status is Status.STALLED and state.at.loss >= first.at.loss:
             status = Status.NOT_IMPROVED
-        return Solution(
-            theta=state.theta,
-            status=status,
-            curve=state.curve,
-            prior=state.prior,
-            evidence=state.evidence,
-            at=state.at,
-        )
+        return Solution(state=state, status=status)
 
     def _step(self, state: State, provider: AbstractProvider) -> State:
         ridge = state.prior.precision / state.prior.beta
@@ -175,8 +192,10 @@ class LevenbergMarquardt:
             promised = -float(g @ step + 0.5 * step @ (H @ step))
             gain = (now - provider.loss(trial) - state.prior.penalty(trial)) / promised if promised > 0.0 else -1.0
             if gain > MIN_GAIN:
-                state = replace(state, theta=trial, at=provider.linearise(trial), damping=damping.accepted(gain))
-                return self._with_evidence(replace(state, iteration=state.iteration + 1), provider)
+                at = provider.linearise(trial)
+                if at.finite:
+                    state = replace(state, theta=trial, at=at, damping=damping.accepted(gain))
+                    return self._with_evidence(replace(state, iteration=state.iteration + 1), provider)
             damping = damping.rejected()
         return replace(state, damping=damping, iteration=state.iteration + 1)
 
@@ -186,13 +205,13 @@ class LevenbergMarquardt:
         prior, evidence = update(state.prior, state.theta, state.at, provider.n_samples)
         return replace(state, prior=prior, evidence=evidence)
 
-    def _record(self, state: State, provider: AbstractProvider, started: float) -> State:
+    def _record(self, state: State, provider: AbstractProvider, elapsed: float) -> State:
         entry = Iteration(
             iteration=state.iteration,
             mse=2.0 * state.at.loss / provider.n_samples,
             damping=state.damping.factor,
             effective_parameters=state.evidence.total_effective_parameters if state.evidence else float("nan"),
-            elapsed_s=time.perf_counter() - started,
+            elapsed_s=elapsed,
         )
         self.on_iteration(entry)
         # The objective moves with the precisions, so progress is judged by the residuals' part alone.

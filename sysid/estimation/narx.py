@@ -2,126 +2,23 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.estimation import starts
 from sysid.estimation.arx import first_output
+from sysid.estimation.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.initialise import Layout
-from sysid.estimation.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
-from sysid.estimation.provider import RecursionProvider, experiments_of
+from sysid.estimation.provider import Experiment, RecursionProvider, experiments_of
+from sysid.estimation.regression import lagged
 from sysid.estimation.result import FitResult, Loop, Status
-from sysid.estimation.termination import Termination
-from sysid.models import NARX, Mapping, NARXModel, Recursion, Scaling, Start
-from sysid.models.narx import CLAMP
+from sysid.estimation.training import FitProgress, Training
+from sysid.models import NARX, Mapping, NARXModel, Scaling, Start
 from sysid.traces import Trace
-
-INITIAL_ALPHA = 1e-2
-"""Precision of the weights before the evidence has spoken, with residuals of precision 1: weak, but enough to keep
-the first steps of an underdetermined network small."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Training:
-    """How a network is trained.
-
-    Args:
-        loop: ``closed`` minimises the error of the free run, ``open`` that of the one-step prediction.
-        max_iterations: Levenberg-Marquardt iterations of each start.
-        max_time_s: Wall time of each start in seconds.
-        tolerance: Relative improvement over ``patience`` iterations below which a fit has converged.
-        patience: Iterations over which improvement is judged.
-        starts: Random starts; the best one is kept.
-        seed: Seed of the first start; each start's own seed is derived from it.
-        choose_by: What picks among the starts: ``selection`` (least free-run error on traces that are used for
-            nothing else) or ``evidence``.
-        open_iterations: Iterations in open loop before a closed-loop fit begins.
-        workers: Starts that run at the same time.
-    """
-
-    loop: Loop = Loop.CLOSED
-    max_iterations: int = 200
-    max_time_s: float = float("inf")
-    tolerance: float = 1e-4
-    patience: int = 20
-    starts: int = 1
-    seed: int = 0
-    choose_by: str = "selection"
-    open_iterations: int = 0
-    workers: int = 2
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "loop", Loop(self.loop))
-        if self.choose_by not in {"selection", "evidence"}:
-            raise ConfigError(
-                "not a way to choose between starts",
-                where="choose_by",
-                expected="selection or evidence",
-                got=repr(self.choose_by),
-                remedy="write choose_by: selection and name a selection data set, or choose_by: evidence",
-            )
-        for name in ("max_iterations", "patience", "starts", "workers"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitProgress:
-    """What a progress bar shows.
-
-    Args:
-        stage: What is being done, in words.
-        start: Which start, from 1 on.
-        starts: How many there are.
-        iteration: Iterations of this start done.
-        max_iterations: At most so many.
-        mse: Mean squared error on the estimation traces, in the output's unit squared.
-        elapsed_s: Seconds since this start began.
-    """
-
-    stage: str
-    start: int
-    starts: int
-    iteration: int
-    max_iterations: int
-    mse: float
-    elapsed_s: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Task:
-    """Everything the starts of one fit have in common."""
-
-    training: Training
-    network: NARX
-    layout: Layout
-    template: NARXModel
-    open_loop: RecursionProvider
-    closed_loop: RecursionProvider
-    selection: Sequence[Trace]
-    start: Start
-    on_progress: Callable[[FitProgress], None]
-    stop: threading.Event = field(default_factory=threading.Event)
-
-    def model(self, theta: NDArray[np.float64]) -> NARXModel:
-        return replace(self.template, theta=theta)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Candidate:
-    """One start's outcome."""
-
-    seed: int | None
-    solution: Solution
-    model: NARXModel
-    selection_mse: float
-    seconds: float
 
 
 def fit_narx(
@@ -159,16 +56,95 @@ def fit_narx(
         ConfigError: If the structure does not fit the mapping, or ``initial`` has another structure.
     """
     began = time.perf_counter()
-    training = training or Training()
-    task = _prepare(traces, mapping, network, training, start or Start(), rest_output, selection, on_progress)
-    first = _initial_parameters(initial, task)
-    candidates = _run_starts(task, first)
-    chosen, how = _choose(candidates, training.choose_by, bool(selection))
-    scale = task.template.scaling.output_scale**2
+    training, start = training or Training(), start or Start()
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    experiments = experiments_of(traces, mapping, start, rest)
+    template = _template(traces[0], mapping, network, experiments, rest)
+    layout = Layout(lags=network.lags(len(mapping.inputs)), neurons=network.neurons, linear=network.feedthrough)
+    to_plain = _basis(training, template, experiments, layout).to_plain(layout)
+    inner = RecursionProvider(template=template.recursion, experiments=experiments, closed=training.loop is Loop.CLOSED)
+    race = starts.Race(
+        training=training,
+        layout=layout,
+        provider=RebasedProvider(inner=inner, to_plain=to_plain),
+        to_plain=to_plain,
+        template=template,
+        selection=selection,
+        start=start,
+        initial=_initial_parameters(initial, network),
+        on_progress=on_progress,
+    )
+    candidates = starts.run(race)
+    chosen = min(candidates, key=lambda candidate: starts.rank(candidate, training.choose_by))
+    status = _status(chosen, candidates, interrupted=race.stop.is_set())
+    return _result(chosen, candidates, training, status, time.perf_counter() - began)
+
+
+def _template(
+    first: Trace, mapping: Mapping, network: NARX, experiments: Sequence[Experiment], rest: float
+) -> NARXModel:
+    """The model but for its parameters."""
+    layout = Layout(lags=network.lags(len(mapping.inputs)), neurons=network.neurons, linear=network.feedthrough)
+    return NARXModel(
+        network=network,
+        theta=layout.centre(),
+        scaling=Scaling.to_unit_range([e.inputs for e in experiments], [e.output for e in experiments]),
+        mapping=mapping,
+        sample_time=first.sample_time,
+        input_units=tuple(first.channel(name).unit for name in mapping.inputs),
+        output_unit=first.channel(mapping.output).unit,
+        rest_output=rest,
+    )
+
+
+def _basis(
+    training: Training, template: NARXModel, experiments: Sequence[Experiment], layout: Layout
+) -> RegressorBasis:
+    if training.basis == "plain" or not layout.linear:
+        # The constant and linear part absorb the shift of the basis; without them the plain regressors remain.
+        return RegressorBasis.identity(layout.lags)
+    records = []
+    for experiment in experiments:
+        u, y = template.recursion.extended(experiment.inputs, experiment.history)
+        y[layout.lags.depth :] = template.scaling.scale_output(experiment.output)
+        records.append(lagged(u, y, layout.lags, len(experiment.output)))
+    return RegressorBasis.levels_and_rates(layout.lags, np.concatenate(records))
+
+
+def _initial_parameters(initial: FitResult | None, network: NARX) -> NDArray[np.float64] | None:
+    if initial is None:
+        return None
+    if not isinstance(initial.model, NARXModel) or initial.model.network != network:
+        raise ConfigError(
+            "the initial fit has another structure",
+            where="initial",
+            expected=network.label,
+            got=initial.model.structure.label,
+            remedy="name a fit with the same delays and neurons, or leave initial out",
+        )
+    return initial.model.theta
+
+
+def _status(chosen: starts.Candidate, candidates: Sequence[starts.Candidate], *, interrupted: bool) -> Status:
+    if interrupted:
+        return Status.INTERRUPTED
+    iteration = chosen.solution.state.iteration
+    later = any(c.number == chosen.number and c.solution.state.iteration > iteration for c in candidates)
+    return Status.STOPPED_EARLY if later else chosen.solution.status
+
+
+def _result(
+    chosen: starts.Candidate,
+    candidates: Sequence[starts.Candidate],
+    training: Training,
+    status: Status,
+    seconds: float,
+) -> FitResult:
     curve = chosen.solution.curve
+    scale = chosen.model.scaling.output_scale**2
     return FitResult(
         model=chosen.model,
-        status=chosen.solution.status,
+        status=status,
         loop=training.loop,
         history={
             "iteration": np.array([entry.iteration for entry in curve], dtype=np.float64),
@@ -176,172 +152,26 @@ def fit_narx(
             "effective_parameters": np.array([entry.effective_parameters for entry in curve]),
             "elapsed_s": np.array([entry.elapsed_s for entry in curve]),
         },
-        train_time_s=time.perf_counter() - began,
+        train_time_s=seconds,
         seed=chosen.seed,
         evidence=chosen.solution.evidence,
-        notes=(*_spread(candidates, chosen, how, scale),),
+        notes=_notes(chosen, candidates, training),
     )
 
 
-def _prepare(  # noqa: PLR0917  # private, called once, in the order of fit_narx
-    traces: Sequence[Trace],
-    mapping: Mapping,
-    network: NARX,
-    training: Training,
-    start: Start,
-    rest_output: float | None,
-    selection: Sequence[Trace],
-    on_progress: Callable[[FitProgress], None],
-) -> _Task:
-    rest = first_output(traces, mapping) if rest_output is None else rest_output
-    experiments = experiments_of(traces, mapping, start, rest)
-    scaling = Scaling.to_unit_range([e.inputs for e in experiments], [e.output for e in experiments])
-    layout = Layout(lags=network.lags(len(mapping.inputs)), neurons=network.neurons, linear=network.feedthrough)
-    template = NARXModel(
-        network=network,
-        theta=layout.centre(),
-        scaling=scaling,
-        mapping=mapping,
-        sample_time=traces[0].sample_time,
-        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
-        output_unit=traces[0].channel(mapping.output).unit,
-        rest_output=rest,
-        clamp=CLAMP,
-    )
-    recursion: Recursion = template.recursion
-    return _Task(
-        training=training,
-        network=network,
-        layout=layout,
-        template=template,
-        open_loop=RecursionProvider(template=recursion, experiments=experiments, closed=False),
-        closed_loop=RecursionProvider(template=recursion, experiments=experiments, closed=True),
-        selection=selection,
-        start=start,
-        on_progress=on_progress,
-    )
-
-
-def _initial_parameters(initial: FitResult | None, task: _Task) -> NARXModel | None:
-    if initial is None:
-        return None
-    if not isinstance(initial.model, NARXModel) or initial.model.network != task.network:
-        raise ConfigError(
-            "the initial fit has another structure",
-            where="initial",
-            expected=task.network.label,
-            got=initial.model.structure.label,
-            remedy="name a fit with the same delays and neurons, or leave initial out",
-        )
-    return initial.model
-
-
-def _run_starts(task: _Task, first: NARXModel | None) -> list[_Candidate]:
-    """All starts, a few at a time; threads suffice because the kernels and BLAS release the interpreter."""
-    training = task.training
-    with ThreadPoolExecutor(min(training.workers, training.starts)) as pool:
-        futures = [
-            pool.submit(_run_start, task, number, first if number == 0 else None) for number in range(training.starts)
-        ]
-        try:
-            return [future.result() for future in futures]
-        except KeyboardInterrupt:
-            task.stop.set()
-            done = [future for future in futures if not future.cancel()]
-            return [future.result() for future in done]
-
-
-def _run_start(task: _Task, number: int, given: NARXModel | None) -> _Candidate:
-    began = time.perf_counter()
-    training = task.training
-    seed = None if given is not None else training.seed + number
-    theta = task.layout.draw(np.random.default_rng(seed)) if given is None else given.theta
-    prior = task.layout.prior(alpha=INITIAL_ALPHA, beta=1.0)
-    if training.loop is Loop.CLOSED and training.open_iterations and given is None:
-        engine = _engine(task, number, "one step ahead", training.open_iterations)
-        theta = engine.minimise(task.open_loop, theta, prior).theta
-    provider = task.closed_loop if training.loop is Loop.CLOSED else task.open_loop
-    stage = "free run" if training.loop is Loop.CLOSED else "one step ahead"
-    solution = _engine(task, number, stage, training.max_iterations).minimise(provider, theta, prior)
-    model = task.model(solution.theta)
-    return _Candidate(
-        seed=seed,
-        solution=solution,
-        model=model,
-        selection_mse=_free_run_mse(model, task.selection, task.start),
-        seconds=time.perf_counter() - began,
-    )
-
-
-def _engine(task: _Task, number: int, stage: str, max_iterations: int) -> LevenbergMarquardt:
-    training = task.training
-    scale = task.template.scaling.output_scale**2
-
-    def report(entry: Iteration) -> None:
-        task.on_progress(
-            FitProgress(
-                stage=stage,
-                start=number + 1,
-                starts=training.starts,
-                iteration=entry.iteration,
-                max_iterations=max_iterations,
-                mse=entry.mse * scale,
-                elapsed_s=entry.elapsed_s,
-            )
-        )
-
-    return LevenbergMarquardt(
-        termination=Termination(
-            max_iterations=max_iterations,
-            max_time_s=training.max_time_s,
-            tolerance=training.tolerance,
-            patience=training.patience,
-        ),
-        on_iteration=report,
-        should_stop=task.stop.is_set,
-    )
-
-
-def _free_run_mse(model: NARXModel, traces: Sequence[Trace], start: Start) -> float:
-    """Mean over traces of the free run's mean squared error; NaN without traces."""
-    errors = []
-    for trace in traces:
-        inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
-        n = start.n_measured
-        output = model.simulate(inputs[n:], start.history(inputs, target, model.rest_output))
-        errors.append(float(np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2)))
-    return float(np.mean(errors)) if errors else float("nan")
-
-
-def _choose(candidates: Sequence[_Candidate], choose_by: str, has_selection: bool) -> tuple[_Candidate, str]:
-    usable = [c for c in candidates if c.solution.status.usable] or list(candidates)
-    if choose_by == "selection" and has_selection:
-        return min(usable, key=lambda c: c.selection_mse), "least free-run error on the selection traces"
-    with_evidence = [c for c in usable if c.solution.evidence is not None]
-    if with_evidence:
-        best = max(with_evidence, key=lambda c: c.solution.evidence.log_evidence if c.solution.evidence else -np.inf)
-        return best, "largest evidence"
-    return min(usable, key=lambda c: c.solution.at.loss), "least error on the estimation traces"
-
-
-def _spread(candidates: Sequence[_Candidate], chosen: _Candidate, how: str, scale: float) -> list[str]:
+def _notes(chosen: starts.Candidate, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
+    scale = chosen.model.scaling.output_scale**2
     notes = []
-    if len(candidates) > 1:
-        notes.append(f"Chosen among {len(candidates)} starts by {how}.")
-    for candidate in candidates:
-        origin = "initial fit" if candidate.seed is None else f"seed {candidate.seed}"
-        evidence = candidate.solution.evidence
+    if training.starts > 1:
+        by_selection = training.choose_by == "selection" and np.isfinite(chosen.score)
+        how = "the least error on the selection traces (geometric mean)" if by_selection else "the largest evidence"
+        notes.append(f"Chosen by {how} among {training.starts} starts looked at {len(candidates)} times.")
+    for candidate in sorted(candidates, key=lambda c: (c.number, c.solution.state.iteration)):
+        origin = "the initial fit" if candidate.seed is None else f"seed {candidate.seed}"
         notes.append(
-            f"{'Chosen' if candidate is chosen else 'Start'}, {origin}: estimation mse {_mse(candidate) * scale:.4g}, "
-            f"selection mse {candidate.selection_mse:.4g}, "
-            f"log evidence {evidence.log_evidence if evidence else float('nan'):.6g}, "
-            f"{candidate.seconds:.1f} s, {candidate.solution.status.name}."
+            f"{'Chosen: start' if candidate is chosen else 'Start'} from {origin} after "
+            f"{candidate.solution.state.iteration} iterations ({candidate.solution.curve[-1].elapsed_s:.1f} s): "
+            f"estimation mse {candidate.solution.curve[-1].mse * scale:.4g}, selection mse {candidate.score:.4g}, "
+            f"log evidence {candidate.log_evidence:.6g}."
         )
-    return notes
-
-
-def _mse(candidate: _Candidate) -> float:
-    return candidate.solution.curve[-1].mse
-
-
-__all__ = ["FitProgress", "Status", "Training", "fit_narx"]
+    return tuple(notes)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import blas
 
 from sysid.kernels import recursion as kernel
@@ -74,11 +75,19 @@ class Linearisation:
         loss: :math:`\frac12 \sum w e^2` in scaled numbers.
         gradient: :math:`J^T W e` with :math:`e = \hat y - y`, shape ``(n_parameters,)``.
         gauss_newton: :math:`J^T W J`, shape ``(n_parameters, n_parameters)``.
+        correlation_time: Samples after which the residuals count as new information, at least 1 (see
+            :func:`correlation_time`).
     """
 
     loss: float
     gradient: NDArray[np.float64]
     gauss_newton: NDArray[np.float64]
+    correlation_time: float = 1.0
+
+    @property
+    def finite(self) -> bool:
+        """Whether the matrix can be used: the sensitivities of an unstable free run grow beyond all numbers."""
+        return bool(np.isfinite(self.gauss_newton).all() and np.isfinite(self.gradient).all())
 
 
 class AbstractProvider(ABC):
@@ -167,11 +176,12 @@ class RecursionProvider(AbstractProvider):
         n_p = len(theta)
         gradient = np.zeros(n_p)
         matrix = np.zeros((n_p, n_p), order="F")
-        loss = 0.0
+        loss, correlated = 0.0, 0.0
         for record in self._records:
             out, h, c = self._pass(record, theta)
             residual = out - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
+            correlated += len(residual) * correlation_time(residual)
             loss += 0.5 * float(residual @ residual)
             for first, block in self._blocks(record, theta, h, c):
                 rows = slice(first, first + len(block))
@@ -180,7 +190,12 @@ class RecursionProvider(AbstractProvider):
                 # Row-major (rows, parameters) is column-major (parameters, rows): no copy, half the flops of gemm.
                 matrix = blas.dsyrk(1.0, weighted.T, beta=1.0, c=matrix, overwrite_c=1)
         upper = np.triu(matrix)
-        return Linearisation(loss=loss, gradient=gradient, gauss_newton=upper + np.triu(upper, 1).T)
+        return Linearisation(
+            loss=loss,
+            gradient=gradient,
+            gauss_newton=upper + np.triu(upper, 1).T,
+            correlation_time=correlated / sum(len(record.target) for record in self._records),
+        )
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """The whole Jacobian of the scaled output, unweighted, records one after the other.
@@ -241,6 +256,35 @@ class RecursionProvider(AbstractProvider):
             The recursion.
         """
         return replace(self.template, theta=theta)
+
+
+def correlation_time(residual: NDArray[np.float64]) -> float:
+    r"""Integrated autocorrelation time of a residual, in samples.
+
+    :math:`\tau = 1 + 2\sum_k \rho_k`, summed until the window exceeds five times the sum (Sokal 1997, "Monte Carlo
+    methods in statistical mechanics", section 3): ``len(residual) / tau`` independent samples would determine a mean
+    as well as this residual does. The residuals of a free run are errors that persist, so it is far above 1.
+
+    Args:
+        residual: Shape ``(n_samples,)``.
+
+    Returns:
+        At least 1.
+
+    Example:
+        >>> noise = np.random.default_rng(0).standard_normal(20_000)
+        >>> correlation_time(noise) < 1.2, correlation_time(np.repeat(noise, 10)) > 8.0
+        (True, True)
+    """
+    n = len(residual)
+    size = next_fast_len(2 * n, real=True)
+    spectrum = np.abs(rfft(residual, size)) ** 2
+    covariance = irfft(spectrum, size)[:n]
+    if not covariance[0] > 0.0 or not np.isfinite(covariance[0]):
+        return 1.0
+    tau = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
+    inside = np.arange(n) >= 5.0 * tau
+    return float(max(1.0, tau[int(np.argmax(inside))] if inside.any() else tau.max()))
 
 
 def experiments_of(

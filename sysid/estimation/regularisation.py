@@ -19,14 +19,19 @@ rank of :math:`J`: :math:`\gamma_g = \sum_{i \in g} (1 - (M^{-1})_{ii})` lies be
 term, and :math:`\ln\det H = \ln\det M + \sum\ln\alpha`. An eigenvalue sum over :math:`J^T J` itself, where
 rounding makes small eigenvalues negative, does not have that property.
 
-Limits: the update does not guarantee that the evidence increases; the noise is taken as white, which free-run
-residuals of a deterministic system are not, so that :math:`\beta` and with it :math:`\gamma` come out high.
+**Residuals that persist.** The formulas take every residual as new information. Free-run residuals of a deterministic
+system are correlated over tens to hundreds of samples (:math:`\tau`, ``correlation_time``); counting all of them makes
+:math:`\beta` too large by that factor and switches the regularisation off. The likelihood is therefore raised to the
+power :math:`1/\tau`: :math:`N/\tau` samples of loss :math:`E_D/\tau`. With :math:`\tau = 1` this is MacKay's update.
+
+Limits: the update does not guarantee that the evidence increases; a power of the likelihood is an approximation, so
+that evidences of fits with different :math:`\tau` are not strictly comparable.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +43,11 @@ from sysid.estimation.result import Evidence
 ALPHA_BOUNDS = (1e-9, 1e9)
 """Bounds of a prior's precision in scaled numbers, where weights of order 1 are ordinary: a group outside them is
 free, or switched off, for every practical purpose."""
+
+
+SAMPLES_PER_PARAMETER = 4.0
+"""Independent samples that each parameter is granted at least: a record so short, or residuals so persistent, that
+fewer remain would leave the precision of the residuals undetermined."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,7 +71,7 @@ class Prior:
         centre: Where each parameter is drawn to, shape ``(n_parameters,)``.
         groups: Disjoint groups that cover all parameters.
         alphas: Precision of each group, shape ``(n_groups,)``.
-        beta: Precision of the residuals.
+        beta: Precision of the residuals over their correlation time: what multiplies the loss.
     """
 
     centre: NDArray[np.float64]
@@ -96,14 +106,15 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     Args:
         prior: Precisions now.
         theta: Flat parameters, near a minimum of the penalised loss.
-        at: Loss and Gauss-Newton matrix there.
+        at: Loss, Gauss-Newton matrix and correlation time there.
         n_samples: Samples that count.
 
     Returns:
         The prior with new precisions, and the evidence found.
     """
-    precision = prior.precision
-    root = np.sqrt(prior.beta / precision)
+    tau = min(at.correlation_time, max(1.0, n_samples / (SAMPLES_PER_PARAMETER * len(theta))))
+    independent = n_samples / tau
+    root = np.sqrt(prior.beta / prior.precision)
     M = at.gauss_newton * root[:, None] * root[None, :]
     M[np.diag_indices_from(M)] += 1.0
     shrunk, log_det = _inverse_diagonal(M)
@@ -112,16 +123,17 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     energies = np.array([0.5 * np.sum((theta - prior.centre)[group.members] ** 2) for group in prior.groups])
     penalised = prior.beta * at.loss + float(prior.alphas @ energies)
     evidence = Evidence(
-        log_evidence=-penalised - 0.5 * log_det + 0.5 * n_samples * float(np.log(prior.beta / (2.0 * np.pi))),
-        beta=prior.beta,
+        log_evidence=-penalised - 0.5 * log_det + 0.5 * independent * float(np.log(prior.beta * tau / (2.0 * np.pi))),
+        beta=prior.beta * tau,
         alphas=_named(prior.groups, prior.alphas),
         effective_parameters=_named(prior.groups, gammas),
         parameters={group.name: len(group.members) for group in prior.groups},
+        correlation_time=tau,
     )
     tiny = np.finfo(np.float64).tiny
     alphas = np.clip(gammas / np.maximum(2.0 * energies, tiny), *ALPHA_BOUNDS)
-    beta = max(n_samples - float(gammas.sum()), 1.0) / max(2.0 * at.loss, tiny)
-    return Prior(centre=prior.centre, groups=prior.groups, alphas=alphas, beta=beta), evidence
+    beta = max(independent - float(gammas.sum()), 1.0) / max(2.0 * at.loss, tiny)
+    return replace(prior, alphas=alphas, beta=beta), evidence
 
 
 def _named(groups: Sequence[Group], values: NDArray[np.float64]) -> dict[str, float]:

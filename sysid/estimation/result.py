@@ -21,6 +21,7 @@ class Status(enum.Enum):
     EXACT = "Linear least squares: the minimum was computed directly."
     MAX_ITERATIONS = "The iterations ran out while the loss was still improving; allow more of them."
     TIME_LIMIT = "The time limit was reached while the loss was still improving; allow more time."
+    STOPPED_EARLY = "Stopped early: this state did better on the selection traces than any later one."
     STALLED = "No step improves the loss any more although its gradient is not zero; try another start."
     NOT_IMPROVED = "The fit did not improve on where it started; try another start, or more damping."
     INTERRUPTED = "Interrupted; this is the best model up to then."

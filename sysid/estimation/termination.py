@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sysid.estimation.result import Status
@@ -18,7 +18,7 @@ class Termination:
     Args:
         max_iterations: Steps taken or tried.
         max_time_s: Wall time in seconds.
-        tolerance: Relative improvement of the penalised loss over ``patience`` iterations below which the fit
+        tolerance: Relative improvement of the loss over ``patience`` iterations below which the fit
             has converged.
         patience: Iterations over which improvement is judged.
     """
@@ -28,13 +28,13 @@ class Termination:
     tolerance: float = 1e-4
     patience: int = 10
 
-    def check(self, *, iteration: int, started: float, losses: list[float], damping: float) -> Status | None:
+    def check(self, *, iteration: int, elapsed: float, losses: Sequence[float], damping: float) -> Status | None:
         """Whether to stop now.
 
         Args:
             iteration: Iterations done.
-            started: When the fit began, by ``time.perf_counter``.
-            losses: Penalised loss after each iteration since the objective last changed.
+            elapsed: Seconds since this run of the fit began.
+            losses: Loss after each iteration, the start first.
             damping: Damping factor now.
 
         Returns:
@@ -48,6 +48,6 @@ class Termination:
                 return Status.CONVERGED
         if iteration >= self.max_iterations:
             return Status.MAX_ITERATIONS
-        if time.perf_counter() - started > self.max_time_s:
+        if elapsed > self.max_time_s:
             return Status.TIME_LIMIT
         return None

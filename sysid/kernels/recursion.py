@@ -38,6 +38,65 @@ from numba import njit
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 
+_CENTRE = 0.3125
+_SHIFT = math.exp(-_CENTRE)
+_TAYLOR = tuple((-1.0) ** n / math.factorial(n) for n in range(13))
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def tanh_in_place(a):
+    r"""Replace each entry by its hyperbolic tangent, in a form that the compiler vectorises.
+
+    The library's tanh is a call per number and takes three quarters of a free run's time. Here
+    :math:`\tanh |x| = (1-t)/(1+t)` with :math:`t = e^{-2|x|}`, and :math:`t = (e^{-w})^{64}` by six squarings, with
+    :math:`w = 2|x|/64` at most 0.625 because :math:`2|x|` is cut at 40, beyond which tanh is 1 in double precision.
+    A Taylor polynomial of degree 12 around the middle has a truncation error of 4e-17; the squarings raise the
+    rounding of ``t`` to some 64 units, and the largest error found over the line is 1.4e-14 (tests).
+
+    Args:
+        a: Shape ``(n,)``; NaN stays NaN.
+    """
+    for k in range(len(a)):
+        x = a[k]
+        z = 2.0 * abs(x)
+        w = (z if not z > 40.0 else 40.0) / 64.0 - _CENTRE
+        e = _TAYLOR[12]
+        e = e * w + _TAYLOR[11]
+        e = e * w + _TAYLOR[10]
+        e = e * w + _TAYLOR[9]
+        e = e * w + _TAYLOR[8]
+        e = e * w + _TAYLOR[7]
+        e = e * w + _TAYLOR[6]
+        e = e * w + _TAYLOR[5]
+        e = e * w + _TAYLOR[4]
+        e = e * w + _TAYLOR[3]
+        e = e * w + _TAYLOR[2]
+        e = e * w + _TAYLOR[1]
+        e = e * w + _TAYLOR[0]
+        e *= _SHIFT
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        a[k] = math.copysign((1.0 - e) / (1.0 + e), x)
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def _neurons(W_columns, b, x, h):
+    """Activations of all neurons for one regressor vector; neurons stand side by side in a vector register."""
+    n = len(b)
+    for k in range(n):
+        h[k] = b[k]
+    for i in range(len(x)):
+        value = x[i]
+        column = W_columns[i]
+        for k in range(n):
+            h[k] += column[k] * value
+    tanh_in_place(h)
+
+
 @njit(cache=True, nogil=True, fastmath=_FAST)
 def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, low, high):
     """Run the recursion on its own output, writing ``y[depth:]`` in place.
@@ -58,12 +117,14 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
     n_in, n_out = len(input_lag), len(output_lag)
     n_x = n_in + n_out
     W = theta[: n_neurons * n_x].reshape(n_neurons, n_x)
-    b = theta[n_neurons * n_x :]
-    v = b[n_neurons:]
+    W_columns = np.ascontiguousarray(W.T)
+    b = theta[n_neurons * n_x : n_neurons * (n_x + 1)]
+    v = theta[n_neurons * (n_x + 1) : n_neurons * (n_x + 2)]
     linear = len(theta) > n_neurons * (n_x + 2) + 1
-    constant = v[n_neurons]
-    w = v[n_neurons + 1 :]
+    constant = theta[n_neurons * (n_x + 2)]
+    w = theta[n_neurons * (n_x + 2) + 1 :]
     x = np.empty(n_x)
+    h = np.empty(n_neurons)
     for t in range(depth, depth + n_steps):
         for i in range(n_in):
             x[i] = u[t - input_lag[i], input_channel[i]]
@@ -73,11 +134,9 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
         if linear:
             for i in range(n_x):
                 total += w[i] * x[i]
+        _neurons(W_columns, b, x, h)
         for k in range(n_neurons):
-            a = b[k]
-            for i in range(n_x):
-                a += W[k, i] * x[i]
-            total += v[k] * math.tanh(a)
+            total += v[k] * h[k]
         y[t] = min(max(total, low), high) if not math.isnan(total) else total
 
 
@@ -108,12 +167,14 @@ def activations(
     n_in, n_out = len(input_lag), len(output_lag)
     n_x = n_in + n_out
     W = theta[: n_neurons * n_x].reshape(n_neurons, n_x)
-    b = theta[n_neurons * n_x :]
-    v = b[n_neurons:]
+    W_columns = np.ascontiguousarray(W.T)
+    b = theta[n_neurons * n_x : n_neurons * (n_x + 1)]
+    v = theta[n_neurons * (n_x + 1) : n_neurons * (n_x + 2)]
     linear = len(theta) > n_neurons * (n_x + 2) + 1
-    constant = v[n_neurons]
-    w = v[n_neurons + 1 :]
+    constant = theta[n_neurons * (n_x + 2)]
+    w = theta[n_neurons * (n_x + 2) + 1 :]
     x = np.empty(n_x)
+    slopes = np.empty(n_neurons)
     for t in range(n_steps):
         for i in range(n_in):
             x[i] = u[depth + t - input_lag[i], input_channel[i]]
@@ -125,16 +186,17 @@ def activations(
         if linear:
             for i in range(n_x):
                 total += w[i] * x[i]
+        row = h[t]
+        _neurons(W_columns, b, x, row)
         for k in range(n_neurons):
-            a = b[k]
-            for i in range(n_x):
-                a += W[k, i] * x[i]
-            z = math.tanh(a)
-            h[t, k] = z
-            total += v[k] * z
-            slope = v[k] * (1.0 - z * z)
-            for i in range(n_out):
-                c[t, i] += slope * W[k, n_in + i]
+            total += v[k] * row[k]
+            slopes[k] = v[k] * (1.0 - row[k] * row[k])
+        for i in range(n_out):
+            column = W_columns[n_in + i]
+            derivative = 0.0
+            for k in range(n_neurons):
+                derivative += slopes[k] * column[k]
+            c[t, i] += derivative
         bounded = min(max(total, low), high) if not math.isnan(total) else total
         c[t, n_out] = 1.0 if bounded == total else 0.0
         out[t] = bounded

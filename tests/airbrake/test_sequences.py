@@ -60,3 +60,18 @@ def test_without_emergencies_none_is_drawn() -> None:
 def test_limits_that_are_none_are_refused(limits: dict) -> None:
     with pytest.raises(ConfigError, match=f"{next(iter(limits))} is out of range"):
         RandomCommand(**({"duration": 100.0} | limits))
+
+
+def test_applications_keep_to_the_positions_they_are_confined_to():
+    positions = (84.2, 74.0, 64.2)
+    for seed in range(20):
+        command = RandomCommand(duration=2000.0, positions=positions, partial_release=0.5).draw(seed)
+        assert set(command.pressures) <= {90.0, *positions}
+        held = [p for p in command.pressures if p != 90.0]
+        assert len(set(held)) >= 2
+
+
+@pytest.mark.parametrize("positions", [(), (0.0,), (90.0,)], ids=["none", "emergency", "released"])
+def test_positions_that_are_no_application_are_refused(positions):
+    with pytest.raises(ConfigError, match="positions is out of range"):
+        RandomCommand(duration=100.0, positions=positions)

@@ -1,0 +1,238 @@
+"""Several random starts of one network: raced, halved, and chosen between on traces that train nothing.
+
+A free-run fit has many local minima. Starts of equal error on the estimation record can differ by orders of magnitude
+on the next one, so that how one chooses matters as much as how one trains. The starts run side by side for a part of
+the iterations; the better half goes on; and every state at which a start was looked at stays a candidate, which makes
+the choice an early stopping too. What chooses is the selection traces: they train nothing, and no score on them is
+published as one on unseen data.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.initialise import Layout
+from sysid.estimation.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
+from sysid.estimation.provider import AbstractProvider
+from sysid.estimation.result import Loop, Status
+from sysid.estimation.termination import Termination
+from sysid.estimation.training import FitProgress, Training
+from sysid.models import NARXModel, Start
+from sysid.traces import Trace
+
+RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
+"""Shares of the iterations after which the starts are looked at and, but for the last, half of them dropped
+(successive halving, Jamieson and Talwalkar 2016). Who stays is decided by the error on the estimation traces: early
+on, what the selection traces say of a start is noise; they choose at the end, among all states looked at."""
+
+INITIAL_ALPHA = 1e-2
+"""Precision of the weights before the evidence has spoken: weak, but enough to keep the first steps of an
+underdetermined network small."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Race:
+    """Everything that the starts of one fit have in common.
+
+    Args:
+        training: How to train.
+        layout: Where the parameters stand.
+        provider: Residuals and Jacobians, in the basis of training.
+        to_plain: From the basis to plain parameters, shape ``(n_parameters, n_parameters)``.
+        template: The model to fill with parameters.
+        selection: Traces that choose.
+        start: How a free run begins.
+        initial: Plain parameters of the first start; ``None`` for a random one.
+        on_progress: Called after every iteration, from the threads that train.
+    """
+
+    training: Training
+    layout: Layout
+    provider: AbstractProvider
+    to_plain: NDArray[np.float64]
+    template: NARXModel
+    selection: Sequence[Trace]
+    start: Start
+    initial: NDArray[np.float64] | None
+    on_progress: Callable[[FitProgress], None]
+    stop: threading.Event = field(default_factory=threading.Event)
+    iterations: dict[int, int] = field(default_factory=dict)
+    """Iterations done by each start, for the progress bar."""
+
+    def model(self, theta: NDArray[np.float64]) -> NARXModel:
+        """The model with these parameters of the basis."""
+        return replace(self.template, theta=self.to_plain @ theta)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """One start, as it stood when it was looked at.
+
+    Args:
+        number: Which start, from 0 on.
+        seed: Its seed; ``None`` for the one that was given.
+        solution: Where its fit stands.
+        model: The model there.
+        score: Geometric mean over the selection traces of the mean squared error; NaN without such traces.
+    """
+
+    number: int
+    seed: int | None
+    solution: Solution
+    model: NARXModel
+    score: float
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the evidence; minus infinity where none was computed."""
+        evidence = self.solution.evidence
+        return evidence.log_evidence if evidence else -np.inf
+
+    @property
+    def loss(self) -> float:
+        """Loss on the estimation traces."""
+        return self.solution.at.loss
+
+
+def run(race: Race) -> list[Candidate]:
+    """Race the starts; an interruption from the keyboard ends the race, and what there is comes back.
+
+    Threads suffice: the kernels and BLAS release the interpreter.
+
+    Args:
+        race: What they have in common.
+
+    Returns:
+        Every start at every rung that it reached.
+    """
+    training = race.training
+    rungs = _rungs(training)
+    numbers = list(range(training.starts))
+    latest: dict[int, Candidate] = {}
+    seen: list[Candidate] = []
+    total = _work(training.starts, rungs)
+    with ThreadPoolExecutor(min(training.workers, training.starts)) as pool:
+        for rung, share in enumerate(rungs):
+            before = rungs[rung - 1] if rung else 0.0
+            seconds = training.max_time_s * (share - before) * pool._max_workers / total
+            futures = [pool.submit(_advance, race, n, latest.get(n), share, seconds) for n in numbers]
+            try:
+                done = [future.result() for future in futures]
+            except KeyboardInterrupt:
+                race.stop.set()
+                done = [future.result() for future in futures if not future.cancel()]
+            seen += [candidate for candidate in done if candidate is not latest.get(candidate.number)]
+            latest = {candidate.number: candidate for candidate in done}
+            if race.stop.is_set():
+                break
+            done.sort(key=lambda candidate: (not candidate.solution.status.usable, candidate.loss))
+            numbers = [candidate.number for candidate in done[: max(1, (len(done) + 1) // 2)]]
+    return seen
+
+
+def rank(candidate: Candidate, choose_by: str) -> tuple[bool, float]:
+    """Sorting key, best first; fits that did not improve come last.
+
+    Args:
+        candidate: The candidate.
+        choose_by: ``selection`` or ``evidence``; without selection traces the evidence, without evidence the loss.
+
+    Returns:
+        The key.
+    """
+    if choose_by == "selection" and np.isfinite(candidate.score):
+        value = candidate.score
+    elif candidate.solution.evidence is not None:
+        value = -candidate.log_evidence
+    else:
+        value = candidate.loss
+    return not candidate.solution.status.usable, value
+
+
+def _rungs(training: Training) -> tuple[float, ...]:
+    return RUNGS if training.starts > 1 else RUNGS[-1:]
+
+
+def _work(starts: int, rungs: Sequence[float]) -> float:
+    """Iterations of the whole race, in units of one start's."""
+    work, before, n = 0.0, 0.0, starts
+    for share in rungs:
+        work, before, n = work + n * (share - before), share, max(1, (n + 1) // 2)
+    return work
+
+
+def _advance(race: Race, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
+    training = race.training
+    iterations = max(1, round(share * training.max_iterations))
+    engine = _engine(race, number, iterations, seconds)
+    if before is None:
+        seed, theta, centre = _begin(race, number)
+        # The noise is taken to be as large as the start's error: a prior weighed against residuals of size 1 would hold
+        # an open-loop fit, whose residuals are a thousand times smaller, at its start.
+        beta = 0.5 * race.provider.n_samples / max(race.provider.loss(theta), np.finfo(np.float64).tiny)
+        prior = race.layout.prior(centre, alpha=INITIAL_ALPHA, beta=beta)
+        solution = engine.minimise(race.provider, theta, prior)
+    elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
+        seed, solution = before.seed, engine.resume(race.provider, before.solution.state)
+    else:
+        return before
+    model = race.model(solution.theta)
+    return Candidate(number=number, seed=seed, solution=solution, model=model, score=_score(race, model))
+
+
+def _begin(race: Race, number: int) -> tuple[int | None, NDArray[np.float64], NDArray[np.float64]]:
+    centre = _in_basis(race, race.layout.centre())
+    if number == 0 and race.initial is not None:
+        return None, _in_basis(race, race.initial), centre
+    seed = race.training.seed + number
+    return seed, race.layout.draw(np.random.default_rng(seed), centre), centre
+
+
+def _in_basis(race: Race, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.solve(race.to_plain, theta), dtype=np.float64)
+
+
+def _engine(race: Race, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
+    training = race.training
+    scale = race.template.scaling.output_scale**2
+    work = training.max_iterations * _work(training.starts, _rungs(training))
+
+    def report(entry: Iteration) -> None:
+        race.iterations[number] = entry.iteration
+        race.on_progress(
+            FitProgress(
+                stage="free run" if training.loop is Loop.CLOSED else "one step ahead",
+                start=number + 1,
+                starts=training.starts,
+                iteration=entry.iteration,
+                max_iterations=training.max_iterations,
+                mse=entry.mse * scale,
+                elapsed_s=entry.elapsed_s,
+                fraction=min(1.0, sum(race.iterations.values()) / work),
+            )
+        )
+
+    limits = Termination(
+        max_iterations=iterations, max_time_s=seconds, tolerance=training.tolerance, patience=training.patience
+    )
+    return LevenbergMarquardt(termination=limits, on_iteration=report, should_stop=race.stop.is_set)
+
+
+def _score(race: Race, model: NARXModel) -> float:
+    """Geometric mean over the selection traces: one trace on which every start fails must not choose alone."""
+    errors = []
+    for trace in race.selection:
+        inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
+        n, history = race.start.n_measured, race.start.history(inputs, target, model.rest_output)
+        if race.training.loop is Loop.CLOSED:
+            output = model.simulate(inputs[n:], history)
+        else:
+            output = model.predict(inputs[n:], target[n:], history)
+        errors.append(float(np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2)))
+    return float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")

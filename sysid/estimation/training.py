@@ -1,0 +1,79 @@
+"""How a network is trained, and what is seen of it while it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sysid.errors import ConfigError
+from sysid.estimation.result import Loop
+
+
+@dataclass(frozen=True, kw_only=True)
+class Training:
+    """How a network is trained.
+
+    Args:
+        loop: ``closed`` minimises the error of the free run, ``open`` that of the one-step prediction.
+        max_iterations: Levenberg-Marquardt iterations of a start that is never dropped.
+        max_time_s: Wall time of the whole fit in seconds, shared out among the starts. A fit that it ends cannot be
+            repeated exactly; leave it out where that matters.
+        tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
+        patience: Iterations over which improvement is judged.
+        starts: Random starts; they are raced, and half of them dropped at each of four looks.
+        seed: Seed of the first start; the others count up from it.
+        choose_by: What chooses in the end: ``selection`` (least error on traces that are used for nothing else) or ``evidence``.
+        workers: Starts that run at the same time.
+        basis: ``levels and rates`` trains on each channel's newest sample and its rates of change, ``plain`` on the
+            lagged samples as they are. The finished model is over lagged samples either way.
+    """
+
+    loop: Loop = Loop.CLOSED
+    max_iterations: int = 500
+    max_time_s: float = float("inf")
+    tolerance: float = 1e-3
+    patience: int = 50
+    starts: int = 1
+    seed: int = 0
+    choose_by: str = "selection"
+    workers: int = 2
+    basis: str = "levels and rates"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "loop", Loop(self.loop))
+        for name, choices in {"choose_by": ("selection", "evidence"), "basis": ("levels and rates", "plain")}.items():
+            if getattr(self, name) not in choices:
+                raise ConfigError(
+                    f"unknown value of {name}",
+                    where=name,
+                    expected=" or ".join(choices),
+                    got=repr(getattr(self, name)),
+                    remedy=f"write for example {name}: {choices[0]}",
+                )
+        for name in ("max_iterations", "patience", "starts", "workers"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitProgress:
+    """What a progress bar shows.
+
+    Args:
+        stage: What is being minimised, in words.
+        start: Which start, from 1 on.
+        starts: How many there are.
+        iteration: Iterations of this start done.
+        max_iterations: At most so many.
+        mse: Mean squared error on the estimation traces, in the output's unit squared.
+        elapsed_s: Seconds that this start has taken.
+        fraction: Share of the fit's expected work that is done, 0 to 1; starts that converge early make it run ahead.
+    """
+
+    stage: str
+    start: int
+    starts: int
+    iteration: int
+    max_iterations: int
+    mse: float
+    elapsed_s: float
+    fraction: float

@@ -1,0 +1,85 @@
+"""Slow, obviously right twins of the fast code: what tests, doctests and reports compare with.
+
+Nothing here is compiled, cached or clever; each function is the formula written down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models import History, Recursion
+
+
+def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float64]) -> float:
+    """One step of a recursion in scaled numbers.
+
+    Args:
+        form: The recursion.
+        inputs: Scaled inputs up to now, newest last, shape ``(depth + 1, n_inputs)``.
+        outputs: Scaled outputs before now, newest last, shape ``(depth,)``.
+
+    Returns:
+        The scaled output now.
+    """
+    x = [inputs[-1 - lag, channel] for channel, lags in enumerate(form.lags.inputs) for lag in lags]
+    x += [outputs[-lag] for lag in form.lags.output]
+    y = form.constant + sum(w * value for w, value in zip(form.linear, x, strict=True))
+    for weights, bias, readout in zip(form.hidden_weights, form.hidden_bias, form.readout, strict=True):
+        y += readout * np.tanh(bias + sum(w * value for w, value in zip(weights, x, strict=True)))
+    return float(min(max(y, form.low), form.high))
+
+
+def simulate(form: Recursion, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
+    """Free run, one Python step at a time.
+
+    Args:
+        form: The recursion.
+        inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+        history: The samples before.
+
+    Returns:
+        Output of shape ``(n_samples,)``, in its unit.
+
+    Example:
+        >>> from sysid.models import ARX, History, Mapping, ARXModel
+        >>> orders = ARX(na=1, nb=(1,), nk=(1,))
+        >>> model = ARXModel(orders=orders, coefficients=np.array([1.0, 0.5]), intercept=0.0,
+        ...     mapping=Mapping.parse("u -> y"), sample_time=1.0, input_units=("V",), output_unit="V", rest_output=0.0)
+        >>> simulate(model.recursion, np.ones((3, 1)), History.at_rest(inputs=[0.0], output=0.0)).tolist()
+        [0.0, 1.0, 1.5]
+    """
+    depth = form.lags.depth
+    past_inputs, past_output = history.padded(depth)
+    u = form.scaling.scale_inputs(np.concatenate([past_inputs, inputs]))
+    y = list(form.scaling.scale_output(past_output))
+    for t in range(len(inputs)):
+        y.append(step(form, u[: depth + t + 1], np.array(y)))
+    return np.asarray(form.scaling.unscale_output(np.array(y[depth:])), dtype=np.float64)
+
+
+def finite_difference_jacobian(
+    function: Callable[[NDArray[np.float64]], NDArray[np.float64]], theta: NDArray[np.float64], width: float = 1e-6
+) -> NDArray[np.float64]:
+    """Jacobian by central differences.
+
+    Args:
+        function: From parameters to a vector.
+        theta: Where, shape ``(n_parameters,)``.
+        width: Half the distance between the two evaluations.
+
+    Returns:
+        Shape ``(n_values, n_parameters)``; errors of order ``width**2``.
+
+    Example:
+        >>> finite_difference_jacobian(lambda x: x**2, np.array([1.0, 2.0])).round(6).tolist()
+        [[2.0, 0.0], [0.0, 4.0]]
+    """
+    columns = []
+    for i in range(len(theta)):
+        away = np.zeros(len(theta))
+        away[i] = width
+        columns.append((function(theta + away) - function(theta - away)) / (2.0 * width))
+    return np.column_stack(columns)
