@@ -171,3 +171,16 @@ class RecordedBrake(AbstractBrake):
         rows = np.minimum(np.arange(self._next, self._next + len(command)), len(self._pressures) - 1)
         self._next += len(command)
         return BrakeOutput(cylinders=self._pressures[rows])
+
+
+def no_brake(vehicles: int, sample_time: float = 0.1) -> RecordedBrake:
+    """An air brake that never applies: for a train that brakes by its notches.
+
+    Args:
+        vehicles: Their number.
+        sample_time: In s.
+
+    Returns:
+        A record of empty cylinders.
+    """
+    return RecordedBrake(pressures=np.zeros((1, vehicles)), sample_time=sample_time)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
-from sysid.models import AbstractModel
+from sysid.models import AbstractModel, Recursion
 from sysid.rail import kernel_bank
 from sysid.rail.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
 from sysid.units import PSI_IN_PA
@@ -34,10 +34,9 @@ class Stage:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "models", tuple(self.models))
-        kinds = {
-            (m.mapping, m.sample_time, m.recursion.lags, m.recursion.neurons, len(m.recursion.theta))
-            for m in self.models
-        }
+        kinds = set()
+        for model, form in zip(self.models, self.forms, strict=True):
+            kinds.add((model.mapping, model.sample_time, form.lags, form.neurons, len(form.theta)))
         if len(kinds) != 1:
             raise ConfigError(
                 "the models of a stage differ in more than their parameters",
@@ -46,6 +45,21 @@ class Stage:
                 got=f"{len(kinds)} kinds of model among {len(self.models)}",
                 remedy="fit the cars with one structure",
             )
+
+    @property
+    def forms(self) -> tuple[Recursion, ...]:
+        """What the models lower to: recursions over lagged regressors (:class:`ConfigError` for any other form)."""
+        forms = tuple(model.recursion for model in self.models)
+        found = tuple(form for form in forms if isinstance(form, Recursion))
+        if len(found) < len(forms):
+            raise ConfigError(
+                "a model of the stage is no recursion over lagged regressors",
+                where=f"stage {self.models[0].mapping}",
+                expected="ARX or NARX models",
+                got=", ".join(sorted({type(form).__name__ for form in forms})),
+                remedy="fit the cars with ARX or NARX structures",
+            )
+        return found
 
 
 class ModelBank:
@@ -70,7 +84,7 @@ class ModelBank:
                 got=len(models),
             )
         self.mapping = models[0].mapping
-        recursions = [model.recursion for model in models]
+        recursions = stage.forms * cars if len(stage.forms) == 1 else stage.forms
         self._lags, self._neurons = recursions[0].lags, recursions[0].neurons
         self._theta = np.array([recursion.theta for recursion in recursions])
         self._bounds = np.array([[recursion.low, recursion.high] for recursion in recursions])

@@ -172,7 +172,8 @@ class NotchCurves:
 
     Args:
         speed_step: Spacing of the speeds in m/s; the first is 0, beyond the last the force is held.
-        forces: For each notch the force in N (its size) at each speed. Braking curves start at 0 N.
+        forces: For each notch the force in N (its size) at each speed. A braking curve that does
+            not begin at 0 N holds the train at rest, as one that is blended with friction does.
 
     Raises:
         ConfigError: If the notches are not consecutive or a curve does not fit.
@@ -199,12 +200,12 @@ class NotchCurves:
             got=sorted(lengths),
         )
         for notch, curve in self.forces.items():
-            good = np.isfinite(curve).all() and np.min(curve) >= 0.0 and (notch >= 0 or curve[0] == 0.0)
+            good = np.isfinite(curve).all() and np.min(curve) >= 0.0
             _need(
                 bool(good),
                 f"the curve of notch {notch} cannot be used",
                 where="notches",
-                expected="finite forces from 0 N on; a braking curve begins at 0 N",
+                expected="finite sizes of force from 0 N on",
                 got=np.asarray(curve)[:3],
             )
 
@@ -246,7 +247,8 @@ def diesel_electric(
     """Curves of a diesel-electric locomotive; all defaults are ours, of the size of a six-axle AC locomotive.
 
     A notch n of N gives the share n/N of the starting effort and (n/N)^1.5 of the power: ``min(share F, share P / v)``.
-    Dynamic braking has the share n/N of both and fades out linearly below ``fade_speed``.
+    Dynamic braking has the share n/N of both and fades out linearly below ``fade_speed``; with a fade speed of 0 it
+    is blended with friction down to rest.
 
     Args:
         power: At the rail in the highest notch, in W.
@@ -273,7 +275,7 @@ def diesel_electric(
         share = notch / notches
         forces[notch] = np.minimum(share * starting_effort, share**1.5 * power / safe)
         braking = share * np.minimum(braking_effort, braking_power / safe)
-        forces[-notch] = braking * np.minimum(1.0, speeds / fade_speed)
+        forces[-notch] = braking * np.minimum(1.0, speeds / fade_speed) if fade_speed > 0.0 else braking
     return NotchCurves(speed_step=step, forces=forces)
 
 
