@@ -3,7 +3,7 @@
 torch, onnx and onnxruntime are imported when a file is written or run, not here.
 """
 
-from sysid.export.bundle import Bundle, BundleFile, export_bundle
+from sysid.export.bundle import Bundle, BundleFile, export_bundle, zip_bundle
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run
 from sysid.export.exporters import EXPORTERS, exporter
 from sysid.export.flags import Flag, expected_flags
@@ -35,4 +35,5 @@ __all__ = [
     "parity_cases",
     "random_cases",
     "read_bundle",
+    "zip_bundle",
 ]

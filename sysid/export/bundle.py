@@ -13,24 +13,31 @@ from typing import Any
 
 import numpy as np
 
+from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.estimation.result import FitResult
+from sysid.export.archive import write_archive
 from sysid.export.card import model_card
 from sysid.export.exporters import exporter
 from sysid.export.layout import recursion_of
 from sysid.export.manifest import (
     CARD,
     MANIFEST,
+    SCHEMA,
     Metrics,
     amplification,
+    attachments,
     declared_ranges,
     describe,
     file_entry,
+    first_inputs,
+    schema_text,
     seal,
     sha256,
 )
 from sysid.export.parity import check_parity, parity_cases, random_cases
 from sysid.export.surrogate import Surrogate
+from sysid.export.verification import write_verification
 from sysid.models import AbstractModel, Start
 from sysid.traces import TraceSet
 
@@ -89,7 +96,7 @@ def export_bundle(
     metrics: Metrics | None = None,
     provenance: Dict[str, Any] | None = None,
 ) -> Bundle:
-    """Write a fitted model as a bundle, after each file has reproduced the model on every case.
+    """Write a fitted model as a bundle, after each file has reproduced the model on every case and 100 random runs.
 
     The folder appears, or is replaced, only when the new bundle is complete. The same fit, traces and metrics
     give the same bytes.
@@ -117,7 +124,7 @@ def export_bundle(
     writers = [exporter(name) for name in dict.fromkeys(formats)]
     _check_finite(fit.model)
     model = fit.model
-    surrogate = Surrogate.of(model, declared_ranges(model, traces))
+    surrogate = Surrogate.of(model, declared_ranges(model, traces), first_inputs(model, traces))
     cases, sequences = parity_cases(model, traces, start), random_cases(surrogate)
     allowed = {"float64": tolerance, "float32": max(tolerance, tolerance_float32)}
     with _published(Path(folder)) as draft:
@@ -126,13 +133,36 @@ def export_bundle(
             check_parity(file, draft, cases, sequences, tolerance=allowed[file.dtype], unit=model.output_unit)
             for file in written
         ]
+        purposes = {name: f"needed by {file.name}" for file in written for name in file.companions}
+        purposes |= write_verification(surrogate, written, (cases[0], sequences[0]), draft, allowed)
+        (draft / SCHEMA).write_text(schema_text(), encoding="utf-8", newline="\n")
+        purposes[SCHEMA] = f"JSON schema of {MANIFEST}"
         manifest = describe(fit, traces, start, metrics, provenance or {})
         manifest["amplification"] = amplification(cases, sequences)
         manifest["files"] = [file_entry(file, parity, draft) for file, parity in zip(written, checked, strict=True)]
+        manifest["attachments"] = attachments(purposes, draft)
         (draft / CARD).write_text(model_card(manifest), encoding="utf-8", newline="\n")
         manifest["card"] = {"name": CARD, "sha256": sha256(draft / CARD)}
         (draft / MANIFEST).write_text(seal(manifest), encoding="utf-8", newline="\n")
     return Bundle(folder=Path(folder), model=model, metadata=manifest, files=bundle_files(manifest))
+
+
+def zip_bundle(folder: Path, path: Path | None = None) -> Path:
+    """Pack a bundle into one file; the same bundle gives the same bytes.
+
+    Args:
+        folder: The bundle.
+        path: The file; by default beside the folder, under its name with ``.zip``.
+
+    Returns:
+        The file, which :func:`sysid.export.read_bundle` reads as it reads a folder.
+    """
+    folder = Path(folder)
+    path = folder.with_name(f"{folder.name}.zip") if path is None else Path(path)
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    with replacing(path) as draft:
+        write_archive(draft, {file.relative_to(folder).as_posix(): file.read_bytes() for file in files})
+    return path
 
 
 def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:

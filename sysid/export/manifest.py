@@ -8,7 +8,7 @@ import math
 import platform
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from importlib import metadata
+from importlib import metadata, resources
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -21,8 +21,11 @@ from sysid.export.surrogate import Range
 from sysid.models import AbstractModel, History, Start
 from sysid.traces import Role, Trace, TraceSet
 
-SCHEMA_VERSION = 1
-"""Raised when a reader of an earlier version would misread the file."""
+SCHEMA_VERSION = 2
+"""Raised when a reader of an earlier version would misread the file. Every version from 1 on can be read: 2 added what
+lies beside the exported files (``attachments``), and parity over random sequences."""
+SCHEMA = "model.schema.json"
+"""The JSON schema of ``model.json``, which travels in every bundle."""
 MANIFEST = "model.json"
 CARD = "MODEL_CARD.md"
 PACKAGES = ("numpy", "numba", "onnx", "onnxruntime", "torch")
@@ -86,7 +89,7 @@ def describe(
         "model": stored,
         "n_parameters": model.n_parameters,
         "state": StateLayout.of(model).to_dict(),
-        "initialisation": _initialisation(fit, (*estimation, *traces)[0]),
+        "initialisation": _initialisation(fit, _example(traces)),
         "fit": {
             "status": fit.status.name,
             "status_text": fit.status.value,
@@ -123,6 +126,28 @@ def file_entry(file: ExportedFile, parity: Parity, folder: Path) -> dict[str, An
         "sha256": sha256(folder / file.name),
         "parity": parity.to_dict(),
     }
+
+
+def attachments(purposes: Dict[str, str], folder: Path) -> list[dict[str, str]]:
+    """What ``model.json`` says about the files that are not exports: headers, records, programs, the schema.
+
+    Args:
+        purposes: What each is, by its path in the bundle.
+        folder: The bundle's.
+
+    Returns:
+        JSON values.
+    """
+    return [
+        {"name": name, "purpose": purpose, "sha256": sha256(folder / name)}
+        for name, purpose in sorted(purposes.items())
+    ]
+
+
+def schema_text() -> str:
+    """The JSON schema of ``model.json`` as it is published."""
+    folder = resources.files("sysid.export") / "schemas"
+    return (folder / f"model-{SCHEMA_VERSION}.schema.json").read_text(encoding="utf-8")
 
 
 def seal(manifest: dict[str, Any]) -> str:
@@ -175,6 +200,25 @@ def declared_ranges(model: AbstractModel, traces: TraceSet) -> dict[str, Range]:
     """
     estimation = traces.with_role(Role.ESTIMATION)
     return {name: found for name in model.mapping.inputs if (found := _range(name, estimation))}
+
+
+def first_inputs(model: AbstractModel, traces: TraceSet) -> dict[str, float]:
+    """What each input is at the beginning of the first estimation trace, or of the first trace without one.
+
+    Args:
+        model: The model.
+        traces: The cases.
+
+    Returns:
+        By channel.
+    """
+    example = _example(traces)
+    return {name: float(example[name][0]) for name in model.mapping.inputs}
+
+
+def _example(traces: TraceSet) -> Trace:
+    estimation = traces.with_role(Role.ESTIMATION)
+    return estimation[0] if estimation else traces.traces[0]
 
 
 def amplification(cases: Sequence[ParityCase], sequences: Sequence[ParityCase]) -> dict[str, Any]:

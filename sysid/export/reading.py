@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import zipfile
+import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from pathlib import Path
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from sysid.errors import BundleError, SysidError
 from sysid.export.bundle import Bundle, bundle_files
-from sysid.export.manifest import MANIFEST, SCHEMA_VERSION, manifest_digest, sha256
+from sysid.export.layout import recursion_of
+from sysid.export.manifest import MANIFEST, SCHEMA_VERSION, manifest_digest
 from sysid.models import AbstractModel, model_from_dict
+
+LARGEST = 1 << 30
+"""Bytes; a file that says it unpacks to more is not a bundle's."""
+_AGAIN = "export or copy the bundle again"
 
 
 def read_bundle(folder: Path) -> Bundle:
@@ -19,7 +29,7 @@ def read_bundle(folder: Path) -> Bundle:
     The exported files are hashed, not loaded.
 
     Args:
-        folder: The bundle's folder.
+        folder: The bundle's folder, or its zip.
 
     Returns:
         The model and what ``model.json`` says.
@@ -28,40 +38,96 @@ def read_bundle(folder: Path) -> Bundle:
         BundleError: If a file is missing, changed or newer than this version can read.
     """
     folder = Path(folder)
-    manifest = _read_manifest(folder / MANIFEST)
+    content: _AbstractContent = _Zipped(path=folder) if folder.is_file() else _Folder(path=folder)
+    manifest = _read_manifest(content)
     try:
         files = bundle_files(manifest)
-        hashes = {entry["name"]: entry["sha256"] for entry in [*manifest["files"], manifest["card"]]}
-        model = _model(manifest, folder)
+        entries = [*manifest["files"], manifest["card"]]
+        entries += manifest["attachments"] if manifest["schema_version"] > 1 else []
+        hashes = {entry["name"]: entry["sha256"] for entry in entries}
+        model = _model(manifest, content)
     except (KeyError, TypeError, AttributeError) as error:
         raise BundleError(
             f"{MANIFEST} lacks something that every bundle has",
-            where=str(folder / MANIFEST),
+            where=content.place(MANIFEST),
             got=f"{type(error).__name__}: {error}",
             remedy="ask for the bundle again; this one was not written by the workbench",
         ) from error
     for name, expected in hashes.items():
-        _check_file(folder, name, expected, hashes)
+        _check_file(content, name, expected, hashes)
     return Bundle(folder=folder, model=model, metadata=manifest, files=files)
 
 
-def _read_manifest(path: Path) -> dict[str, Any]:
+@dataclass(frozen=True, kw_only=True)
+class _AbstractContent(ABC):
+    """The files of a bundle, wherever they lie."""
+
+    path: Path
+
+    @abstractmethod
+    def read(self, name: str) -> bytes | None:
+        """The bytes of a file; ``None`` if there is none. ``OSError`` or ``ValueError`` if it cannot be read."""
+
+    @abstractmethod
+    def names(self) -> list[str]:
+        """What there is, sorted."""
+
+    def place(self, name: str) -> str:
+        """Where a file lies, in words."""
+        return str(self.path / name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Folder(_AbstractContent):
+    def read(self, name: str) -> bytes | None:
+        path = self.path / name
+        return path.read_bytes() if path.is_file() else None
+
+    def names(self) -> list[str]:
+        return sorted(path.relative_to(self.path).as_posix() for path in self.path.rglob("*") if path.is_file())
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Zipped(_AbstractContent):
+    """Read in place: nothing is unpacked onto the disk."""
+
+    def read(self, name: str) -> bytes | None:
+        try:
+            with zipfile.ZipFile(self.path) as archive:
+                if name not in archive.namelist():
+                    return None
+                if archive.getinfo(name).file_size > LARGEST:
+                    raise ValueError(f"{name} unpacks to more than {LARGEST} bytes")
+                return archive.read(name)
+        except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+            raise ValueError(f"not a readable zip: {error}") from error
+
+    def names(self) -> list[str]:
+        with zipfile.ZipFile(self.path) as archive:
+            return sorted(archive.namelist())
+
+
+def _read_manifest(content: _AbstractContent) -> dict[str, Any]:
+    where = content.place(MANIFEST)
     try:
-        manifest: Any = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BundleError(
-            f"there is no {MANIFEST}", where=str(path.parent), remedy="give the folder that holds the bundle"
-        ) from None
+        data = content.read(MANIFEST)
+        manifest: Any = None if data is None else json.loads(data.decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise BundleError(
-            f"{MANIFEST} cannot be read", where=str(path), expected="JSON in UTF-8", got=str(error), remedy=_AGAIN
+            f"{MANIFEST} cannot be read", where=where, expected="JSON in UTF-8", got=str(error), remedy=_AGAIN
         ) from error
+    if data is None:
+        raise BundleError(
+            f"there is no {MANIFEST}",
+            where=str(content.path),
+            remedy="give the folder that holds the bundle, or its zip",
+        )
     fields: dict[str, Any] = manifest if isinstance(manifest, dict) else {}
     version = fields.get("schema_version")
     if type(version) is not int or version < 1:
         raise BundleError(
             f"{MANIFEST} does not describe a bundle",
-            where=str(path),
+            where=where,
             expected="a JSON object with schema_version",
             got=f"schema_version {version!r}",
             remedy="give the folder that holds the bundle",
@@ -69,7 +135,7 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     if version > SCHEMA_VERSION:
         raise BundleError(
             "the bundle was written by a newer version of the workbench",
-            where=str(path),
+            where=where,
             expected=f"schema_version up to {SCHEMA_VERSION}",
             got=version,
             remedy="update the workbench: pip install --upgrade sysid-workbench",
@@ -77,7 +143,7 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     if fields.get("digest") != manifest_digest(fields):
         raise BundleError(
             f"{MANIFEST} was changed after it was written",
-            where=str(path),
+            where=where,
             expected=f"SHA-256 {manifest_digest(fields)}",
             got=fields.get("digest"),
             remedy=_AGAIN,
@@ -85,46 +151,49 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     return fields
 
 
-_AGAIN = "export or copy the bundle again"
-
-
-def _model(manifest: dict[str, Any], folder: Path) -> AbstractModel:
+def _model(manifest: dict[str, Any], content: _AbstractContent) -> AbstractModel:
     try:
         model = model_from_dict(manifest["model"])
-        model.recursion  # noqa: B018 - it checks that parameters and structure belong together
+        recursion_of(model)  # it checks that parameters and structure belong together
     except (SysidError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise BundleError(
             f"the model in {MANIFEST} cannot be built",
-            where=str(folder / MANIFEST),
+            where=content.place(MANIFEST),
             got=error.what if isinstance(error, SysidError) else f"{type(error).__name__}: {error}",
             remedy=_AGAIN,
         ) from error
     return model
 
 
-def _check_file(folder: Path, name: str, expected: str, listed: Iterable[str]) -> None:
-    path = folder / name
-    if Path(name).name != name:
+def _check_file(content: _AbstractContent, name: str, expected: str, listed: Iterable[str]) -> None:
+    path = PurePosixPath(name)
+    if path.is_absolute() or str(path) != name or ".." in path.parts or "\\" in name or ":" in name:
         raise BundleError(
             f"{MANIFEST} points outside the bundle",
-            where=str(folder / MANIFEST),
-            expected="plain file names",
+            where=content.place(MANIFEST),
+            expected="names of files within it",
             got=name,
             remedy="do not use this bundle",
         )
-    if not path.is_file():
+    try:
+        data = content.read(name)
+    except (OSError, ValueError) as error:
+        raise BundleError(
+            f"the file {name} cannot be read", where=content.place(name), got=str(error), remedy=_AGAIN
+        ) from error
+    if data is None:
         raise BundleError(
             f"the file {name} is missing",
-            where=str(folder),
+            where=str(content.path),
             expected=", ".join(listed),
-            got=", ".join(sorted(entry.name for entry in folder.iterdir())),
+            got=", ".join(content.names()),
             remedy=_AGAIN,
         )
-    found = sha256(path)
+    found = hashlib.sha256(data).hexdigest()
     if found != expected:
         raise BundleError(
             f"the file {name} was changed after it was written",
-            where=str(path),
+            where=content.place(name),
             expected=f"SHA-256 {expected}",
             got=f"SHA-256 {found}",
             remedy=_AGAIN,

@@ -21,8 +21,12 @@ from sysid.validation import evaluate
 FILES = ["sequence.onnx", "sequence.torchscript.pt", "step.onnx", "step.torchscript.pt"]
 
 
+ALWAYS = ["MODEL_CARD.md", "model.json", "model.schema.json"]
+RECORDS = ["verify/record1.csv", "verify/record2.csv", "verify/record3.csv"]
+
+
 def content(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +48,7 @@ def manifest(bundle):
 
 
 def test_folder_holds_the_files_and_nothing_else(bundle):
-    assert sorted(content(bundle.folder)) == ["MODEL_CARD.md", "model.json", *FILES]
+    assert sorted(content(bundle.folder)) == sorted([*ALWAYS, *FILES, *RECORDS, "verify/verify.py"])
     assert [path.name for path in bundle.folder.parent.iterdir()] == ["bundle"]
 
 
@@ -147,7 +151,7 @@ def test_a_process_of_its_own_gives_the_same_bytes(bundle, tmp_path):
 
 def test_only_the_formats_asked_for_are_written(fit, traces, start, tmp_path):
     bundle = export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onnx"])
-    assert sorted(content(bundle.folder)) == ["MODEL_CARD.md", "model.json", "sequence.onnx", "step.onnx"]
+    assert sorted(content(bundle.folder)) == sorted([*ALWAYS, *FILES[::2], *RECORDS, "verify/verify.py"])
     assert bundle.metadata["metrics"] is None
     assert "No figures were computed" in (bundle.folder / "MODEL_CARD.md").read_text(encoding="utf-8")
 
@@ -219,7 +223,7 @@ def test_an_earlier_bundle_is_replaced_whole(fit, traces, start, narx, tmp_path)
     other = replace(fit, model=narx(NARX(input_delays=1, output_delays=1, neurons=2)))
     export_bundle(other, traces, tmp_path / "b", start=start, formats=["onnx"])
     assert read_bundle(tmp_path / "b").model.to_dict() == other.model.to_dict()
-    assert sorted(content(tmp_path / "b")) == ["MODEL_CARD.md", "model.json", "sequence.onnx", "step.onnx"]
+    assert sorted(content(tmp_path / "b")) == sorted([*ALWAYS, *FILES[::2], *RECORDS, "verify/verify.py"])
     assert [path.name for path in tmp_path.iterdir()] == ["b"]
 
 

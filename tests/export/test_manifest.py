@@ -1,0 +1,67 @@
+"""``model.json`` keeps to the schema that is published with it."""
+
+from __future__ import annotations
+
+import copy
+import json
+
+import jsonschema
+import pytest
+
+from sysid.export import export_bundle, read_bundle
+from sysid.export.manifest import SCHEMA, SCHEMA_VERSION, schema_text
+
+
+@pytest.fixture(scope="module")
+def bundle(fit, traces, start, tmp_path_factory):
+    return export_bundle(fit, traces, tmp_path_factory.mktemp("schema") / "b", start=start, formats=["onnx", "c"])
+
+
+@pytest.fixture(scope="module")
+def schema():
+    return json.loads(schema_text())
+
+
+def test_schema_is_one(schema):
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["properties"]["schema_version"] == {"const": SCHEMA_VERSION}
+
+
+def test_every_manifest_keeps_to_it(bundle, schema):
+    jsonschema.validate(json.loads((bundle.folder / "model.json").read_text(encoding="utf-8")), schema)
+
+
+def test_it_travels_in_the_bundle(bundle):
+    assert (bundle.folder / SCHEMA).read_text(encoding="utf-8") == schema_text()
+    assert SCHEMA in [entry["name"] for entry in read_bundle(bundle.folder).metadata["attachments"]]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(lambda m: m.update(schema_version=1), id="another version"),
+        pytest.param(lambda m: m.pop("files"), id="a field missing"),
+        pytest.param(lambda m: m.update(extra=1), id="a field too many"),
+        pytest.param(lambda m: m["files"][0].update(sha256="0"), id="a hash that is none"),
+        pytest.param(lambda m: m["inputs"][0].update(range=[1.0]), id="half a range"),
+        pytest.param(lambda m: m.update(sample_time_s=0), id="no sample time"),
+        pytest.param(lambda m: m["files"][0]["parity"].pop("random_difference"), id="no random parity"),
+    ],
+)
+def test_schema_refuses(bundle, schema, change):
+    manifest = copy.deepcopy(bundle.metadata)
+    change(manifest)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(manifest, schema)
+
+
+def test_every_file_in_the_bundle_is_hashed(bundle):
+    listed = [entry["name"] for key in ("files", "attachments") for entry in bundle.metadata[key]]
+    there = {path.relative_to(bundle.folder).as_posix() for path in bundle.folder.rglob("*") if path.is_file()}
+    assert there == {*listed, bundle.metadata["card"]["name"], "model.json"}
+
+
+def test_amplification_is_told(bundle):
+    told = bundle.metadata["amplification"]
+    assert 0.0 < told["largest"] < 10.0
+    assert told["meaning"]
