@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from typing import Any
 
+from sysid.export.flags import MEANING
 from sysid.export.templating import render
 
 
@@ -17,4 +18,4 @@ def model_card(manifest: Dict[str, Any]) -> str:
     Returns:
         The text; the same for the same manifest.
     """
-    return render("model_card.md.j2", **manifest)
+    return render("model_card.md.j2", **manifest, meaning=MEANING)

@@ -7,6 +7,7 @@ from sysid.export.c_exporter import CExporter
 from sysid.export.exporter import AbstractExporter
 from sysid.export.fmu_exporter import FmuExporter
 from sysid.export.onnx_exporter import OnnxExporter
+from sysid.export.torch_export import TorchExportExporter
 from sysid.export.torchscript import TorchScriptExporter
 
 EXPORTERS: dict[str, AbstractExporter] = {
@@ -15,6 +16,7 @@ EXPORTERS: dict[str, AbstractExporter] = {
         OnnxExporter(),
         OnnxExporter(name="onnx-float32", dtype="float32"),
         TorchScriptExporter(),
+        TorchExportExporter(),
         CExporter(),
         FmuExporter(name="fmi2", version=2),
         FmuExporter(name="fmi3", version=3),

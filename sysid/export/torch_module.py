@@ -45,7 +45,7 @@ class StageStep(nn.Module):
             "constant": [recursion.constant],
         }
         for name, values in numbers.items():
-            self.register_buffer(name, torch.tensor(np.array(values), dtype=dtype))
+            self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
         self.register_buffer("sources", torch.tensor(stage.sources))
         self.register_buffer("regressor_columns", torch.tensor(layout.regressor_columns(recursion.lags)))
         self.register_buffer("state_columns", torch.tensor(layout.next_columns()))

@@ -133,6 +133,7 @@ ROWS = {
     "ONNX float32, sequence": Row(format="onnx-float32", name="sequence.float32.onnx", dtype="float32", tolerance=1e-3),
     "TorchScript, step": Row(format="torchscript", name="step.torchscript.pt"),
     "TorchScript, sequence": Row(format="torchscript", name="sequence.torchscript.pt"),
+    "torch.export, step": Row(format="torch-export", name="step.pt2"),
     "C": Row(format="c", name="{name}.c"),
     "C, float": Row(format="c", name="{name}.c", dtype="float32", tolerance=1e-3),
     "FMI 2.0": Row(format="fmi2", name="{name}.fmi2.fmu"),

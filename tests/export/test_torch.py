@@ -21,6 +21,14 @@ def test_archive_tells_nothing_about_the_machine_that_wrote_it(narx, declared, t
             assert not [name for name in archive.namelist() if __file__.encode()[:10] in archive.read(name)]
 
 
+def test_exported_program_tells_nothing_about_the_machine_that_wrote_it(narx, declared, tmp_path):
+    surrogate = declared(narx(NARX(input_delays=1, output_delays=1, neurons=1)))
+    (file,) = EXPORTERS["torch-export"].write(surrogate, tmp_path)
+    with zipfile.ZipFile(tmp_path / file.name) as archive:
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert not [name for name in archive.namelist() if __file__.encode()[:10] in archive.read(name)]
+
+
 def test_module_keeps_derivatives(narx, declared, inputs, past):
     model = narx(NARX(input_delays=2, output_delays=2, neurons=3))
     module = SurrogateSequence(declared(model))
