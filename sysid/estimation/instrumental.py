@@ -141,7 +141,7 @@ def _whitening(experiments: Sequence[Experiment], model: ARXModel, order: int) -
 
 def _filtered(columns: NDArray[np.float64], taps: NDArray[np.float64]) -> NDArray[np.float64]:
     """Columns through a finite filter; the first ``len(taps) - 1`` rows lack a past and are to be dropped."""
-    result = taps[0] * columns
+    result: NDArray[np.float64] = float(taps[0]) * columns
     for lag, tap in enumerate(taps[1:], start=1):
         result[lag:] += tap * columns[:-lag]
     return result

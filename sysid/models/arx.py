@@ -137,6 +137,16 @@ class ARXModel(AbstractModel):
             lags=self.orders.lags, neurons=0, theta=theta, scaling=Scaling.identity(len(self.mapping.inputs))
         )
 
+    def to_control(self) -> Any:
+        """The model as a ``control.TransferFunction``, from deviations of the inputs to deviations of the output.
+
+        Returns:
+            One row of transfer functions, one column per input; see :mod:`sysid.models.to_control` for a state space.
+        """
+        from sysid.models.to_control import arx_transfer_function
+
+        return arx_transfer_function(self)
+
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""
         return {

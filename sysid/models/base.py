@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.mapping import Mapping
-from sysid.models.recursion import Recursion
 
 
 class AbstractStructure(ABC):
@@ -59,7 +59,7 @@ class AbstractModel(ABC):
 
     @property
     @abstractmethod
-    def recursion(self) -> Recursion:
+    def recursion(self) -> AbstractForm:
         """The form that is run and exported."""
 
     @abstractmethod

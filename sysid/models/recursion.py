@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.kernels import recursion as kernel
+from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lags
 from sysid.models.scaling import Scaling
@@ -30,7 +31,7 @@ def parameter_count(lags: Lags, neurons: int, *, linear: bool) -> int:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Recursion:
+class Recursion(AbstractForm):
     r"""A tanh layer and a linear part over lagged regressors, scaling included.
 
     In scaled numbers :math:`\hat y_t = \mathrm{clip}(w^T x_t + c + \sum_k v_k \tanh(W_k x_t + b_k))`; the
@@ -65,6 +66,11 @@ class Recursion:
                 got=f"shape {theta.shape}",
                 remedy="use parameters that were fitted with this structure",
             )
+
+    @property
+    def finite(self) -> bool:
+        """Whether every parameter is a finite number."""
+        return bool(np.isfinite(self.theta).all())
 
     @property
     def hidden_weights(self) -> NDArray[np.float64]:

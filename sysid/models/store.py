@@ -9,9 +9,18 @@ from sysid.errors import ConfigError
 from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.narx import NARX, NARXModel
+from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
 
-_MODELS: dict[str, type[AbstractModel]] = {ARX.kind: ARXModel, NARX.kind: NARXModel}
-_STRUCTURES: dict[str, type[AbstractStructure]] = {ARX.kind: ARX, NARX.kind: NARX}
+_MODELS: dict[str, type[AbstractModel]] = {
+    ARX.kind: ARXModel,
+    NARX.kind: NARXModel,
+    TransferFunction.kind: TransferFunctionModel,
+}
+_STRUCTURES: dict[str, type[AbstractStructure]] = {
+    ARX.kind: ARX,
+    NARX.kind: NARX,
+    TransferFunction.kind: TransferFunction,
+}
 
 
 def _check_kind(kind: object) -> str:

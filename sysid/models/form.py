@@ -1,0 +1,61 @@
+"""What a model lowers to: the form that is run and exported."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models.history import History
+from sysid.models.scaling import Scaling
+
+
+class AbstractForm(ABC):
+    """A recursion in scaled numbers that can be run freely and be fed with measured output."""
+
+    scaling: Scaling
+    """Between units and scaled numbers."""
+    low: float
+    """Lower bound of the output in scaled numbers; ``-inf`` for none."""
+    high: float
+    """Upper bound of the output in scaled numbers; ``inf`` for none."""
+
+    @property
+    @abstractmethod
+    def finite(self) -> bool:
+        """Whether every parameter is a finite number."""
+
+    @abstractmethod
+    def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
+        """Free run: the model is fed its own past output.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+            history: The samples before.
+
+        Returns:
+            Output of shape ``(n_samples,)``, in its unit.
+
+        Raises:
+            TraceError: If the number of inputs is not the model's.
+        """
+
+    @abstractmethod
+    def predict(
+        self, inputs: NDArray[np.float64], output: NDArray[np.float64], history: History, steps: int
+    ) -> NDArray[np.float64]:
+        """Prediction ``steps`` ahead: measured output up to ``t - steps``, the model's own after it.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+            output: Measured output, shape ``(n_samples,)``.
+            history: The samples before.
+            steps: How far ahead, at least 1.
+
+        Returns:
+            Predicted output of shape ``(n_samples,)``; its first ``steps`` samples start from the history.
+
+        Raises:
+            TraceError: If the number of inputs is not the model's.
+        """

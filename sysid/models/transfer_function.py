@@ -1,0 +1,307 @@
+"""Transfer functions: for each input a rational function of its own, discrete or continuous, with a dead time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.errors import ConfigError
+from sysid.models import ladder as ladders
+from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.ladder import Domain, Rung
+from sysid.models.mapping import Mapping
+from sysid.models.realisation import Realisation, realise
+from sysid.models.scaling import Scaling
+from sysid.models.state_space import StateSpace
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransferFunction(AbstractStructure):
+    """Orders of a transfer function, as in MATLAB's ``tfest``: one number for each input.
+
+    Args:
+        poles: Number of poles.
+        zeros: Number of zeros, fewer than poles.
+        delays: Dead time in samples; ``None`` to search for it. A discrete transfer function without dead time reacts
+            to its input at once, and one that is sampled from a plant has a dead time of at least 1.
+        domain: ``discrete``: ``B(1/q) / F(1/q)``, where ``zeros`` is the degree of ``B``; or ``continuous``:
+            ``B(s) / F(s)``, its input held between samples.
+        intercept: Fit a constant output beside them.
+
+    Raises:
+        ConfigError: If the numbers are not those of a transfer function, or differ in length.
+
+    Example:
+        >>> TransferFunction(poles=(2,), zeros=(1,), delays=(3,)).label
+        'TF [2; 1; 3]'
+    """
+
+    poles: tuple[int, ...]
+    zeros: tuple[int, ...]
+    delays: tuple[int, ...] | None = None
+    domain: Domain = Domain.DISCRETE
+    intercept: bool = True
+
+    kind = "TransferFunction"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "poles", tuple(self.poles))
+        object.__setattr__(self, "zeros", tuple(self.zeros))
+        object.__setattr__(self, "delays", None if self.delays is None else tuple(self.delays))
+        object.__setattr__(self, "domain", _domain(self.domain))
+        delays = self.delays or (0,) * len(self.poles)
+        same = len(self.poles) == len(self.zeros) == len(delays)
+        orders = all(0 <= z < p for p, z in zip(self.poles, self.zeros, strict=False))
+        if not same or not self.poles or not orders or min(delays) < 0:
+            raise ConfigError(
+                "not the orders of a transfer function",
+                expected="for each input fewer zeros than poles, and a dead time from 0 on",
+                got=f"poles {list(self.poles)}, zeros {list(self.zeros)}, delays {self.delays}",
+                remedy="write for example poles: [2, 2], zeros: [1, 1], delays: [1, 1]",
+            )
+
+    @property
+    def label(self) -> str:
+        """Poles, zeros and dead times; ``?`` where they are to be searched."""
+        rows = [self.poles, self.zeros, ("?",) if self.delays is None else self.delays]
+        prefix = "TF" if self.domain is Domain.DISCRETE else "continuous TF"
+        return f"{prefix} [{'; '.join(' '.join(map(str, row)) for row in rows)}]"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        return {
+            "kind": self.kind,
+            "poles": list(self.poles),
+            "zeros": list(self.zeros),
+            "delays": None if self.delays is None else list(self.delays),
+            "domain": self.domain.value,
+            "intercept": self.intercept,
+        }
+
+
+def _domain(value: object) -> Domain:
+    try:
+        return Domain(value)
+    except ValueError:
+        raise ConfigError(
+            "unknown domain",
+            expected="discrete or continuous",
+            got=repr(value),
+            remedy="choose one of the two",
+        ) from None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TransferFunctionModel(AbstractModel):
+    """A fitted transfer function.
+
+    Args:
+        orders: The structure, with its dead times.
+        sections: For each input the denominators of its sections, ``[1, c1, c2]`` in powers of ``1/q`` or
+            ``[c0, c1, 1]`` in powers of ``s``; see :mod:`sysid.models.ladder`.
+        taps: For each input the weights of its ladder's taps, in scaled numbers, shapes ``(zeros_j + 1,)``.
+        constant: Scaled output without inputs.
+        scaling: Between units and scaled numbers.
+        mapping: Which channels go in, which comes out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+    """
+
+    orders: TransferFunction
+    sections: tuple[tuple[NDArray[np.float64], ...], ...]
+    taps: tuple[NDArray[np.float64], ...]
+    constant: float
+    scaling: Scaling
+    mapping: Mapping
+    sample_time: float
+    input_units: tuple[str, ...]
+    output_unit: str
+    rest_output: float
+
+    @property
+    def structure(self) -> TransferFunction:
+        """The orders."""
+        return self.orders
+
+    @property
+    def n_parameters(self) -> int:
+        """Coefficients of numerators and denominators and, if fitted, the constant."""
+        return sum(self.orders.poles) + sum(self.orders.zeros) + len(self.orders.zeros) + self.orders.intercept
+
+    @property
+    def delays(self) -> tuple[int, ...]:
+        """Dead time of each input in samples."""
+        return self.orders.delays or (0,) * len(self.orders.poles)
+
+    def ladder(self, j: int) -> tuple[Rung, ...]:
+        """The ladder of one input.
+
+        Args:
+            j: Which input.
+
+        Returns:
+            Its rungs.
+        """
+        return ladders.rungs(self.sections[j], self.orders.zeros[j], self.orders.domain)
+
+    def numerator(self, j: int) -> NDArray[np.float64]:
+        """``B`` of one input, from its unit to the output's.
+
+        Args:
+            j: Which input.
+
+        Returns:
+            Shape ``(zeros_j + 1,)``, in ascending powers of ``1/q`` or ``s``. With many poles the coefficients of a
+            product have fewer correct digits than its factors; the model itself runs on the factors.
+        """
+        gain = self.scaling.output_scale / self.scaling.input_scale[j]
+        return np.asarray(gain * (self.taps[j] @ ladders.numerators(self.ladder(j))))[: self.orders.zeros[j] + 1]
+
+    def denominator(self, j: int) -> NDArray[np.float64]:
+        """``F`` of one input.
+
+        Args:
+            j: Which input.
+
+        Returns:
+            Shape ``(poles_j + 1,)``, ascending powers; the first (discrete) or last (continuous) one is 1.
+        """
+        return ladders.denominator(self.ladder(j))
+
+    def poles(self, j: int) -> NDArray[np.complex128]:
+        """Poles of one input, in the z or the s plane.
+
+        Args:
+            j: Which input.
+
+        Returns:
+            Shape ``(poles_j,)``.
+        """
+        return np.concatenate([ladders.section_poles(d, self.orders.domain) for d in self.sections[j]])
+
+    def zeros(self, j: int) -> NDArray[np.complex128]:
+        """Zeros of one input, in the z or the s plane, those at infinity (or z = 0) left out.
+
+        Args:
+            j: Which input.
+
+        Returns:
+            Shape ``(zeros_j,)`` or fewer.
+        """
+        b = self.numerator(j)
+        return np.asarray(np.roots(b if self.orders.domain is Domain.DISCRETE else b[::-1]), dtype=np.complex128)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all poles lie inside the unit circle, or left of the imaginary axis."""
+        poles = np.concatenate([self.poles(j) for j in range(len(self.sections))])
+        margin = np.abs(poles) - 1.0 if self.orders.domain is Domain.DISCRETE else poles.real
+        return bool((margin < 0.0).all())
+
+    def response(self, j: int, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Frequency response of one input, dead time included.
+
+        Args:
+            j: Which input.
+            frequency: In rad/s, shape ``(n_points,)``.
+
+        Returns:
+            Output unit per input unit, shape ``(n_points,)``.
+        """
+        s = 1j * np.asarray(frequency, dtype=np.float64)
+        discrete = self.orders.domain is Domain.DISCRETE
+        variable = np.asarray(np.exp(-s * self.sample_time) if discrete else s, dtype=np.complex128)
+        gain = self.scaling.output_scale / self.scaling.input_scale[j]
+        dead = np.exp(-s * self.sample_time * self.delays[j])
+        return np.asarray(gain * dead * (ladders.responses(self.ladder(j), variable) @ self.taps[j]))
+
+    @cached_property
+    def recursion(self) -> StateSpace:
+        """The state space that is run and exported: block by block, each input's dead time, then its ladder."""
+        parts = [self._block(j) for j in range(len(self.sections))]
+        B = np.zeros((sum(len(part.A) for part in parts), len(parts)))
+        at = 0
+        for j, part in enumerate(parts):
+            B[at : at + len(part.A), j] = part.B
+            at += len(part.A)
+        return StateSpace(
+            A=np.ascontiguousarray(linalg.block_diag(*(part.A for part in parts))),
+            B=B,
+            C=np.concatenate([part.C[0] for part in parts]),
+            D=np.array([part.D[0] for part in parts]),
+            constant=self.constant,
+            scaling=self.scaling,
+        )
+
+    def _block(self, j: int) -> Realisation:
+        """One input's dead time and ladder, with the weighted taps as its output."""
+        part = realise(self.ladder(j), self.orders.domain)
+        if self.orders.domain is Domain.CONTINUOUS:
+            part = part.sampled(self.sample_time)
+        row, direct = self.taps[j] @ part.C, float(self.taps[j] @ part.D)
+        n, k = len(part.A), self.delays[j]
+        if k == 0:
+            return Realisation(A=part.A, B=part.B, C=row[np.newaxis], D=np.array([direct]))
+        A, B, C = np.zeros((n + k, n + k)), np.zeros(n + k), np.zeros(n + k)
+        A[:k, :k] = np.eye(k, k=-1)
+        B[0] = 1.0
+        A[k:, k:], A[k:, k - 1] = part.A, part.B
+        C[k:], C[k - 1] = row, direct
+        return Realisation(A=A, B=B, C=C[np.newaxis], D=np.zeros(1))
+
+    def to_control(self, *, pade_order: int = 3) -> Any:
+        """The model as a ``control.TransferFunction``, from deviations of the inputs to deviations of the output.
+
+        Args:
+            pade_order: Order of the Padé approximation that stands for a dead time of a continuous model.
+
+        Returns:
+            One row of transfer functions, one column per input; see :mod:`sysid.models.to_control` for a state space.
+        """
+        from sysid.models.to_control import transfer_function
+
+        return transfer_function(self, pade_order=pade_order)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return {
+            "structure": self.orders.to_dict(),
+            "mapping": str(self.mapping),
+            "sample_time": self.sample_time,
+            "input_units": list(self.input_units),
+            "output_unit": self.output_unit,
+            "rest_output": self.rest_output,
+            "sections": [[d.tolist() for d in sections] for sections in self.sections],
+            "taps": [taps.tolist() for taps in self.taps],
+            "constant": self.constant,
+            "scaling": {
+                "input_offset": list(self.scaling.input_offset),
+                "input_scale": list(self.scaling.input_scale),
+                "output_offset": self.scaling.output_offset,
+                "output_scale": self.scaling.output_scale,
+            },
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> TransferFunctionModel:
+        """The model that :meth:`to_dict` wrote."""
+        orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
+        scaling: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields["scaling"].items()}
+        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output", "constant")}
+        return cls(
+            orders=TransferFunction(**orders),
+            sections=tuple(tuple(np.array(d, dtype=np.float64) for d in part) for part in fields["sections"]),
+            taps=tuple(np.array(taps, dtype=np.float64) for taps in fields["taps"]),
+            scaling=Scaling(**scaling),
+            mapping=Mapping.parse(fields["mapping"]),
+            input_units=tuple(fields["input_units"]),
+            **rest,
+        )
