@@ -1,0 +1,171 @@
+"""Is linear enough? The best linear free run against the best network, by the amplitude of the case.
+
+A linear model answers twice the input with twice the output. A system that does not can still be fitted at one
+amplitude, so that a mean over cases hides what matters: the verdict is given amplitude by amplitude.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping as Dict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sysid.traces import Role
+from sysid.validation.evaluate import Evaluation
+
+SMALL, LARGE = 1.0 / 3.0, 0.85
+"""Amplitudes, as parts of the largest, up to which a case is small, and from which it is full."""
+ENOUGH = 95.0
+"""NRMSE fit in percent from which a linear free run is called good at an amplitude."""
+FACTOR = 2.0
+"""How many times smaller the network's error must be for the linear model to be called worse at an amplitude."""
+
+
+class Amplitude(enum.Enum):
+    """How far the output of a case moves; the value is its name in tables."""
+
+    MINIMUM = "minimum"
+    INTERMEDIATE = "intermediate"
+    FULL = "full"
+
+
+class Answer(enum.Enum):
+    """The verdict; the value is the sentence that a person reads."""
+
+    LINEAR = "A linear model is enough: at every amplitude it is good, or as good as the network."
+    NETWORK = (
+        "Linear is not enough: at some amplitude the network's error is less than half that of every linear model."
+    )
+    NEITHER = (
+        "Neither is good at every amplitude, and the network is not clearly better: more or other data are needed."
+    )
+    UNKNOWN = "No answer: it takes a linear model, a network, and cases that neither was chosen on."
+
+
+@dataclass(frozen=True, kw_only=True)
+class AmplitudeRow:
+    """The best of both kinds at one amplitude.
+
+    Args:
+        amplitude: Which.
+        cases: Names of its cases.
+        linear: Name of the linear model with the highest mean fit over these cases.
+        linear_fit: That fit in percent.
+        network: Name of the network with the highest mean fit over these cases.
+        network_fit: That fit in percent.
+    """
+
+    amplitude: Amplitude
+    cases: tuple[str, ...]
+    linear: str
+    linear_fit: float
+    network: str
+    network_fit: float
+
+    @property
+    def good(self) -> bool:
+        """Whether the linear model is good here."""
+        return self.linear_fit >= ENOUGH
+
+    @property
+    def worse(self) -> bool:
+        """Whether the linear model's error is more than ``FACTOR`` times the network's, and not good."""
+        return not self.good and 100.0 - self.linear_fit > FACTOR * (100.0 - self.network_fit)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The row as JSON values."""
+        return {
+            "amplitude": self.amplitude.value,
+            "cases": list(self.cases),
+            "linear": self.linear,
+            "linear_fit": self.linear_fit,
+            "network": self.network,
+            "network_fit": self.network_fit,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linearity:
+    """The verdict on a data set.
+
+    Args:
+        rows: By amplitude, smallest first; amplitudes without a case are left out.
+        answer: The verdict.
+    """
+
+    rows: tuple[AmplitudeRow, ...]
+    answer: Answer
+
+    def to_dict(self) -> dict[str, Any]:
+        """The verdict as JSON values."""
+        return {"answer": self.answer.name, "text": self.answer.value, "rows": [row.to_dict() for row in self.rows]}
+
+
+def judge_linearity(linear: Dict[str, Evaluation], networks: Dict[str, Evaluation]) -> Linearity:
+    """Compare the best linear free run with the best network, amplitude by amplitude.
+
+    Each amplitude may have its own best model of either kind: the question is what the kind can do. Only cases for
+    validation and test count.
+
+    Args:
+        linear: Evaluations of linear models by name, on the same cases.
+        networks: Evaluations of networks by name, on the same cases.
+
+    Returns:
+        The verdict.
+    """
+    groups = _by_amplitude([*linear.values(), *networks.values()])
+    if not linear or not networks or not groups:
+        return Linearity(rows=(), answer=Answer.UNKNOWN)
+    rows = []
+    for amplitude in Amplitude:
+        cases = groups.get(amplitude, ())
+        if cases:
+            best, fit = _best(linear, cases)
+            other, other_fit = _best(networks, cases)
+            rows.append(
+                AmplitudeRow(
+                    amplitude=amplitude,
+                    cases=cases,
+                    linear=best,
+                    linear_fit=fit,
+                    network=other,
+                    network_fit=other_fit,
+                )
+            )
+    if any(row.worse for row in rows):
+        answer = Answer.NETWORK
+    elif all(row.good or row.linear_fit >= row.network_fit - 1.0 for row in rows):
+        answer = Answer.LINEAR
+    else:
+        answer = Answer.NEITHER
+    return Linearity(rows=tuple(rows), answer=answer)
+
+
+def _by_amplitude(evaluations: Sequence[Evaluation]) -> dict[Amplitude, tuple[str, ...]]:
+    """Unseen cases by how far their target moves, relative to the one that moves furthest."""
+    if not evaluations:
+        return {}
+    unseen = {n: c for n, c in evaluations[0].cases.items() if c.role in {Role.VALIDATION, Role.TEST}}
+    spans = {name: float(np.ptp(case.target)) for name, case in unseen.items()}
+    largest = max(spans.values(), default=0.0)
+    groups: dict[Amplitude, tuple[str, ...]] = {}
+    for name, span in spans.items():
+        if largest > 0.0:
+            part = span / largest
+            kind = Amplitude.MINIMUM if part <= SMALL else Amplitude.FULL if part >= LARGE else Amplitude.INTERMEDIATE
+            groups[kind] = (*groups.get(kind, ()), name)
+    return groups
+
+
+def _best(evaluations: Dict[str, Evaluation], cases: Sequence[str]) -> tuple[str, float]:
+    fits = {
+        name: float(np.mean([evaluation.cases[case].free_run.nrmse_fit for case in cases]))
+        for name, evaluation in evaluations.items()
+    }
+    name = max(fits, key=lambda key: fits[key] if np.isfinite(fits[key]) else -np.inf)
+    return name, fits[name]
