@@ -126,7 +126,7 @@ def annotate(
     settings = settings or ComputerSettings()
     if equalising is None and handle is None:
         # A pipe never stands as still as a reservoir: its lap is a fall of less than 0.6 psi in 2 s (ours).
-        settings = replace(settings, held_fall=0.6, held_window=2.0)
+        settings = replace(settings, held_swing=0.6, held_window=2.0)
     computer = BrakeComputer(sample_time=trace.sample_time, settings=settings, charged=True)
     names, states = list(State), np.empty(len(trace), dtype=np.int64)
     events: list[Event] = []

@@ -70,7 +70,7 @@ class ComputerSettings:
         confirm: Fall of the equalising reservoir that confirms it.
         confirm_time: Time within which it must.
         step: Fall of the equalising reservoir that is worth another order: the reporting step of 49 CFR 232.403.
-        held_fall: Fall of the equalising reservoir within ``held_window`` under which it is held.
+        held_swing: Swing of the equalising reservoir within ``held_window`` under which it is held.
         held_window: Over this time.
         rise: Rise of the equalising reservoir that is a release.
         emergency_fall: Fall of the head pipe that is an emergency.
@@ -88,7 +88,7 @@ class ComputerSettings:
     confirm: float = 1.5
     confirm_time: float = 5.0
     step: float = 2.0
-    held_fall: float = 0.1
+    held_swing: float = 0.1
     held_window: float = 0.5
     rise: float = 1.5
     emergency_fall: float = 5.0
@@ -268,8 +268,8 @@ class BrakeComputer:
         if self._rising():
             return self._enter(State.STABILITY, self._message(Order.RELEASE))
         message = None
-        held = -self._er.change(s.held_window) <= s.held_fall
-        if self._sent - reading.equalising >= (s.held_fall if held else s.step):
+        held = self._er.swing(s.held_window) <= s.held_swing
+        if self._sent - reading.equalising >= (s.held_swing if held else s.step):
             self._sent = reading.equalising
             message = self._message(Order.SERVICE)
         return self._enter(State.QUALIFY_DEEPER if held else State.QUALIFY_SERVICE, message)
