@@ -65,7 +65,7 @@ class Correlation:
         allowed = int(stats.binom.ppf(0.99, n, 1.0 - self.probability))
         wide = self.bound * float(stats.norm.ppf(1.0 - 0.005 / n) / stats.norm.ppf(0.5 + 0.5 * self.probability))
         largest = float(np.abs(self.values[self.lags >= 0]).max(initial=0.0))
-        return len(self.outside) <= allowed and largest <= wide
+        return bool(len(self.outside) <= allowed and largest <= wide)
 
     def to_dict(self) -> dict[str, Any]:
         """The function as JSON values."""

@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_v
 from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import Training
-from sysid.models import ARX, NARX, Start
+from sysid.models import ARX, NARX, Start, TransferFunction
 from sysid.workbench.fields import (
     STRICT,
     FormatField,
@@ -32,7 +32,7 @@ class FitConfig(BaseModel):
     Args:
         name: Name in tables, different for each fit.
         structure: What is fitted, with its ``kind``.
-        training: How a network is trained; an ARX model has nothing to choose.
+        training: How a network is trained; a linear model has nothing to choose.
         initial: Name of an earlier fit to start from.
     """
 
@@ -50,10 +50,11 @@ class FitConfig(BaseModel):
 
     @model_validator(mode="after")
     def _check(self) -> FitConfig:
-        if isinstance(self.structure, ARX) and (self.training is not None or self.initial is not None):
+        linear = isinstance(self.structure, ARX | TransferFunction)
+        if linear and (self.training is not None or self.initial is not None):
             raise FieldError(
-                f"the fit {self.name!r} has a training or an initial fit, but is ARX",
-                expected="neither: least squares is computed directly",
+                f"the fit {self.name!r} has a training or an initial fit, but is {self.structure.kind}",
+                expected="neither: a linear model finds its own start",
                 remedy="remove training and initial",
             )
         try:
@@ -203,6 +204,13 @@ class PipelineConfig(BaseModel):
                     expected=f"{n_inputs} values of nb and of nk for {self.mapping}",
                     got=f"{len(fit.structure.nb)} values",
                     remedy="give one nb and one nk for each input",
+                )
+            if isinstance(fit.structure, TransferFunction) and len(fit.structure.poles) != n_inputs:
+                raise FieldError(
+                    f"the orders of the fit {fit.name!r} do not match the inputs",
+                    expected=f"{n_inputs} numbers of poles and of zeros for {self.mapping}",
+                    got=f"{len(fit.structure.poles)} numbers",
+                    remedy="give one number of poles and of zeros for each input",
                 )
             if isinstance(fit.structure, NARX):
                 try:

@@ -14,13 +14,24 @@ from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, PlainValidat
 from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.export.exporters import EXPORTERS
-from sysid.models import ARX, NARX, AbstractStructure, Mapping, Start, StartKind, structure_from_dict
+from sysid.models import (
+    ARX,
+    NARX,
+    AbstractStructure,
+    Mapping,
+    Start,
+    StartKind,
+    TransferFunction,
+    structure_from_dict,
+)
 from sysid.yaml_files import FieldError
 
 STRICT = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 """A field that is not known is an error; nothing changes once it is read."""
 
-STRUCTURES: dict[str, type[AbstractStructure]] = {ARX.kind: ARX, NARX.kind: NARX}
+STRUCTURES: dict[str, type[AbstractStructure]] = {
+    structure.kind: structure for structure in (ARX, NARX, TransferFunction)
+}
 """Structures that a pipeline can fit; their fields are those of the classes."""
 
 

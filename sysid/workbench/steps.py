@@ -17,8 +17,15 @@ import numpy as np
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
-from sysid.estimation import FitProgress, FitResult, fit_arx, fit_narx
-from sysid.models import ARX, NARX
+from sysid.estimation import (
+    FitProgress,
+    FitResult,
+    TransferFunctionTraining,
+    fit_arx,
+    fit_narx,
+    fit_transfer_function,
+)
+from sysid.models import ARX, NARX, TransferFunction
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation import Evaluation, evaluate, evaluate_case
 from sysid.workbench.config import FitConfig, PipelineConfig
@@ -142,10 +149,11 @@ def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | N
         64 hexadecimal digits.
     """
     is_arx = isinstance(fit.structure, ARX)
-    training = None if is_arx else dataclasses.asdict(fit.training_options(config.seed))
+    network = isinstance(fit.structure, NARX)
+    training = dataclasses.asdict(fit.training_options(config.seed)) if network else {"seed": config.seed}
     terms = {
         "structure": fit.structure.to_dict(),
-        "training": training,
+        "training": None if is_arx else training,
         "initial": initial,
         "traces": [trace.digest for trace in data.estimation],
         # Least squares has nothing to choose, so that other selection traces do not concern it.
@@ -195,6 +203,11 @@ def fit_traces(
     common: dict[str, Any] = {"start": config.start, "rest_output": config.rest_output}
     if isinstance(structure, ARX):
         return fit_arx(data.estimation, config.mapping, structure, **common)
+    if isinstance(structure, TransferFunction):
+        training = TransferFunctionTraining(seed=config.seed)
+        return fit_transfer_function(
+            data.estimation, config.mapping, structure, training, selection=data.selection, **common
+        )
     if isinstance(structure, NARX):
         return fit_narx(
             data.estimation,

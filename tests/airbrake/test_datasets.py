@@ -25,6 +25,8 @@ LENGTHS = {
     },
     "abdx-selection": {f"SEL{k:02d}": 800.0 for k in range(1, 7)},
     "abdx-combined-selection": {f"SEL{k:02d}": 900.0 for k in range(1, 7)},
+    "ab-linear": {"EST01": 2700.0, "VAL01": 2700.0, "VAL02": 420.0, "VAL03": 720.0, "VAL04": 620.0, "VAL05": 720.0},
+    "ab-linear-selection": {f"SEL{k:02d}": 1500.0 for k in range(1, 5)},
 }
 
 
@@ -33,6 +35,8 @@ SHORT = {
     "abdx-combined": ["VAL03", "VAL05"],
     "abdx-selection": ["SEL02"],
     "abdx-combined-selection": ["SEL03"],
+    "ab-linear": ["VAL02", "VAL04"],
+    "ab-linear-selection": ["SEL04"],
 }
 """Cases that are simulated here; the long ones take 2.5 s each and differ by their commands only."""
 
