@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.linalg import blas
 
 from sysid.kernels import recursion as kernel
 from sysid.models import History, Mapping, Recursion, Start
@@ -121,12 +120,26 @@ class AbstractProvider(ABC):
 
 @dataclass(frozen=True, eq=False)
 class _Record:
-    """An experiment in scaled numbers, with room for what the kernel writes."""
+    """An experiment in scaled numbers.
+
+    ``y`` is the output with its history: measured where the loop is open, zeros to be filled where it is closed. It is
+    copied before a kernel writes, because starts that train side by side share the provider.
+    """
 
     u: NDArray[np.float64]
     y: NDArray[np.float64]
     target: NDArray[np.float64]
     root_weights: NDArray[np.float64] | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Pass:
+    """What one run over a record leaves for the sensitivities (see the kernel)."""
+
+    y: NDArray[np.float64]
+    out: NDArray[np.float64]
+    h: NDArray[np.float64]
+    c: NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,10 +176,11 @@ class RecursionProvider(AbstractProvider):
         total = 0.0
         for record in self._records:
             if self.closed:
-                kernel.free_run(record.u, record.y, *self._arguments(record, theta))
-                residual = record.y[self.template.lags.depth :] - record.target
+                y = record.y.copy()
+                kernel.free_run(record.u, y, *self._arguments(record, theta))
+                residual = y[self.template.lags.depth :] - record.target
             else:
-                residual = self._pass(record, theta)[0] - record.target
+                residual = self._pass(record, theta).out - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
             total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
@@ -175,25 +189,25 @@ class RecursionProvider(AbstractProvider):
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
         n_p = len(theta)
         gradient = np.zeros(n_p)
-        matrix = np.zeros((n_p, n_p), order="F")
+        matrix = np.zeros((n_p, n_p))
         loss, correlated = 0.0, 0.0
         for record in self._records:
-            out, h, c = self._pass(record, theta)
-            residual = out - record.target
+            passed = self._pass(record, theta)
+            residual = passed.out - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
             correlated += len(residual) * correlation_time(residual)
             loss += 0.5 * float(residual @ residual)
-            for first, block in self._blocks(record, theta, h, c):
+            for first, block in self._blocks(record, theta, passed):
                 rows = slice(first, first + len(block))
                 weighted = block if record.root_weights is None else block * record.root_weights[rows, None]
                 gradient += weighted.T @ residual[rows]
-                # Row-major (rows, parameters) is column-major (parameters, rows): no copy, half the flops of gemm.
-                matrix = blas.dsyrk(1.0, weighted.T, beta=1.0, c=matrix, overwrite_c=1)
-        upper = np.triu(matrix)
+                # NumPy sees that both factors are one array and calls syrk, half the flops of a general product; unlike
+                # SciPy's wrapper of it, it lets the other starts' threads run meanwhile.
+                matrix += weighted.T @ weighted
         return Linearisation(
             loss=loss,
             gradient=gradient,
-            gauss_newton=upper + np.triu(upper, 1).T,
+            gauss_newton=matrix,
             correlation_time=correlated / sum(len(record.target) for record in self._records),
         )
 
@@ -208,12 +222,12 @@ class RecursionProvider(AbstractProvider):
         """
         blocks = []
         for record in self._records:
-            _, h, c = self._pass(record, theta)
-            blocks += [block.copy() for _, block in self._blocks(record, theta, h, c)]
+            passed = self._pass(record, theta)
+            blocks += [block.copy() for _, block in self._blocks(record, theta, passed)]
         return np.concatenate(blocks)
 
     def _blocks(
-        self, record: _Record, theta: NDArray[np.float64], h: NDArray[np.float64], c: NDArray[np.float64]
+        self, record: _Record, theta: NDArray[np.float64], passed: _Pass
     ) -> Iterator[tuple[int, NDArray[np.float64]]]:
         lags = self.template.lags
         carry = max(lags.output, default=0) if self.closed else 0
@@ -224,18 +238,22 @@ class RecursionProvider(AbstractProvider):
             if first:
                 J[:carry] = J[BLOCK : BLOCK + carry]
             kernel.sensitivities(
-                record.u, record.y, lags.depth, first, rows, *self._tables(), theta,
-                self.template.neurons, self.closed, h, c, carry, J,
+                record.u, passed.y, lags.depth, first, rows, *self._tables(), theta,
+                self.template.neurons, self.closed, passed.h, passed.c, carry, J,
             )  # fmt: skip
             yield first, J[carry : carry + rows]
 
-    def _pass(self, record: _Record, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    def _pass(self, record: _Record, theta: NDArray[np.float64]) -> _Pass:
         n = len(record.target)
-        out = np.empty(n)
-        h = np.empty((n, self.template.neurons))
-        c = np.empty((n, len(self.template.lags.output) + 1))
-        kernel.activations(record.u, record.y, *self._arguments(record, theta), self.closed, out, h, c)
-        return out, h, c
+        passed = _Pass(
+            y=record.y.copy(),
+            out=np.empty(n),
+            h=np.empty((n, self.template.neurons)),
+            c=np.empty((n, len(self.template.lags.output) + 1)),
+        )
+        arguments = self._arguments(record, theta)
+        kernel.activations(record.u, passed.y, *arguments, self.closed, passed.out, passed.h, passed.c)
+        return passed
 
     def _tables(self) -> tuple[NDArray[np.int64], ...]:
         lags = self.template.lags

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from sysid.estimation.initialise import Layout
 from sysid.estimation.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
@@ -117,7 +118,8 @@ def run(race: Race) -> list[Candidate]:
     latest: dict[int, Candidate] = {}
     seen: list[Candidate] = []
     total = _work(training.starts, rungs)
-    with ThreadPoolExecutor(min(training.workers, training.starts)) as pool:
+    # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(min(training.workers, training.starts)) as pool:
         for rung, share in enumerate(rungs):
             before = rungs[rung - 1] if rung else 0.0
             seconds = training.max_time_s * (share - before) * pool._max_workers / total

@@ -1,0 +1,147 @@
+"""Fitting networks: what is learnt, what is chosen, what an interruption leaves."""
+
+import _thread
+import threading
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.estimation import Loop, Status, Training, fit_narx
+from sysid.models import NARX, Mapping
+from sysid.traces import Channel, Trace
+
+TANK = Mapping(inputs=("pump",), output="level")
+SMALL = NARX(input_delays=1, output_delays=1, neurons=4)
+
+
+def tank(seed: int, n: int = 600) -> Trace:
+    """A tank whose outflow follows the square root of its level: no linear model fits it."""
+    rng = np.random.default_rng(seed)
+    pump = np.repeat(rng.uniform(0.2, 2.0, n // 30 + 1), 30)[:n]
+    level = np.zeros(n)
+    for t in range(1, n):
+        level[t] = level[t - 1] + 0.05 * (pump[t - 1] - 1.2 * np.sqrt(max(level[t - 1], 0.0)))
+    channels = (Channel(name="pump", unit="V"), Channel(name="level", unit="m"))
+    return Trace(name=f"tank {seed}", sample_time=0.5, channels=channels, values=np.column_stack([pump, level]))
+
+
+def free_run_mse(fit, trace: Trace) -> float:
+    return float(np.mean((fit.model.simulate(trace.columns(["pump"])) - trace["level"]) ** 2))
+
+
+def test_a_closed_loop_fit_predicts_a_record_it_has_not_seen():
+    records = [tank(1), tank(4), tank(5)]
+    fit = fit_narx(records, TANK, SMALL, Training(max_iterations=150, starts=4), selection=[tank(2)])
+    unseen = tank(3)
+    assert free_run_mse(fit, unseen) < 1e-3 * np.var(unseen["level"])
+    assert fit.loop is Loop.CLOSED
+    assert fit.status.usable
+    assert fit.evidence is not None
+    assert 0.0 < fit.evidence.total_effective_parameters <= fit.model.n_parameters
+
+
+def test_the_learning_curve_ends_at_the_error_of_the_model():
+    fit = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=20))
+    assert fit.history["mse"][-1] == pytest.approx(free_run_mse(fit, tank(1)), rel=1e-9)
+    assert len({len(column) for column in fit.history.values()}) == 1
+
+
+def test_the_open_loop_minimises_the_one_step_error_and_the_closed_loop_the_free_run():
+    trace = tank(1)
+    fits = {loop: fit_narx([trace], TANK, SMALL, Training(loop=loop, max_iterations=60)) for loop in Loop}
+    inputs = trace.columns(["pump"])
+
+    def one_step(fit) -> float:
+        return float(np.mean((fit.model.predict(inputs, trace["level"]) - trace["level"]) ** 2))
+
+    assert one_step(fits[Loop.OPEN]) < one_step(fits[Loop.CLOSED])
+    assert free_run_mse(fits[Loop.CLOSED], trace) < free_run_mse(fits[Loop.OPEN], trace)
+
+
+@pytest.mark.parametrize("workers", [1, 2], ids=["one worker", "two workers"])
+def test_the_seed_decides_and_not_the_number_of_workers(workers):
+    training = Training(max_iterations=25, starts=3, seed=5, workers=workers)
+    fit = fit_narx([tank(1)], TANK, SMALL, training, selection=[tank(2)])
+    again = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=25, starts=3, seed=5), selection=[tank(2)])
+    np.testing.assert_array_equal(fit.model.theta, again.model.theta)
+    assert fit.seed in {5, 6, 7}
+
+
+def test_what_is_chosen_has_the_least_error_on_the_selection_traces():
+    selection = [tank(2), tank(4)]
+    fit = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=40, starts=4), selection=selection)
+    scores = [float(note.split("selection mse ")[1].split(",")[0]) for note in fit.notes if "selection mse" in note]
+    assert len(scores) >= 4
+    chosen = np.exp(np.mean([np.log(free_run_mse(fit, trace)) for trace in selection]))
+    assert chosen == pytest.approx(min(scores), rel=1e-3)
+
+
+def test_without_selection_traces_the_evidence_chooses():
+    fit = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=30, starts=3))
+    evidences = [float(note.split("log evidence ")[1].rstrip(".")) for note in fit.notes if "log evidence" in note]
+    assert fit.evidence is not None
+    assert fit.evidence.log_evidence == pytest.approx(max(evidences), rel=1e-5)
+
+
+def test_an_initial_fit_is_where_the_first_start_begins():
+    first = fit_narx([tank(1)], TANK, SMALL, Training(loop="open", max_iterations=40))
+    fit = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=5), initial=first)
+    assert fit.history["mse"][0] == pytest.approx(free_run_mse(first, tank(1)), rel=1e-6)
+    assert fit.seed is None
+
+
+def test_an_initial_fit_of_another_structure_is_refused():
+    first = fit_narx([tank(1)], TANK, SMALL, Training(loop="open", max_iterations=2))
+    with pytest.raises(ConfigError, match="another structure"):
+        fit_narx([tank(1)], TANK, NARX(input_delays=2, output_delays=1, neurons=4), initial=first)
+
+
+def test_several_records_count_each_from_its_own_start():
+    fit = fit_narx([tank(1, 200), tank(2, 300)], TANK, SMALL, Training(max_iterations=30))
+    total = (200 * free_run_mse(fit, tank(1, 200)) + 300 * free_run_mse(fit, tank(2, 300))) / 500
+    assert fit.history["mse"][-1] == pytest.approx(total, rel=1e-9)
+
+
+def test_masked_samples_do_not_train():
+    clean = tank(1)
+    values = clean.values.copy()
+    usable = np.ones(len(clean), dtype=bool)
+    usable[100:110] = False
+    values[100:110, 1] = 50.0
+    dirty = Trace(name="dirty", sample_time=0.5, channels=clean.channels, values=values, usable=usable)
+    fit = fit_narx([dirty], TANK, SMALL, Training(max_iterations=60))
+    counted = (fit.model.simulate(dirty.columns(["pump"])) - clean["level"])[usable]
+    assert np.mean(counted**2) < 1e-2 * np.var(clean["level"])
+
+
+def test_an_interruption_keeps_the_best_model_so_far():
+    seen = threading.Event()
+
+    def interrupt_once(progress) -> None:
+        if progress.iteration == 10 and not seen.is_set():
+            seen.set()
+            _thread.interrupt_main()
+
+    training = Training(max_iterations=100_000, starts=2, patience=100_000)
+    fit = fit_narx([tank(1)], TANK, SMALL, training, on_progress=interrupt_once)
+    assert fit.status is Status.INTERRUPTED
+    assert np.isfinite(fit.model.theta).all()
+    assert len(fit.history["mse"]) >= 10
+
+
+def test_progress_ends_at_the_whole():
+    fractions = []
+    fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=10), on_progress=lambda p: fractions.append(p.fraction))
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"choose_by": "luck"}, {"basis": "fourier"}, {"starts": 0}, {"max_iterations": 0}],
+    ids=lambda fields: next(iter(fields)),
+)
+def test_training_that_cannot_be_is_refused(fields):
+    with pytest.raises(ConfigError, match=next(iter(fields))):
+        Training(**fields)
