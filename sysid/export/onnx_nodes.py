@@ -65,6 +65,14 @@ class Nodes:
         self.nodes.append(helper.make_node(operator, list(inputs), [output], name=f"make_{output}", **attributes))
         return output
 
+    def split(self, value: str, outputs: Sequence[str]) -> list[str]:
+        """Cut a value into equal parts along its last axis, one for each name."""
+        if len(outputs) == 1:
+            return [value]
+        names = [self.prefix + output for output in outputs]
+        self.nodes.append(helper.make_node("Split", [value], names, name=f"make_{names[0]}", axis=-1))
+        return names
+
     def add_scan(
         self, states: Sequence[str], scanned: Sequence[str], ends: Sequence[str], output: str, body: Any
     ) -> str:

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 from onnx import numpy_helper
 
+from sysid.export.flags import Flag
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import TO_END, Nodes
-from sysid.export.onnx_step import clipped, ends, run_stages, scaled_inputs, unscaled_output
+from sysid.export.onnx_step import INT32, clipped, ends, held_outputs, run_stages, unscaled_output
 from sysid.export.surrogate import Stage, Surrogate
-from sysid.models import Lags
+from sysid.models import Lags, Recursion
 
 
 def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
@@ -37,14 +38,14 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         The ``GraphProto``.
     """
     nodes = Nodes(dtype)
-    run_stages(nodes, surrogate, _stage)
+    _flags(nodes, surrogate, run_stages(nodes, surrogate, _stage))
     return nodes.graph("sequence", *ends(nodes, surrogate, ["time", "batch"]))
 
 
 def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, str, str]:
     layout, recursion = stage.layout, stage.recursion
     n_inputs, longest = recursion.lags.n_inputs, max(line.length for line in layout.inputs)
-    scaled = scaled_inputs(nodes, inputs, recursion)
+    scaled = _scaled_inputs(nodes, inputs, recursion)
     history = _with_past(nodes, layout, scaled, state, longest)
     columns = _input_columns(recursion.lags)
     regressors = _input_regressors(nodes, columns, history, n_inputs, longest)
@@ -53,7 +54,69 @@ def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, st
     past = nodes.add("Slice", [state, *span], "output_line")
     body = _scan_body(stage, columns, line.length, nodes)
     output = nodes.add_scan([past], [regressors], ["output_line_end"], "y_scaled", body)
-    return output, unscaled_output(nodes, output, recursion), _state_out(nodes, layout, history, longest)
+    flat = nodes.add("Squeeze", [output, nodes.integers([-1])], "y_scaled_flat")
+    y = _columns(nodes, [unscaled_output(nodes, flat, recursion, "y_flat")], "y")
+    return flat, y, _state_out(nodes, layout, history, longest)
+
+
+def _channels(nodes: Nodes, value: str, names: list[str]) -> list[str]:
+    """The channels of ``(time, batch, n)`` as arrays ``(time, batch)``.
+
+    Arithmetic along a last axis of one, two or three numbers cannot be vectorised: on 20,000 samples of a hundred cars
+    it was measured ten times as slow as without that axis.
+    """
+    parts = nodes.split(value, [f"{name}_column" for name in names])
+    last = nodes.integers([-1])
+    return [nodes.add("Squeeze", [part, last], name) for part, name in zip(parts, names, strict=True)]
+
+
+def _columns(nodes: Nodes, channels: list[str], output: str) -> str:
+    """Arrays ``(time, batch)`` side by side as ``(time, batch, n)``."""
+    last = nodes.integers([-1])
+    if len(channels) == 1:
+        return nodes.add("Unsqueeze", [channels[0], last], output)
+    columns = [nodes.add("Unsqueeze", [channel, last], f"{output}_{i}") for i, channel in enumerate(channels)]
+    return nodes.add("Concat", columns, output, axis=2)
+
+
+def _scaled_inputs(nodes: Nodes, inputs: str, recursion: Recursion) -> str:
+    """Inputs in the model's numbers."""
+    scaling, scaled = recursion.scaling, []
+    channels = _channels(nodes, inputs, [f"u{i}" for i in range(recursion.lags.n_inputs)])
+    for i, (offset, scale) in enumerate(zip(scaling.input_offset, scaling.input_scale, strict=True)):
+        centred = nodes.add("Sub", [channels[i], nodes.numbers(f"input_offset{i}", offset)], f"u{i}_centred")
+        scaled.append(nodes.add("Div", [centred, nodes.numbers(f"input_scale{i}", scale)], f"u{i}_scaled"))
+    return _columns(nodes, scaled, "u_scaled")
+
+
+def _flags(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> None:
+    """The flags of all samples, after the loops."""
+    channels = _channels(nodes, "u", [f"u{i}_seen" for i in range(len(surrogate.inputs))])
+    outside, lost = [], []
+    for i, (port, channel) in enumerate(zip(surrogate.inputs, channels, strict=True)):
+        if port.range is not None:
+            low, high = nodes.numbers(f"declared_low{i}", port.low), nodes.numbers(f"declared_high{i}", port.high)
+            outside.append(nodes.add("Less", [channel, low], f"u{i}_below"))
+            outside.append(nodes.add("Greater", [channel, high], f"u{i}_above"))
+        lost.append(nodes.add("IsNaN", [channel], f"u{i}_lost"))
+    lost += [nodes.add("IsNaN", [output], f"y{k}_lost") for k, output in enumerate(scaled)]
+    causes = {
+        Flag.OUTSIDE_RANGE: outside,
+        Flag.AT_BOUND: held_outputs(nodes, surrogate, scaled),
+        Flag.NOT_A_NUMBER: lost,
+    }
+    bits = []
+    for flag, raised in causes.items():
+        part = nodes.within(f"{str(flag.name).lower()}_")
+        if raised:
+            any_of = raised[0]
+            for i, cause in enumerate(raised[1:]):
+                any_of = part.add("Or", [any_of, cause], f"any{i}")
+            bits.append(part.add("Mul", [part.add("Cast", [any_of], "number", to=INT32), part.whole(int(flag))], "bit"))
+    total = bits[0]
+    for i, bit in enumerate(bits[1:]):
+        total = nodes.add("Add", [total, bit], f"flags_{i}")
+    nodes.add("Unsqueeze", [total, nodes.integers([-1])], "flags")
 
 
 def _input_columns(lags: Lags) -> list[tuple[int, int, int]]:

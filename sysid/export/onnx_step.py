@@ -30,19 +30,21 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         The ``GraphProto``.
     """
     nodes = Nodes(dtype)
-    run_stages(nodes, surrogate, _stage)
-    shapes: list[str] = ["batch"]
-    return nodes.graph("step", *ends(nodes, surrogate, shapes))
+    _flags(nodes, surrogate, run_stages(nodes, surrogate, _stage))
+    return nodes.graph("step", *ends(nodes, surrogate, ["batch"]))
 
 
-def run_stages(nodes: Nodes, surrogate: Surrogate, stage_nodes: Any) -> None:
-    """Lay the stages one behind the other, up to the graph's outputs.
+def run_stages(nodes: Nodes, surrogate: Surrogate, stage_nodes: Any) -> list[str]:
+    """Lay the stages one behind the other, up to the graph's outputs ``y`` and ``state_out``.
 
     Args:
         nodes: The graph.
         surrogate: What to write.
         stage_nodes: Adds one stage, from the names of its inputs and its state to those of its scaled output, its
             output ``y`` and its ``state_out``.
+
+    Returns:
+        The names of the scaled outputs.
     """
     alone = len(surrogate.stages) == 1
     known, outputs, states, scaled = "u", [], [], []
@@ -63,7 +65,7 @@ def run_stages(nodes: Nodes, surrogate: Surrogate, stage_nodes: Any) -> None:
     if not alone:
         nodes.add("Concat", outputs, "y", axis=-1)
         nodes.add("Concat", states, "state_out", axis=1)
-    _flags(nodes, surrogate, scaled)
+    return scaled
 
 
 def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, str, str]:
@@ -123,11 +125,11 @@ def scaled_inputs(nodes: Nodes, inputs: str, recursion: Recursion) -> str:
     return nodes.add("Div", [nodes.add("Sub", [inputs, offset], "u_centred"), scale], "u_scaled")
 
 
-def unscaled_output(nodes: Nodes, output: str, recursion: Recursion) -> str:
-    """The stage's output ``y`` in its unit."""
+def unscaled_output(nodes: Nodes, output: str, recursion: Recursion, name: str = "y") -> str:
+    """The stage's output in its unit."""
     scale = nodes.numbers("output_scale", recursion.scaling.output_scale)
     offset = nodes.numbers("output_offset", recursion.scaling.output_offset)
-    return nodes.add("Add", [nodes.add("Mul", [output, scale], "y_centred"), offset], "y")
+    return nodes.add("Add", [nodes.add("Mul", [output, scale], "y_centred"), offset], name)
 
 
 def clipped(nodes: Nodes, output: str, stage: Stage) -> str:
@@ -139,39 +141,39 @@ def clipped(nodes: Nodes, output: str, stage: Stage) -> str:
 
 
 def _flags(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> None:
-    """The flags of every sample at once, outside of any loop."""
+    """The flags of a sample, with few nodes: in one step a node costs more than its arithmetic."""
     low, high = ([getattr(port, side) for port in surrogate.inputs] for side in ("low", "high"))
     below = nodes.add("Less", ["u", nodes.numbers("declared_low", low)], "u_below")
     above = nodes.add("Greater", ["u", nodes.numbers("declared_high", high)], "u_above")
-    bits = [_any(nodes, nodes.add("Or", [below, above], "u_outside"), Flag.OUTSIDE_RANGE)]
-    both = nodes.add("Concat", ["u", "y"], "u_and_y", axis=-1)
-    bits.append(_any(nodes, nodes.add("IsNaN", [both], "u_and_y_lost"), Flag.NOT_A_NUMBER))
+    known = nodes.add("Concat", ["u", "y"], "u_and_y", axis=-1)
+    raised = {
+        Flag.OUTSIDE_RANGE: [nodes.add("Or", [below, above], "u_outside")],
+        Flag.AT_BOUND: held_outputs(nodes, surrogate, scaled),
+        Flag.NOT_A_NUMBER: [nodes.add("IsNaN", [known], "u_and_y_lost")],
+    }
+    bits = []
+    for flag, causes in raised.items():
+        part = nodes.within(f"{str(flag.name).lower()}_")
+        if causes:
+            whole = causes[0] if len(causes) == 1 else part.add("Concat", causes, "causes", axis=-1)
+            whole = part.add("ReduceMax", [part.add("Cast", [whole], "by_channel", to=INT32)], "any", axes=[-1])
+            bits.append(part.add("Mul", [whole, part.whole(int(flag))], "bit"))
+    last = bits[0]
+    for i, bit in enumerate(bits[1:], start=2):
+        last = nodes.add("Add", [last, bit], "flags" if i == len(bits) else "flags_but_last")
+
+
+def held_outputs(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> list[str]:
+    """Where the output of each bounded stage is at a bound."""
+    held = []
     for k, (stage, output) in enumerate(zip(surrogate.stages, scaled, strict=True)):
         if stage.bounded:
-            low_k, high_k = (
-                nodes.numbers(f"low{k}", stage.recursion.low),
-                nodes.numbers(f"high{k}", stage.recursion.high),
-            )
-            at_low = nodes.add("LessOrEqual", [output, low_k], f"y{k}_at_low")
-            at_high = nodes.add("GreaterOrEqual", [output, high_k], f"y{k}_at_high")
-            held = nodes.add("Or", [at_low, at_high], f"y{k}_held")
-            bits.append(_any(nodes, held, Flag.AT_BOUND, number=k))
-    held_bits = bits[2:]
-    if len(held_bits) > 1:
-        bits = [*bits[:2], nodes.add("Max", held_bits, "any_held")]
-    total = bits[0]
-    for i, bit in enumerate(bits[1:-1]):
-        total = nodes.add("Add", [total, bit], f"flags_{i}")
-    nodes.add("Add", [total, bits[-1]], "flags")
+            part, recursion = nodes.within(f"held{k}_"), stage.recursion
+            low = part.add("LessOrEqual", [output, part.numbers("low", recursion.low)], "at_low")
+            high = part.add("GreaterOrEqual", [output, part.numbers("high", recursion.high)], "at_high")
+            held.append(part.add("Or", [low, high], "at_bound"))
+    return held
 
 
-def _any(nodes: Nodes, raised: str, flag: Flag, number: int = 0) -> str:
-    """The flag's bit where any channel raises it, ``(..., 1)``, as int32."""
-    bit = nodes.within(f"{flag.name.lower()}{number}_" if flag.name else "")
-    whole = bit.add("Cast", [raised], "by_channel", to=_INT32)
-    most = bit.add("ReduceMax", [whole], "any", axes=[-1], keepdims=1)
-    return bit.add("Mul", [most, bit.whole(int(flag))], "bit")
-
-
-_INT32 = 6
+INT32 = 6
 """``TensorProto.INT32``."""

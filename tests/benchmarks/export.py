@@ -1,0 +1,239 @@
+"""Run times and sizes of exported surrogates, beside the model's own compiled free run.
+
+    python -m tests.benchmarks.export
+
+One NARX 4/4/20 with two inputs and random weights whose free run forgets where it started, 20,000 samples; medians.
+C is timed inside a program of its own, everything else from Python with the calls that a user makes.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+
+from sysid.export import EXPORTERS, Surrogate
+from sysid.export.parity import largest_difference, random_cases
+from sysid.models import NARX, Mapping, NARXModel, Scaling, parameter_count
+
+SAMPLES = 20_000
+RANGES = {"STP": (0.0, 90.0), "BP": (0.0, 90.0), "AR": (50.0, 90.0)}
+
+TIMING = """
+#include "NAME.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#define N 20000
+#define RUNS 101
+static NAME_real in[N * PREFIX_N_INPUTS], out[N * PREFIX_N_OUTPUTS];
+static double run[RUNS], single[N];
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
+}
+static int order(const void *a, const void *b) { return *(const double *)a > *(const double *)b ? 1 : -1; }
+int main(int argc, char **argv)
+{
+    NAME_state state;
+    double number, begin, clock_cost = 1e9;
+    int i;
+    FILE *file = fopen(argv[argc - 1], "r");
+    for (i = 0; i < N * PREFIX_N_INPUTS; i++) {
+        if (fscanf(file, "%lf", &number) != 1) return 1;
+        in[i] = (NAME_real)number;
+    }
+    for (i = 0; i < RUNS; i++) {
+        NAME_init(&state, in, 0);
+        begin = now();
+        NAME_run(&state, N, in, out, 0);
+        run[i] = now() - begin;
+    }
+    for (i = 0; i < 1000; i++) {
+        begin = now();
+        number = now() - begin;
+        if (number < clock_cost) clock_cost = number;
+    }
+    NAME_init(&state, in, 0);
+    for (i = 0; i < N; i++) {
+        begin = now();
+        NAME_step(&state, in + i * PREFIX_N_INPUTS, out);
+        single[i] = now() - begin - clock_cost;
+    }
+    qsort(run, RUNS, sizeof *run, order);
+    qsort(single, N, sizeof *single, order);
+    printf("%.0f %.0f %.0f %.0f %.0f\\n", run[RUNS / 2], run[0], single[N / 2], single[N - N / 1000], single[N - 1]);
+    return 0;
+}
+"""
+
+
+def build(mapping: str, structure: NARX, seed: int) -> NARXModel:
+    """A network with random weights, shrunk until its free run forgets where it started."""
+    rng = np.random.default_rng(seed)
+    parsed = Mapping.parse(mapping)
+    n_inputs = len(parsed.inputs)
+    lags = structure.lags(n_inputs)
+    theta = rng.normal(size=parameter_count(lags, structure.neurons, linear=True))
+    theta *= 0.4 / np.sqrt(len(theta))
+    theta[structure.neurons * lags.n_regressors :] *= 2.0
+    return NARXModel(
+        network=structure,
+        theta=theta,
+        scaling=Scaling(
+            input_offset=(45.0,) * n_inputs, input_scale=(45.0,) * n_inputs, output_offset=38.0, output_scale=40.0
+        ),
+        mapping=parsed,
+        sample_time=0.1,
+        input_units=("psi",) * n_inputs,
+        output_unit="psi",
+        rest_output=0.0,
+    )
+
+
+def cascade() -> Surrogate:
+    """The combined brake's wiring with networks as large as published ones, and long spaced lags for the pipe."""
+    powers = [0, 1, 2, 4, 8, 16, 32, 64, 128, 256]
+    return Surrogate.wired(
+        [
+            build("STP -> BP", NARX(input_delays=powers, output_delays=powers[1:], neurons=15), 1),
+            build("BP -> ER", NARX(input_delays=4, output_delays=4, neurons=20), 2),
+            build("BP+ER -> AR", NARX(input_delays=4, output_delays=4, neurons=20), 3),
+            build("BP+AR+ER -> BC", NARX(input_delays=4, output_delays=4, neurons=20), 4),
+        ],
+        RANGES,
+    )
+
+
+def median(call: Callable[[], object], repeats: int = 11) -> float:
+    """Median time of a call in milliseconds, after one to warm up."""
+    call()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        call()
+        times.append(1e3 * (time.perf_counter() - begin))
+    return float(np.median(times))
+
+
+def excitation(surrogate: Surrogate, cars: int) -> np.ndarray:
+    """Inputs ``(SAMPLES, cars, n_inputs)`` within the declared range."""
+    drawn = random_cases(surrogate, sequences=cars, samples=SAMPLES)
+    return np.stack([case.inputs for case in drawn], axis=1)
+
+
+def time_c(surrogate: Surrogate, folder: Path, inputs: np.ndarray, *flags: str) -> list[float]:
+    """Median and least time of a run of 20,000 samples, and median, 99.9 % and greatest of a single step, in ns."""
+    prefix = surrogate.identifier
+    EXPORTERS["c"].write(surrogate, folder)
+    (folder / "timing.c").write_text(TIMING.replace("NAME", prefix).replace("PREFIX", prefix.upper()))
+    np.savetxt(folder / "inputs.txt", inputs)
+    command = ["gcc", "-std=gnu99", *flags, "timing.c", f"{prefix}.c", "-lm", "-o", "timing"]
+    subprocess.run(command, cwd=folder, check=True)
+    done = subprocess.run(["./timing", "inputs.txt"], cwd=folder, check=True, capture_output=True, text=True)
+    return [float(number) for number in done.stdout.split()]
+
+
+def stack_bytes(surrogate: Surrogate, folder: Path, *flags: str) -> int:
+    """Stack of a step: its own frame and the largest beneath it, as the compiler counts them."""
+    prefix = surrogate.identifier
+    command = ["gcc", "-std=c99", "-O2", *flags, "-fno-inline", "-fstack-usage", "-c", f"{prefix}.c"]
+    subprocess.run(command, cwd=folder, check=True)
+    usage = re.findall(r":(\w+)\t(\d+)\t", (folder / f"{prefix}.su").read_text())
+    frames = {name: int(size) for name, size in usage}
+    beneath = max((size for name, size in frames.items() if name.startswith("stage")), default=0)
+    leaf = max((frames.get(name, 0) for name in ("dot", "tanh_near")), default=0)
+    return frames[f"{prefix}_step"] + beneath + leaf
+
+
+def say(*cells: object) -> None:
+    """One row of a table."""
+    sys.stdout.write("| " + " | ".join(str(cell) for cell in cells) + " |\n")
+
+
+def run_times(folder: Path) -> None:
+    """The table of run times."""
+    surrogate = Surrogate.of(build("BP+AR -> BC", NARX(input_delays=4, output_delays=4, neurons=20), 2), RANGES)
+    many = excitation(surrogate, 100)
+    one, rest = many[:, :1], np.stack([surrogate.at_rest(many[0, i]) for i in range(100)])
+    own = median(lambda: surrogate.simulate(one[:, 0]))
+    expected = surrogate.simulate(one[:, 0])
+    say("runner", "20,000 samples [ms]", "one step [us]", "ratio to own free run", "largest difference [psi]")
+    say("---", "---:", "---:", "---:", "---:")
+    say("own compiled free run (numba)", f"{own:.1f}", f"{own / 20:.3f}", "1.0", "0")
+    for label, flags in {
+        "C, double, -O2": ["-O2"],
+        "C, double, -O2, tanh of libm": ["-O2", "-DBP_AR_TO_BC_LIBM_TANH"],
+        "C, double, -O3 -march=native": ["-O3", "-march=native"],
+        "C, float, -O2": ["-O2", "-DBP_AR_TO_BC_FLOAT"],
+    }.items():
+        middle, least, step, late, worst = time_c(surrogate, folder, one[:, 0], *flags)
+        note = f"{label} (least {least / 1e6:.1f} ms; single step {step:.0f} ns, 99.9 % {late:.0f} ns, most {worst:.0f} ns)"
+        say(note, f"{middle / 1e6:.2f}", f"{middle / 1e3 / SAMPLES:.3f}", f"{middle / 1e6 / own:.2f}", "see parity")
+    for name, exporter in EXPORTERS.items():
+        for file in exporter.write(surrogate, folder):
+            runner = exporter.load(file, folder)
+            found = largest_difference(runner(one, rest[:1]).output[:, 0], expected)
+            took = median(lambda runner=runner: runner(one, rest[:1]), repeats=5)
+            label = f"{name}: {file.name} {file.dtype}, one car"
+            say(label, f"{took:.1f}", f"{took / 20:.3f}", f"{took / own:.1f}", f"{found:.1e}")
+            if file.name.startswith("sequence") and file.name.endswith(".onnx"):
+                took = median(lambda runner=runner: runner(many, rest), repeats=3)
+                label = f"{name}: {file.name} {file.dtype}, 100 cars"
+                say(label, f"{took:.0f}", f"{took / 20:.2f}", f"{took / own / 100:.2f} a car", "")
+                pieces = [(first, first + 500) for first in range(0, SAMPLES, 500)]
+                took = median(lambda r=runner, p=pieces: [r(many[a:b], rest) for a, b in p], repeats=3)
+                say(
+                    f"{label}, 500 samples a call",
+                    f"{took:.0f}",
+                    f"{took / 20:.2f}",
+                    f"{took / own / 100:.2f} a car",
+                    "",
+                )
+
+
+def sizes(folder: Path) -> None:
+    """Sizes and stack of a single model and of a whole cascade."""
+    single = Surrogate.of(build("BP+AR -> BC", NARX(input_delays=4, output_delays=4, neurons=20), 2), RANGES)
+    say("surrogate", "file", "bytes", "stack of a step [bytes]: double, float")
+    say("---", "---", "---:", "---:")
+    for label, surrogate in {"NARX 4/4/20": single, "combined cascade, 4 models": cascade()}.items():
+        for name in ("c", "fmi2", "fmi3", "onnx"):
+            for file in EXPORTERS[name].write(surrogate, folder):
+                stack = ""
+                if name == "c" and file.dtype == "float64":
+                    macro = f"-D{surrogate.identifier.upper()}_FLOAT"
+                    stack = f"{stack_bytes(surrogate, folder)}, {stack_bytes(surrogate, folder, macro)}"
+                if file.dtype == "float64":
+                    say(label, file.name, (folder / file.name).stat().st_size, stack)
+    middle, _, _, _, worst = time_c(cascade(), folder, excitation(cascade(), 1)[:, 0], "-O2")
+    say("combined cascade, C -O2", "one step [us]", f"{middle / 1e3 / SAMPLES:.3f}", f"most {worst / 1e3:.1f} us")
+
+
+def main() -> None:
+    """Print every table as Markdown."""
+    say(
+        platform.platform(),
+        f"{os.cpu_count()} cores",
+        f"Python {platform.python_version()}",
+        f"load {os.getloadavg()[0]:.1f}",
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        run_times(Path(folder))
+        sizes(Path(folder))
+
+
+if __name__ == "__main__":
+    main()
