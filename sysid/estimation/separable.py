@@ -25,6 +25,7 @@ from sysid.models.ladder import Domain, rungs, section_orders
 
 RANK_TOLERANCE = 1e-11
 """Singular values of the unit columns below this part of the largest are directions that the data do not show."""
+_NO_EFFECT = 1e-24
 _LARGEST_REFLECTION = 1.0 - 1e-12
 
 Sections = tuple[tuple[NDArray[np.float64], ...], ...]
@@ -196,7 +197,12 @@ class SeparableProvider(AbstractProvider):
         J = self.poles.chain(theta, self.tangents(solution))
         J -= solution.span @ (solution.span.T @ J)
         loss = 0.5 * float(solution.residual @ solution.residual)
-        return Linearisation(loss=loss, gradient=J.T @ solution.residual, gauss_newton=J.T @ J)
+        H = J.T @ J
+        # A pole without effect would leave a zero on the diagonal, which a step is scaled by.
+        diagonal = np.diag(H)
+        floor = max(float(diagonal.max(initial=0.0)), np.finfo(np.float64).tiny) * _NO_EFFECT
+        H[np.diag_indices_from(H)] = np.maximum(diagonal, floor)
+        return Linearisation(loss=loss, gradient=J.T @ solution.residual, gauss_newton=H)
 
     def separated(self, theta: NDArray[np.float64]) -> Separated | None:
         """Solve the linear part.

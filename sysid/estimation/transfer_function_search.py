@@ -47,7 +47,7 @@ class TransferFunctionTraining:
         ConfigError: If a number is negative.
     """
 
-    max_iterations: int = 100
+    max_iterations: int = 200
     short_iterations: int = 12
     scattered_starts: int = 2
     stable: bool = True
