@@ -154,6 +154,17 @@ def export(
     export_command(pipeline, fit=fit, out=out, run_folder=run_folder)
 
 
+@app.command(epilog="Example: sysid promote bp-ar-to-bc")
+def promote(
+    model: Annotated[str, typer.Argument(help="Name of a registered model, or its mapping.")],
+    version: Annotated[str | None, typer.Option(help="The version; the candidate by default.")] = None,
+) -> None:
+    """Make the newest export of a model, or an earlier one, the champion that others load from MLflow."""
+    from sysid.workbench.commands.promote import promote_command
+
+    promote_command(model, version=version)
+
+
 @app.command(epilog="Example: sysid report runs/service-brake")
 def report(
     run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")],

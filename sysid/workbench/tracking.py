@@ -26,6 +26,7 @@ from sysid.atomic import replacing
 from sysid.workbench import tracked
 from sysid.workbench.events import BundleReady, DataLoaded, Event, FitReady, ReportReady, RunStarted
 from sysid.workbench.naming import slug
+from sysid.workbench.registry import register
 
 KEY_TAG = "sysid.key"
 """Tag that holds the digest of everything a fit and its figures depend on."""
@@ -264,7 +265,7 @@ class Tracker:
         self.client.set_tag(run_id, "exported", "yes")
 
     def _log_model(self, run_id: str, file: Path, ready: BundleReady) -> None:
-        """The exported network as a model that MLflow can load and serve."""
+        """The exported network as a model that MLflow can load and serve, and as the newest in the registry."""
         import mlflow
         import onnx
 
@@ -273,7 +274,7 @@ class Tracker:
         mlflow.set_tracking_uri(self.uri)
         try:
             with mlflow.start_run(run_id=run_id):
-                mlflow.onnx.log_model(
+                logged = mlflow.onnx.log_model(
                     network,
                     name=slug(tracked.run_name(ready.of)),
                     signature=_signature(network),
@@ -283,6 +284,14 @@ class Tracker:
                     pip_requirements=["onnx", "onnxruntime", "numpy"],
                     save_as_external_data=False,
                 )
+            register(
+                self.client,
+                str(ready.of.fit.model.mapping),
+                source=logged.model_uri,
+                run_id=run_id,
+                model_id=logged.model_id,
+                fit=ready.of.config.name,
+            )
         finally:
             mlflow.set_tracking_uri(before)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 
 from sysid.reporting.results import Results
-from sysid.workbench import tracked, tracking
+from sysid.workbench import registry, tracked, tracking
+from sysid.workbench.cli import run_cli
 from sysid.workbench.config import read_pipeline
 from sysid.workbench.pipeline import run_pipeline
 from sysid.workbench.tracking import KEY_TAG, Tracker, latest_experiment, store_uri
@@ -207,3 +209,57 @@ def test_a_store_whose_making_was_stopped_is_made_again(
 
 def test_names_that_a_store_refuses_are_changed() -> None:
     assert tracked.key("VAL 1 (µ=0.3)/a") == "VAL 1 ___0.3__a"
+
+
+def load_onnx(workspace: Path, uri: str):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # MLflow's own deprecations
+        import mlflow
+
+        mlflow.set_tracking_uri(store_uri(workspace))
+        return mlflow.onnx.load_model(uri)
+
+
+def test_the_exported_model_is_the_newest_version_and_the_candidate(tracked_once) -> None:
+    workspace, client, results = tracked_once
+    model = client.get_registered_model("inlet-valve-to-outlet")
+    assert set(model.aliases) == {"candidate"}
+    version = client.get_model_version(model.name, str(model.aliases["candidate"]))
+    assert version.run_id == runs_of(client)[results.best.name].info.run_id
+    assert version.tags["fit"] == results.best.name
+    graph = load_onnx(workspace, "models:/inlet-valve-to-outlet@candidate").graph
+    assert [value.name for value in graph.output] == ["y", "state_out", "flags"]
+
+
+def test_a_promoted_model_is_loaded_as_the_champion(tracked_once, capsys: pytest.CaptureFixture[str]) -> None:
+    workspace, client, results = tracked_once
+    name = "inlet-valve-to-outlet"
+    (first,) = client.search_model_versions(f"name = '{name}'")
+    second = registry.register(
+        client,
+        "inlet+valve -> outlet",
+        source=first.source,
+        run_id=first.run_id,
+        model_id=getattr(first, "model_id", None),
+        fit="again",
+    )
+    assert str(client.get_registered_model(name).aliases["candidate"]) == second
+    assert run_cli(["promote", "inlet+valve -> outlet", "--version", first.version]) == 0
+    assert f"version {first.version} ({results.best.name}) is the champion." in capsys.readouterr().out
+    assert run_cli(["promote", name]) == 0
+    assert f"version {second} (again) is the champion, in place of version {first.version}" in capsys.readouterr().out
+    assert str(client.get_model_version_by_alias(name, "champion").version) == second
+    assert load_onnx(workspace, f"models:/{name}@champion").graph.node
+
+
+@pytest.mark.parametrize(
+    ("words", "match"),
+    [
+        (["outlet"], r"(?s)no such model in the registry.*one of inlet-valve-to-outlet.*got:\s+outlet"),
+        (["inlet-valve-to-outlet", "--version", "99"], r"(?s)has no such version.*one of 1.*got:\s+99"),
+    ],
+    ids=["unknown model", "unknown version"],
+)
+def test_what_cannot_be_promoted_is_refused(tracked_once, capsys: pytest.CaptureFixture[str], words, match) -> None:
+    assert run_cli(["promote", *words]) == 2
+    assert re.search(match, capsys.readouterr().err)

@@ -1,0 +1,26 @@
+"""``sysid promote``: the candidate, or another version, becomes the champion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sysid.workbench.commands.run import console
+from sysid.workbench.registry import promote
+from sysid.workbench.tracking import connect, store_uri
+
+
+def promote_command(name: str, *, version: str | None) -> None:
+    """Promote a version and say how to load it.
+
+    Args:
+        name: Name of the registered model, or its mapping.
+        version: The version; the candidate by default.
+
+    Raises:
+        ConfigError: If there is no such model or version.
+    """
+    done = promote(connect(store_uri(Path.cwd())), name, version)
+    target = console()
+    before = "" if done.before in {None, done.version} else f", in place of version {done.before}"
+    target.print(f"{done.name}: version {done.version} ({done.fit}) is the champion{before}.", soft_wrap=True)
+    target.print(f'Load it with mlflow.onnx.load_model("{done.uri}").', soft_wrap=True)
