@@ -4,8 +4,9 @@
 
 The folder holds ``cascaded_tanks/dataBenchmark.csv`` (4TU 10.4121/12960104) and ``silverbox/SNLS80mV.csv``
 (nonlinearbenchmark.org); neither is part of this project. Orders are chosen on estimation data alone. Published:
-Champneys et al., "Baseline results for selected nonlinear system identification benchmarks", arXiv 2405.10779: for each figure
-the better of its linear rows (ARX, linear state space), with 5 initial samples on the tanks and 50 on the Silverbox.
+Champneys et al., "Baseline results for selected nonlinear system identification benchmarks", arXiv 2405.10779: for
+each figure the better of its linear rows (ARX, linear state space), with 5 initial samples on the tanks and 50 on the
+Silverbox.
 """
 
 from __future__ import annotations
