@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.machine import BrakedTrain, Probe
+from sysid.airbrake.variant import PHYSICAL, Variant
 from sysid.errors import ConfigError
 from sysid.models import AbstractModel, Recursion
 from sysid.rail import kernel_bank
 from sysid.rail.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
-from sysid.units import PSI_IN_PA
+from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
 
 COMMAND, TAIL_VENT, SPEED, CYLINDER = "STP", "TV", "V", "BC"
 """Channels that the train provides (psi gauge, m2, m/s), and the one that it wants (psi gauge)."""
@@ -176,17 +178,85 @@ class SurrogateBrake(AbstractBrake):
             )
         samples, cars = len(command), self.consist.pairs
         given = {COMMAND: command, TAIL_VENT: tail_vent, SPEED: speed}
-        signals = {
+        signals: dict[str, NDArray[np.float64]] = {
             name: np.broadcast_to(
                 np.broadcast_to(np.asarray(value, dtype=np.float64), (samples,))[:, None], (samples, cars)
             )
             for name, value in given.items()
         }
-        for bank in self._banks:
-            inputs = np.stack([signals[name] for name in bank.mapping.inputs], axis=-1)
-            signals[bank.mapping.output] = bank.advance(inputs)
-        cylinders = np.zeros((samples, self.vehicles))
-        braked = self._columns >= 0
-        # A model may swing a little below the atmosphere, a cylinder cannot.
-        cylinders[:, braked] = np.maximum(signals[CYLINDER], 0.0)[:, self._columns[braked]] * PSI_IN_PA
-        return BrakeOutput(cylinders=cylinders)
+        return BrakeOutput(cylinders=_cylinders(self._banks, signals, self._columns))
+
+
+def _cylinders(
+    banks: Sequence[ModelBank], signals: dict[str, NDArray[np.float64]], columns: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Run a chain over its signals; pressures of the cylinders in Pa gauge, one column per vehicle."""
+    for bank in banks:
+        inputs = np.stack([signals[name] for name in bank.mapping.inputs], axis=-1)
+        signals[bank.mapping.output] = bank.advance(inputs)
+    last = signals[CYLINDER]
+    cylinders = np.zeros((len(last), len(columns)))
+    # A model may swing a little below the atmosphere, a cylinder cannot.
+    cylinders[:, columns >= 0] = np.maximum(last, 0.0)[:, columns[columns >= 0]] * PSI_IN_PA
+    return cylinders
+
+
+VALVE_CHANNELS = {"BP": "pipe", "AR": "auxiliary", "ER": "emergency"}
+"""Channels that the reference pipe gives at every valve, in psi gauge."""
+
+
+class ValveSurrogateBrake(AbstractBrake):
+    """Surrogate valves on the reference pipe: each car's own pressures go into a model that gives its cylinder.
+
+    The way is one: the reservoirs are the reference's, emptied by its cylinders. So the error of the valve model is
+    seen alone, at every car.
+
+    Args:
+        stage: From ``BP``, ``AR`` and ``ER``, or some of them, to ``BC``; one model for all cars or one per car.
+        consist: The train.
+        variant: The reading of the reference.
+        time_step: Of the reference in s.
+
+    Raises:
+        ConfigError: If the stage takes or gives another channel.
+    """
+
+    def __init__(self, *, stage: Stage, consist: Consist, variant: Variant = PHYSICAL, time_step: float = 1e-3) -> None:
+        model = stage.models[0]
+        if not set(model.mapping.inputs) <= set(VALVE_CHANNELS) or model.mapping.output != CYLINDER:
+            raise ConfigError(
+                "not a model of a valve",
+                where=str(model.mapping),
+                expected=f"inputs among {', '.join(VALVE_CHANNELS)} and the output {CYLINDER}",
+                got=str(model.mapping),
+            )
+        rest = [consist.running_pressure] * len(model.mapping.inputs)
+        self._bank = ModelBank(stage=stage, cars=consist.pairs, rest_inputs=rest)
+        self.sample_time, self.vehicles, self.consist = model.sample_time, consist.vehicles, consist
+        nodes = [
+            Probe(quantity=VALVE_CHANNELS[name], node=node)
+            for name in model.mapping.inputs
+            for node in consist.valve_nodes
+        ]
+        ends = [Probe(quantity="pipe", node=node) for node in (1, 2, consist.vehicles)]
+        self._train = BrakedTrain(
+            consist=consist,
+            variant=variant,
+            probes=(*nodes, *ends),
+            time_step=time_step,
+            sample_time=model.sample_time,
+        )
+        self._columns = valve_of_vehicle(consist)
+
+    def advance(self, command: NDArray[np.float64], *, speed: Signal = 1.0, tail_vent: Signal = 0.0) -> BrakeOutput:
+        """Advance; see :meth:`AbstractBrake.advance`."""
+        pressures = self._train.advance(command, speed=speed, tail_vent=tail_vent) - STANDARD_ATMOSPHERE_PA
+        pairs, names = self.consist.pairs, self._bank.mapping.inputs
+        signals = {name: pressures[:, k * pairs : (k + 1) * pairs] / PSI_IN_PA for k, name in enumerate(names)}
+        equalising, head, tail = pressures[:, len(names) * pairs :].T
+        return BrakeOutput(
+            cylinders=_cylinders([self._bank], signals, self._columns),
+            equalising=equalising,
+            head_pipe=head,
+            tail_pipe=tail,
+        )
