@@ -147,11 +147,12 @@ def export(
     fit: Annotated[str, typer.Option(help="Name of the fit.")],
     out: Annotated[Path | None, typer.Option(help="Folder of the bundle; in the run folder by default.")] = None,
     run_folder: Annotated[Path | None, typer.Option(help="The run folder; runs/<pipeline> by default.")] = None,
+    pack: Annotated[bool, typer.Option("--zip", help="Pack the bundle into one file beside it.")] = False,
 ) -> None:
     """Export a fit of a finished run as files that run elsewhere, each checked against its model."""
     from sysid.workbench.commands.export import export_command
 
-    export_command(pipeline, fit=fit, out=out, run_folder=run_folder)
+    export_command(pipeline, fit=fit, out=out, run_folder=run_folder, pack=pack)
 
 
 @app.command(epilog="Example: sysid promote bp-ar-to-bc")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.errors import ConfigError
+from sysid.export.bundle import zip_bundle
 from sysid.workbench import steps
 from sysid.workbench.commands.run import console
 from sysid.workbench.config import ExportConfig, FitConfig, Pipeline, find_pipeline, read_pipeline
@@ -12,7 +13,7 @@ from sysid.workbench.record import read_fit, read_scores
 from sysid.workbench.store import RunFolder
 
 
-def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Path | None) -> None:
+def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Path | None, pack: bool) -> None:
     """Export a fit that is stored.
 
     Args:
@@ -20,6 +21,7 @@ def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Pat
         fit: Name of the fit.
         out: Folder of the bundle.
         run_folder: The run folder.
+        pack: Whether to write the bundle as one zip too.
 
     Raises:
         ConfigError: If there is no such fit, or it has not been run as the pipeline now stands.
@@ -49,6 +51,8 @@ def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Pat
     for entry in bundle.files:
         target.print(f"{entry.name}: at most {entry.largest_difference:.1e} from the model")
     target.print(f"Bundle: {folder}", soft_wrap=True)
+    if pack:
+        target.print(f"Packed: {zip_bundle(folder)}", soft_wrap=True)
 
 
 def _check_stored(store: RunFolder, pipeline: Pipeline, chosen: FitConfig, data: steps.Data) -> None:
