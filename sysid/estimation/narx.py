@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import starts
 from sysid.estimation.arx import first_output
 from sysid.estimation.basis import RebasedProvider, RegressorBasis
@@ -17,7 +18,7 @@ from sysid.estimation.provider import Experiment, RecursionProvider, experiments
 from sysid.estimation.regression import lagged
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.training import FitProgress, Training
-from sysid.models import NARX, Mapping, NARXModel, Scaling, Start
+from sysid.models import NARX, History, Mapping, NARXModel, Scaling, Start
 from sysid.traces import Trace
 
 
@@ -59,6 +60,7 @@ def fit_narx(
     training, start = training or Training(), start or Start()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = experiments_of(traces, mapping, start, rest)
+    experiments = (*experiments, *_offset(experiments, mapping, training))
     template = _template(traces[0], mapping, network, experiments, rest)
     layout = Layout(lags=network.lags(len(mapping.inputs)), neurons=network.neurons, linear=network.feedthrough)
     to_plain = _basis(training, template, experiments, layout).to_plain(layout)
@@ -78,6 +80,20 @@ def fit_narx(
     chosen = min(candidates, key=lambda candidate: starts.rank(candidate, training.choose_by))
     status = _status(chosen, candidates, interrupted=race.stop.is_set())
     return _result(chosen, candidates, training, status, time.perf_counter() - began)
+
+
+def _offset(experiments: Sequence[Experiment], mapping: Mapping, training: Training) -> list[Experiment]:
+    """The experiments once more with each offset of their inputs."""
+    copies = []
+    for offset in training.offsets:
+        strangers = sorted(set(offset) - set(mapping.inputs))
+        if strangers:
+            raise ChannelError(strangers, mapping.inputs, where="offsets")
+        by = np.array([float(offset.get(name, 0.0)) for name in mapping.inputs])
+        for e in experiments:
+            history = History(inputs=e.history.inputs + by, output=e.history.output)
+            copies.append(replace(e, inputs=e.inputs + by, history=history))
+    return copies
 
 
 def _template(

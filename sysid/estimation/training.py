@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sysid.errors import ConfigError
@@ -21,10 +22,15 @@ class Training:
         patience: Iterations over which improvement is judged.
         starts: Random starts; they are raced, and half of them dropped at each of four looks.
         seed: Seed of the first start; the others count up from it.
-        choose_by: What chooses in the end: ``selection`` (least error on traces that are used for nothing else) or ``evidence``.
+        choose_by: What chooses in the end: ``selection`` (least error on traces that are used for nothing else) or
+            ``evidence``.
         workers: Starts that run at the same time.
         basis: ``levels and rates`` trains on each channel's newest sample and its rates of change, ``plain`` on the
             lagged samples as they are. The finished model is over lagged samples either way.
+        offsets: Constant offsets, by input channel and in its unit, with each of which the estimation traces are used
+            once more. A record says little about what its absolute levels do and what their changes do when the two
+            always go together; copies that differ in level alone tell the network which to follow, and how far a
+            sensor may be off.
     """
 
     loop: Loop = Loop.CLOSED
@@ -37,9 +43,11 @@ class Training:
     choose_by: str = "selection"
     workers: int = 2
     basis: str = "levels and rates"
+    offsets: tuple[Mapping[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loop", Loop(self.loop))
+        object.__setattr__(self, "offsets", tuple(dict(offset) for offset in self.offsets))
         for name, choices in {"choose_by": ("selection", "evidence"), "basis": ("levels and rates", "plain")}.items():
             if getattr(self, name) not in choices:
                 raise ConfigError(

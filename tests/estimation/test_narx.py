@@ -6,7 +6,7 @@ import threading
 import numpy as np
 import pytest
 
-from sysid.errors import ConfigError
+from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import Loop, Status, Training, fit_narx
 from sysid.models import NARX, Mapping
 from sysid.traces import Channel, Trace
@@ -113,6 +113,21 @@ def test_masked_samples_do_not_train():
     fit = fit_narx([dirty], TANK, SMALL, Training(max_iterations=60))
     counted = (fit.model.simulate(dirty.columns(["pump"])) - clean["level"])[usable]
     assert np.mean(counted**2) < 1e-2 * np.var(clean["level"])
+
+
+def test_offsets_are_copies_of_the_record_that_differ_in_level_alone():
+    shifted = tank(1)
+    values = shifted.values.copy()
+    values[:, 0] += 0.3
+    copy = Trace(name="copy", sample_time=0.5, channels=shifted.channels, values=values)
+    by_hand = fit_narx([tank(1), copy], TANK, SMALL, Training(max_iterations=15))
+    by_option = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=15, offsets=[{"pump": 0.3}]))
+    np.testing.assert_array_equal(by_option.model.theta, by_hand.model.theta)
+
+
+def test_an_offset_of_what_is_no_input_is_refused():
+    with pytest.raises(ChannelError, match="did you mean pump"):
+        fit_narx([tank(1)], TANK, SMALL, Training(offsets=[{"pumb": 0.3}]))
 
 
 def test_an_interruption_keeps_the_best_model_so_far():
