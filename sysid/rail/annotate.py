@@ -306,3 +306,19 @@ def weights_by_state(annotation: Annotation, weights: dict[State, float]) -> NDA
     """
     table = np.array([weights.get(state, 1.0) for state in State])
     return table[annotation.states]
+
+
+def annotator(trace: Trace) -> Trace:
+    """The trace with its states: what ``sysid ingest --annotate`` asks of a field of application.
+
+    Args:
+        trace: With the channel ``BP`` and, for laps to be found at once, ``STP``.
+
+    Returns:
+        The trace with the channel ``STATE``.
+
+    Raises:
+        ChannelError: If there is no ``BP``.
+    """
+    handle = "STP" if "STP" in trace.channel_names else None
+    return annotated(trace, annotate(trace, handle=handle))

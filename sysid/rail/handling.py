@@ -8,7 +8,8 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.rail.constants import GRAVITY, KMH
-from sysid.rail.terrain import Feature, Severity, Shape, effective_grade, quasi_static_forces
+from sysid.rail.features import Feature, Severity
+from sysid.rail.terrain import Shape, effective_grade, quasi_static_forces
 from sysid.rail.track import TrackProfile
 from sysid.rail.train import Train
 

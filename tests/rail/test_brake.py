@@ -12,7 +12,9 @@ from sysid.airbrake.simulate import simulate
 from sysid.errors import ConfigError
 from sysid.models import ARX, NARX, AbstractModel, ARXModel, History, Mapping, NARXModel, Scaling, parameter_count
 from sysid.rail.brake import AbstractBrake, RecordedBrake, ReferenceBrake, valve_of_vehicle
-from sysid.rail.surrogate import ModelBank, Stage, SurrogateBrake
+from sysid.rail.brake_computer import Order
+from sysid.rail.surrogate import ModelBank, Stage, SurrogateBrake, ValveSurrogateBrake
+from sysid.rail.tail_unit import TwoEndedBrake
 from sysid.units import PSI_IN_PA
 
 TRAIN = Consist(pairs=3)
@@ -66,6 +68,7 @@ BRAKES = {
         pressures=np.linspace(0.0, 4e5, 200)[:, None] * (np.arange(7) > 0), sample_time=0.1
     ),
     "surrogate": lambda: SurrogateBrake(stages=[pipe_models(), cylinder_models()], consist=TRAIN),
+    "valves": lambda: ValveSurrogateBrake(stage=Stage(models=(network(2, "BP+AR"),)), consist=TRAIN),
     "network": lambda: SurrogateBrake(stages=[pipe_models(), Stage(models=(network(1),))], consist=TRAIN),
 }
 
@@ -152,6 +155,28 @@ def test_a_chain_is_its_models_one_after_the_other() -> None:
             pipe[:, None], History.at_rest(inputs=[90.0], output=0.0)
         )
         np.testing.assert_allclose(output[:, 1 + 2 * car], np.maximum(cylinder, 0.0) * PSI_IN_PA, atol=1e-6)
+
+
+def test_surrogate_valves_are_their_model_on_the_reference_s_pressures() -> None:
+    command = Command.from_rows([[0, 90], [2, 70], [20, 70]])
+    model = network(3, "BP+AR")
+    output = ValveSurrogateBrake(stage=Stage(models=(model,)), consist=TRAIN).advance(command.sampled(sample_time=0.1))
+    probes = tuple(Probe(quantity=quantity, node=5) for quantity in ("pipe", "auxiliary"))
+    inputs = (simulate(command, consist=TRAIN, probes=probes).pressures - 101_325.0) / PSI_IN_PA
+    alone = model.simulate(inputs, History.at_rest(inputs=[90.0, 90.0], output=0.0))
+    np.testing.assert_allclose(output.cylinders[:, 3], np.maximum(alone, 0.0) * PSI_IN_PA, rtol=1e-9, atol=1e-3)
+
+
+def test_surrogate_valves_are_braked_from_both_ends_too() -> None:
+    brake = TwoEndedBrake(ValveSurrogateBrake(stage=Stage(models=(network(2, "BP+AR"),)), consist=TRAIN))
+    brake.advance(np.repeat([90.0, 0.0], [5, 40]))
+    assert brake.log[0][0].order is Order.EMERGENCY
+
+
+@pytest.mark.parametrize("mapping", ["STP", "BP+AR+PS"])
+def test_a_model_that_is_none_of_a_valve_is_refused(mapping: str) -> None:
+    with pytest.raises(ConfigError, match="model of a valve"):
+        ValveSurrogateBrake(stage=Stage(models=(network(1, mapping),)), consist=TRAIN)
 
 
 def test_a_surrogate_that_knows_no_open_tail_says_so() -> None:

@@ -14,6 +14,7 @@ from sysid.rail.annotate import (
     agreement,
     annotate,
     annotated,
+    annotator,
     equalising_from_handle,
     events_of_handle,
     figures_by_state,
@@ -232,5 +233,6 @@ def test_states_weigh_and_sort_errors(combined: dict[str, Trace]) -> None:
     assert by_state[State.RELEASE].mse == 0.0
     with_states = annotated(trace, annotation)
     np.testing.assert_array_equal(with_states[STATE_CHANNEL], annotation.states)
+    np.testing.assert_array_equal(annotator(trace).values, with_states.values)
     with pytest.raises(ConfigError, match="another trace"):
         annotated(combined["VAL04"], annotation)

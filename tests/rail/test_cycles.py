@@ -17,7 +17,7 @@ SEEDS = (1, 2)
 
 @pytest.fixture(scope="module", params=SEEDS)
 def cycle(request: pytest.FixtureRequest) -> Run:
-    return drive_cycle(heavy_haul(pairs=20), Consist(pairs=20), seed=request.param, duration=900.0)
+    return drive_cycle(heavy_haul(pairs=20), Consist(pairs=20), seed=request.param, duration=600.0)
 
 
 def test_the_speed_is_held(cycle: Run) -> None:
@@ -79,5 +79,5 @@ def test_the_data_set_holds_such_a_cycle() -> None:
     """The first command vector in the data set is the one that the driver makes today."""
     traces = load_dataset("abdx-drive-cycles")
     assert {traces.roles[name] for name in traces.names} == {Role.ESTIMATION, Role.SELECTION}
-    run = drive_cycle(heavy_haul(pairs=50), Consist(pairs=50), seed=1, duration=900.0)
-    np.testing.assert_array_equal(traces["CYC01"]["STP"], run.handle)
+    run = drive_cycle(heavy_haul(pairs=50), Consist(pairs=50), seed=1, duration=250.0)
+    np.testing.assert_array_equal(traces["CYC01"]["STP"][:2500], run.handle)

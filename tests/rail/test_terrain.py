@@ -5,6 +5,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.rail import terrain
+from sysid.rail.features import Severity, StartRule, Thresholds, crest_starts, features
 from sysid.rail.handling import crest_handling, peak_force, sag_acceleration, sub_trains
 from sysid.rail.motion import MovingTrain
 from sysid.rail.terrain import (
@@ -12,15 +13,10 @@ from sysid.rail.terrain import (
     PATTERNS,
     SAG,
     Pattern,
-    Severity,
     Shape,
-    StartRule,
-    Thresholds,
     correlation,
-    crest_starts,
     effective_grade,
     equivalent_grade_change,
-    features,
     quasi_static_forces,
     stringlining_risk,
     uniform,
