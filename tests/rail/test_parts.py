@@ -8,8 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+import sysid
+from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
 from sysid.rail.coupler import Coupler
+from sysid.rail.scenarios import standard_scenarios
 from sysid.rail.track import TrackProfile, read_track
 from sysid.rail.train import Train, heavy_haul, read_train
 from sysid.rail.vehicle import Davis, NotchCurves, Rigging, Shoe, Vehicle, diesel_electric, modified_davis
@@ -198,3 +201,28 @@ def test_impossible_trains_are_refused(tmp_path: Path, old: str, new: str) -> No
     file.write_text(TRAIN.replace(old, new))
     with pytest.raises(ConfigError):
         read_train(file)
+
+
+EXAMPLE = Path(sysid.__file__).parent.parent / "datasets" / "rail-example"
+
+
+@pytest.mark.parametrize(("file", "pairs"), [("heavy-haul-101.yaml", 50), ("heavy-haul-151.yaml", 75)])
+def test_the_example_trains_are_the_mechanical_side_of_the_air_brake_s(file: str, pairs: int) -> None:
+    train, made = read_train(EXAMPLE / file), heavy_haul(pairs=pairs)
+    assert len(train.vehicles) == Consist(pairs=pairs).vehicles
+    np.testing.assert_array_equal(train.masses, made.masses)
+    np.testing.assert_array_equal(train.lengths, made.lengths)
+    assert train.powered == made.powered == (0,)
+    assert train.vehicles[-1].rigging == made.vehicles[-1].rigging
+    assert train.lengths[1] == Consist(pairs=pairs).pipe.vehicle_length
+
+
+@pytest.mark.parametrize("name", ["crest", "sag", "curve"])
+def test_the_example_lines_are_those_of_the_scenarios(name: str) -> None:
+    track, scenario = (
+        read_track(EXAMPLE / f"{name}.yaml"),
+        standard_scenarios(heavy_haul(pairs=1))[f"{name}, full service"],
+    )
+    x = np.linspace(-3000.0, 600.0, 500)
+    np.testing.assert_allclose(track.grade(x), scenario.track.grade(x))
+    np.testing.assert_allclose(track.curvature(x), scenario.track.curvature(x))
