@@ -19,7 +19,6 @@ from sysid.estimation.result import FitResult
 from sysid.export.archive import write_archive
 from sysid.export.card import model_card
 from sysid.export.exporters import exporter
-from sysid.export.layout import recursion_of
 from sysid.export.manifest import (
     CARD,
     MANIFEST,
@@ -192,14 +191,14 @@ def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
 
 
 def _check_finite(model: AbstractModel) -> None:
-    theta = recursion_of(model).theta
-    lost = int(np.sum(~np.isfinite(theta)))
+    numbers = model.recursion.numbers
+    lost = int(np.sum(~np.isfinite(numbers)))
     if lost:  # such a file would reproduce its model: both compute nothing but NaN
         raise ConfigError(
             "the model has parameters that are not finite",
             where=model.structure.label,
             expected="finite numbers",
-            got=f"{lost} of {len(theta)} are not",
+            got=f"{lost} of {len(numbers)} are not",
             remedy="export a fit whose status is usable",
         )
 

@@ -51,8 +51,8 @@ def expected_flags(
     lost = np.isnan(inputs).any(axis=1) | np.isnan(outputs).any(axis=1)
     held = np.zeros(len(inputs), dtype=bool)
     for stage, output in zip(surrogate.stages, outputs.T, strict=True):
-        scaling = stage.recursion.scaling
-        for bound in (stage.recursion.low, stage.recursion.high):
+        scaling = stage.form.scaling
+        for bound in (stage.form.low, stage.form.high):
             if np.isfinite(bound):
                 held |= output == bound * scaling.output_scale + scaling.output_offset
     flags = outside * int(Flag.OUTSIDE_RANGE) + held * int(Flag.AT_BOUND) + lost * int(Flag.NOT_A_NUMBER)

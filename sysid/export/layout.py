@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.models import AbstractModel, History, Lags, Recursion
+from sysid.models import AbstractModel, History, Lags, Recursion, StateSpace
 
 
 def recursion_of(model: AbstractModel) -> Recursion:
@@ -27,17 +27,71 @@ def recursion_of(model: AbstractModel) -> Recursion:
         The recursion.
 
     Raises:
-        ConfigError: If it lowers to something else.
+        ConfigError: If it lowers to a state space, which formats with delay lines cannot hold.
     """
     form = model.recursion
     if isinstance(form, Recursion):
         return form
     raise ConfigError(
-        "no format can be written for this kind of model",
+        "this format cannot be written for this kind of model",
         expected="a model over lagged inputs and outputs (ARX, NARX)",
         got=model.structure.label,
-        remedy="export an ARX or NARX fit",
+        remedy="export a transfer function as onnx, torchscript or torch-export",
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearState:
+    """The state of a linear state space: numbers without a channel of their own.
+
+    Args:
+        form: The state space.
+    """
+
+    form: StateSpace
+
+    @property
+    def size(self) -> int:
+        """Length of the state."""
+        return self.form.n_state
+
+    @property
+    def lines(self) -> tuple[DelayLine, ...]:
+        """None: no number of the state is a past sample."""
+        return ()
+
+    def from_history(self, history: History) -> NDArray[np.float64]:
+        """The state after some samples.
+
+        Args:
+            history: The samples, oldest first, in units; a single one is a system at rest.
+
+        Returns:
+            Shape ``(size,)``.
+        """
+        return self.form.state(history)
+
+    def to_dict(self) -> dict[str, Any]:
+        """How to begin at rest, as JSON values."""
+        columns = [self.form.equilibrium(unit) for unit in np.eye(self.form.n_inputs)]
+        return {
+            "size": self.size,
+            "rule": "at rest: at_rest times the scaled inputs, (value - offset) / scale, one column per input",
+            "at_rest": np.column_stack(columns).tolist(),
+        }
+
+
+def layout_of(model: AbstractModel) -> StateLayout | LinearState:
+    """The layout of a model's state, whatever form it lowers to.
+
+    Args:
+        model: The model.
+
+    Returns:
+        Delay lines, or the state of a state space.
+    """
+    form = model.recursion
+    return LinearState(form=form) if isinstance(form, StateSpace) else StateLayout.of(model)
 
 
 @dataclass(frozen=True, kw_only=True)

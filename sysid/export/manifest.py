@@ -15,9 +15,9 @@ from typing import Any, Protocol
 import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
-from sysid.export.layout import StateLayout
+from sysid.export.layout import LinearState, layout_of
 from sysid.export.parity import Parity, ParityCase
-from sysid.export.surrogate import Range
+from sysid.export.surrogate import Range, Surrogate
 from sysid.models import AbstractModel, History, Start
 from sysid.traces import Role, Trace, TraceSet
 
@@ -88,7 +88,7 @@ def describe(
         ],
         "model": stored,
         "n_parameters": model.n_parameters,
-        "state": StateLayout.of(model).to_dict(),
+        "state": Surrogate.of(model).state_text(),
         "initialisation": _initialisation(fit, _example(traces)),
         "fit": {
             "status": fit.status.name,
@@ -261,9 +261,11 @@ def _channel(name: str, unit: str, traces: TraceSet, estimation: tuple[Trace, ..
 def _initialisation(fit: FitResult, example: Trace) -> dict[str, Any]:
     model = fit.model
     inputs = example.columns(model.mapping.inputs)[0]
-    state = StateLayout.of(model).from_history(History.at_rest(inputs=inputs, output=model.rest_output))
+    layout = layout_of(model)
+    state = layout.from_history(History.at_rest(inputs=inputs, output=model.rest_output))
+    lines = "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale"
     return {
-        "rule": "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale",
+        "rule": "a system at rest: the equilibrium at its inputs" if isinstance(layout, LinearState) else lines,
         "values": {
             **dict(zip(model.mapping.inputs, inputs.tolist(), strict=True)),
             model.mapping.output: model.rest_output,

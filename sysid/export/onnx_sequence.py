@@ -18,9 +18,9 @@ from onnx import numpy_helper
 from sysid.export.flags import Flag
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import TO_END, Nodes
-from sysid.export.onnx_step import INT32, clipped, ends, held_outputs, run_stages, unscaled_output
+from sysid.export.onnx_step import INT32, clipped, ends, held_outputs, linear_step, run_stages, unscaled_output
 from sysid.export.surrogate import Stage, Surrogate
-from sysid.models import Lags, Recursion
+from sysid.models import AbstractForm, Lags, StateSpace
 
 
 def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
@@ -43,9 +43,11 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
 
 
 def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, str, str]:
+    if isinstance(stage.form, StateSpace):
+        return _linear_stage(nodes, stage, stage.form, inputs, state)
     layout, recursion = stage.layout, stage.recursion
     n_inputs, longest = recursion.lags.n_inputs, max(line.length for line in layout.inputs)
-    scaled = _scaled_inputs(nodes, inputs, recursion)
+    scaled = _scaled_inputs(nodes, inputs, recursion, n_inputs)
     history = _with_past(nodes, layout, scaled, state, longest)
     columns = _input_columns(recursion.lags)
     regressors = _input_regressors(nodes, columns, history, n_inputs, longest)
@@ -57,6 +59,27 @@ def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, st
     flat = nodes.add("Squeeze", [output, nodes.integers([-1])], "y_scaled_flat")
     y = _columns(nodes, [unscaled_output(nodes, flat, recursion, "y_flat")], "y")
     return flat, y, _state_out(nodes, layout, history, longest)
+
+
+def _linear_stage(nodes: Nodes, stage: Stage, form: StateSpace, inputs: str, state: str) -> tuple[str, str, str]:
+    """A state space: the loop carries its state, and each step is two products."""
+    scaled = _scaled_inputs(nodes, inputs, form, form.n_inputs)
+    body = Nodes(nodes.dtype, prefix=f"{nodes.prefix}body_")
+    x, u = f"{body.prefix}x", f"{body.prefix}u"
+    output, state_out = linear_step(body, form, body.add("Concat", [x, u], "state_and_inputs", axis=1))
+    output = clipped(body, output, stage)
+    graph = body.graph(
+        "one_step",
+        [body.value("x", ["batch", form.n_state]), body.value("u", ["batch", form.n_inputs])],
+        [
+            body.value(state_out.removeprefix(body.prefix), ["batch", form.n_state]),
+            body.value(output.removeprefix(body.prefix), ["batch", 1]),
+        ],
+    )
+    result = nodes.add_scan([state], [scaled], ["state_out"], "y_scaled", graph)
+    flat = nodes.add("Squeeze", [result, nodes.integers([-1])], "y_scaled_flat")
+    y = _columns(nodes, [unscaled_output(nodes, flat, form, "y_flat")], "y")
+    return flat, y, f"{nodes.prefix}state_out"
 
 
 def _channels(nodes: Nodes, value: str, names: list[str]) -> list[str]:
@@ -79,10 +102,10 @@ def _columns(nodes: Nodes, channels: list[str], output: str) -> str:
     return nodes.add("Concat", columns, output, axis=2)
 
 
-def _scaled_inputs(nodes: Nodes, inputs: str, recursion: Recursion) -> str:
+def _scaled_inputs(nodes: Nodes, inputs: str, recursion: AbstractForm, n_inputs: int) -> str:
     """Inputs in the model's numbers."""
     scaling, scaled = recursion.scaling, []
-    channels = _channels(nodes, inputs, [f"u{i}" for i in range(recursion.lags.n_inputs)])
+    channels = _channels(nodes, inputs, [f"u{i}" for i in range(n_inputs)])
     for i, (offset, scale) in enumerate(zip(scaling.input_offset, scaling.input_scale, strict=True)):
         centred = nodes.add("Sub", [channels[i], nodes.numbers(f"input_offset{i}", offset)], f"u{i}_centred")
         scaled.append(nodes.add("Div", [centred, nodes.numbers(f"input_scale{i}", scale)], f"u{i}_scaled"))

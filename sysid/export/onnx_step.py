@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike
 from sysid.export.flags import MEANING, Flag
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.surrogate import Port, Stage, Surrogate
-from sysid.models import Recursion
+from sysid.models import AbstractForm, StateSpace
 
 STATE_TEXT = "past samples, scaled; the layout stands in model.json under state"
 FLAGS_TEXT = "the sum of: " + "; ".join(f"{int(flag)}: {text}" for flag, text in MEANING.items())
@@ -54,7 +54,7 @@ def run_stages(nodes: Nodes, surrogate: Surrogate, stage_nodes: Any) -> list[str
         if stage.sources != tuple(range(len(surrogate.inputs) + k)):
             inputs = part.add("Gather", [known, nodes.integers(list(stage.sources))], "u", axis=-1)
         if not alone:
-            bounds = [nodes.integers([at]) for at in (stage.first, stage.first + stage.layout.size, 1)]
+            bounds = [nodes.integers([at]) for at in (stage.first, stage.first + stage.state.size, 1)]
             state = part.add("Slice", ["state", *bounds], "state")
         y_scaled, y, state_out = stage_nodes(part, stage, inputs, state)
         scaled.append(y_scaled)
@@ -69,6 +69,8 @@ def run_stages(nodes: Nodes, surrogate: Surrogate, stage_nodes: Any) -> list[str
 
 
 def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, str, str]:
+    if isinstance(stage.form, StateSpace):
+        return _linear_stage(nodes, stage, stage.form, inputs, state)
     layout, recursion = stage.layout, stage.recursion
     scaled = scaled_inputs(nodes, inputs, recursion)
     known = nodes.add("Concat", [scaled, state], "inputs_and_state", axis=1)
@@ -86,6 +88,32 @@ def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, st
     everything = nodes.add("Concat", [scaled, output, state], "inputs_output_and_state", axis=1)
     state_out = nodes.add("Gather", [everything, nodes.integers(layout.next_columns())], "state_out", axis=1)
     return output, unscaled_output(nodes, output, recursion), state_out
+
+
+def _linear_stage(nodes: Nodes, stage: Stage, form: StateSpace, inputs: str, state: str) -> tuple[str, str, str]:
+    scaled = scaled_inputs(nodes, inputs, form)
+    known = nodes.add("Concat", [state, scaled], "state_and_inputs", axis=1)
+    output, state_out = linear_step(nodes, form, known)
+    output = clipped(nodes, output, stage)
+    return output, unscaled_output(nodes, output, form), state_out
+
+
+def linear_step(nodes: Nodes, form: StateSpace, known: str) -> tuple[str, str]:
+    """One step of a state space.
+
+    Args:
+        nodes: The graph.
+        form: The state space.
+        known: State and scaled inputs side by side, ``(batch, n_state + n_inputs)``.
+
+    Returns:
+        The scaled output ``(batch, 1)`` and the next state.
+    """
+    readout = np.concatenate([form.C, form.D])[:, np.newaxis]
+    constant = nodes.numbers("c", [form.constant])
+    output = nodes.add("Gemm", [known, nodes.numbers("C_and_D", readout), constant], "output")
+    matrix = nodes.numbers("A_and_B", np.concatenate([form.A, form.B], axis=1).T)
+    return output, nodes.add("MatMul", [known, matrix], "state_out")
 
 
 def ends(nodes: Nodes, surrogate: Surrogate, leading: list[str]) -> tuple[list[Any], list[Any]]:
@@ -118,14 +146,14 @@ def _channels(ports: tuple[Port, ...]) -> str:
     return ", ".join(f"{port.name} [{port.unit}]" for port in ports)
 
 
-def scaled_inputs(nodes: Nodes, inputs: str, recursion: Recursion) -> str:
+def scaled_inputs(nodes: Nodes, inputs: str, recursion: AbstractForm) -> str:
     """Inputs in the model's numbers, scaled on the last axis."""
     offset = nodes.numbers("input_offset", recursion.scaling.input_offset)
     scale = nodes.numbers("input_scale", recursion.scaling.input_scale)
     return nodes.add("Div", [nodes.add("Sub", [inputs, offset], "u_centred"), scale], "u_scaled")
 
 
-def unscaled_output(nodes: Nodes, output: str, recursion: Recursion, name: str = "y") -> str:
+def unscaled_output(nodes: Nodes, output: str, recursion: AbstractForm, name: str = "y") -> str:
     """The stage's output in its unit."""
     scale = nodes.numbers("output_scale", recursion.scaling.output_scale)
     offset = nodes.numbers("output_offset", recursion.scaling.output_offset)
@@ -136,7 +164,7 @@ def clipped(nodes: Nodes, output: str, stage: Stage) -> str:
     """The output within its bounds; no node where there are none. NaN stays NaN, as in the model."""
     if not stage.bounded:
         return output
-    low, high = nodes.numbers("low", stage.recursion.low), nodes.numbers("high", stage.recursion.high)
+    low, high = nodes.numbers("low", stage.form.low), nodes.numbers("high", stage.form.high)
     return nodes.add("Clip", [output, low, high], "bounded")
 
 

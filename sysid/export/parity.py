@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sysid.errors import ParityError
 from sysid.export.exporter import ExportedFile, Runner
 from sysid.export.exporters import exporter
-from sysid.export.layout import StateLayout
+from sysid.export.layout import layout_of
 from sysid.export.surrogate import Surrogate
 from sysid.models import AbstractModel, History, Start
 from sysid.traces import TraceSet
@@ -98,7 +98,7 @@ def parity_cases(model: AbstractModel, traces: TraceSet, start: Start) -> tuple[
         ChannelError: If a trace lacks a channel of the mapping.
         TraceError: If a trace is not longer than its measured start.
     """
-    cases, layout = [], StateLayout.of(model)
+    cases, layout = [], layout_of(model)
     change = DISTURBANCE * model.recursion.scaling.output_scale
     for trace in traces:
         inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
@@ -135,7 +135,7 @@ def random_cases(
     """
     rng = np.random.default_rng(seed)
     low, high = _ranges(surrogate)
-    change = DISTURBANCE * np.array([stage.recursion.scaling.output_scale for stage in surrogate.stages])
+    change = DISTURBANCE * np.array([stage.form.scaling.output_scale for stage in surrogate.stages])
     cases = []
     for number in range(sequences):
         inputs = low + (high - low) * _excitation(rng, samples, len(low))
@@ -156,7 +156,7 @@ def random_cases(
 def _ranges(surrogate: Surrogate) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     scale: dict[int, tuple[float, float]] = {}
     for stage in surrogate.stages:
-        scaling = stage.recursion.scaling
+        scaling = stage.form.scaling
         for column, offset, half in zip(stage.sources, scaling.input_offset, scaling.input_scale, strict=True):
             scale.setdefault(column, (offset - half, offset + half))
     ranges = [port.range or scale[i] for i, port in enumerate(surrogate.inputs)]

@@ -14,7 +14,6 @@ from typing import Any
 
 from sysid.errors import BundleError, SysidError
 from sysid.export.bundle import Bundle, bundle_files
-from sysid.export.layout import recursion_of
 from sysid.export.manifest import MANIFEST, SCHEMA_VERSION, manifest_digest
 from sysid.models import AbstractModel, model_from_dict
 
@@ -154,7 +153,7 @@ def _read_manifest(content: _AbstractContent) -> dict[str, Any]:
 def _model(manifest: dict[str, Any], content: _AbstractContent) -> AbstractModel:
     try:
         model = model_from_dict(manifest["model"])
-        recursion_of(model)  # it checks that parameters and structure belong together
+        model.recursion  # noqa: B018 - it checks that parameters and structure belong together
     except (SysidError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise BundleError(
             f"the model in {MANIFEST} cannot be built",

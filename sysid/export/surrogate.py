@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.layout import DelayLine, StateLayout, recursion_of
-from sysid.models import AbstractModel, History, Recursion
+from sysid.export.layout import DelayLine, LinearState, StateLayout, layout_of, recursion_of
+from sysid.models import AbstractForm, AbstractModel, History, Recursion
 
 Range = tuple[float, float]
 """Least and greatest value, in the channel's unit."""
@@ -68,19 +68,29 @@ class Stage:
     first: int
 
     @property
-    def recursion(self) -> Recursion:
+    def form(self) -> AbstractForm:
         """The form that is exported."""
+        return self.model.recursion
+
+    @property
+    def recursion(self) -> Recursion:
+        """The form, where it has delay lines (:class:`ConfigError` where it is a state space)."""
         return recursion_of(self.model)
 
     @property
-    def layout(self) -> StateLayout:
+    def state(self) -> StateLayout | LinearState:
         """The layout of its own state, counted from ``first``."""
+        return layout_of(self.model)
+
+    @property
+    def layout(self) -> StateLayout:
+        """The layout of its delay lines, counted from ``first``; as for ``recursion``."""
         return StateLayout.of(self.model)
 
     @property
     def bounded(self) -> bool:
         """Whether its output is held within bounds."""
-        return bool(np.isfinite(self.recursion.low) or np.isfinite(self.recursion.high))
+        return bool(np.isfinite(self.form.low) or np.isfinite(self.form.high))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,7 +156,7 @@ class Surrogate:
             stages.append(
                 Stage(model=model, sources=tuple(columns[name] for name in model.mapping.inputs), first=first)
             )
-            first += StateLayout.of(model).size
+            first += layout_of(model).size
         identifiers = _identifiers(columns)
         ranges, starts = ranges or {}, starts or {}
         ports = [
@@ -196,13 +206,13 @@ class Surrogate:
     def lines(self) -> tuple[DelayLine, ...]:
         """The delay lines of all stages, laid end to end."""
         return tuple(
-            replace(line, first=stage.first + line.first) for stage in self.stages for line in stage.layout.lines
+            replace(line, first=stage.first + line.first) for stage in self.stages for line in stage.state.lines
         )
 
     @property
     def state_size(self) -> int:
         """Length of the state."""
-        return sum(line.length for line in self.lines)
+        return sum(stage.state.size for stage in self.stages)
 
     @property
     def rest_outputs(self) -> NDArray[np.float64]:
@@ -221,7 +231,7 @@ class Surrogate:
         known = np.concatenate([np.asarray(inputs, dtype=np.float64), self.rest_outputs])
         return np.concatenate(
             [
-                stage.layout.from_history(
+                stage.state.from_history(
                     History.at_rest(inputs=known[list(stage.sources)], output=stage.model.rest_output)
                 )
                 for stage in self.stages
@@ -251,12 +261,14 @@ class Surrogate:
 
     def state_text(self) -> dict[str, Any]:
         """The state as JSON values, with how to read it."""
-        return {
+        spaces = [(stage.first, stage.state) for stage in self.stages if isinstance(stage.state, LinearState)]
+        text = {
             "size": self.state_size,
             "order": "delay line after delay line; within a line the newest sample first",
             "number": "(value in the channel's unit - offset) / scale",
             "lines": [line.to_dict() for line in self.lines],
         }
+        return text | ({"state_spaces": [{"first": at, **state.to_dict()} for at, state in spaces]} if spaces else {})
 
 
 def _check_wiring(models: Sequence[AbstractModel]) -> None:

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 
 from sysid.export.flags import Flag
 from sysid.export.surrogate import Stage, Surrogate
+from sysid.models import StateSpace
 
 
 class StageStep(nn.Module):
@@ -76,6 +77,50 @@ class StageStep(nn.Module):
         return y * self.output_scale + self.output_offset, following, held
 
 
+class LinearStep(nn.Module):
+    """One step of a stage that is a state space.
+
+    Args:
+        stage: The stage.
+        form: Its state space.
+        dtype: Of the numbers; inputs and state must have it too.
+    """
+
+    sources: Tensor
+    input_offset: Tensor
+    input_scale: Tensor
+    transition: Tensor
+    readout: Tensor
+    constant: Tensor
+
+    def __init__(self, stage: Stage, form: StateSpace, dtype: torch.dtype = torch.float64) -> None:
+        super().__init__()
+        scaling = form.scaling
+        numbers = {
+            "input_offset": scaling.input_offset,
+            "input_scale": scaling.input_scale,
+            "transition": np.concatenate([form.A, form.B], axis=1).T,
+            "readout": np.concatenate([form.C, form.D])[:, np.newaxis],
+            "constant": [form.constant],
+        }
+        for name, values in numbers.items():
+            self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
+        self.register_buffer("sources", torch.tensor(stage.sources))
+        self.first, self.size = int(stage.first), form.n_state
+        self.bounded = stage.bounded
+        self.low, self.high = float(form.low), float(form.high)
+        self.output_offset, self.output_scale = float(scaling.output_offset), float(scaling.output_scale)
+
+    def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """One step; see :class:`StageStep`."""
+        state = whole_state.narrow(1, self.first, self.size)
+        scaled = (known.index_select(1, self.sources) - self.input_offset) / self.input_scale
+        x = torch.cat([state, scaled], dim=1)
+        y = torch.clamp(torch.addmm(self.constant, x, self.readout), self.low, self.high)
+        held = (y <= self.low) | (y >= self.high) if self.bounded else torch.zeros_like(y, dtype=torch.bool)
+        return y * self.output_scale + self.output_offset, x @ self.transition, held
+
+
 class SurrogateStep(nn.Module):
     """One step with explicit state.
 
@@ -89,7 +134,12 @@ class SurrogateStep(nn.Module):
 
     def __init__(self, surrogate: Surrogate, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
-        self.stages = nn.ModuleList([StageStep(stage, dtype) for stage in surrogate.stages])
+        self.stages = nn.ModuleList(
+            [
+                LinearStep(stage, stage.form, dtype) if isinstance(stage.form, StateSpace) else StageStep(stage, dtype)
+                for stage in surrogate.stages
+            ]
+        )
         self.register_buffer("declared_low", torch.tensor([port.low for port in surrogate.inputs], dtype=dtype))
         self.register_buffer("declared_high", torch.tensor([port.high for port in surrogate.inputs], dtype=dtype))
         self.outside_bit, self.bound_bit = int(Flag.OUTSIDE_RANGE), int(Flag.AT_BOUND)

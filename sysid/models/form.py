@@ -23,8 +23,8 @@ class AbstractForm(ABC):
 
     @property
     @abstractmethod
-    def finite(self) -> bool:
-        """Whether every parameter is a finite number."""
+    def numbers(self) -> NDArray[np.float64]:
+        """Every number of the form, flat."""
 
     @abstractmethod
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:

@@ -68,9 +68,9 @@ class Recursion(AbstractForm):
             )
 
     @property
-    def finite(self) -> bool:
-        """Whether every parameter is a finite number."""
-        return bool(np.isfinite(self.theta).all())
+    def numbers(self) -> NDArray[np.float64]:
+        """The flat parameters."""
+        return self.theta
 
     @property
     def hidden_weights(self) -> NDArray[np.float64]:

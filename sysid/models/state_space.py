@@ -62,9 +62,9 @@ class StateSpace(AbstractForm):
         return int(self.B.shape[1])
 
     @property
-    def finite(self) -> bool:
-        """Whether every matrix is finite."""
-        return all(bool(np.isfinite(part).all()) for part in (self.A, self.B, self.C, self.D, self.constant))
+    def numbers(self) -> NDArray[np.float64]:
+        """All matrices and the constant, flat."""
+        return np.concatenate([self.A.ravel(), self.B.ravel(), self.C, self.D, [self.constant]])
 
     def state(self, history: History) -> NDArray[np.float64]:
         """The state after some samples.

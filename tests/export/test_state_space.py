@@ -1,0 +1,126 @@
+"""Transfer functions exported: their files compute what the model's state space computes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult, Loop, Status
+from sysid.export import EXPORTERS, Surrogate, expected_flags, export_bundle, read_bundle
+from sysid.export.layout import layout_of
+from sysid.export.parity import largest_difference
+from sysid.models import Domain, History, Mapping, Scaling, Start, TransferFunction
+from sysid.models.transfer_function import TransferFunctionModel
+
+FORMATS = ("onnx", "torchscript", "torch-export")
+RANGES = {"BP": (0.0, 95.0), "AR": (0.0, 95.0)}
+
+
+def build(
+    domain: Domain = Domain.DISCRETE, *, delays: tuple[int, int] = (1, 3), poles: int = 4
+) -> TransferFunctionModel:
+    """Slow, well-damped poles for both inputs."""
+    rng = np.random.default_rng(0)
+    sections = []
+    for _ in range(2):
+        part = []
+        for _ in range(poles // 2):
+            r, w = rng.uniform(0.9, 0.99), rng.uniform(0.01, 0.2)
+            discrete = np.array([1.0, -2 * r * np.cos(w), r * r])
+            part.append(discrete if domain is Domain.DISCRETE else np.array([rng.uniform(0.5, 2.0), 1.0, 1.0]))
+        sections.append(tuple(part))
+    return TransferFunctionModel(
+        orders=TransferFunction(poles=(poles, poles), zeros=(poles - 1, 1), delays=delays, domain=domain),
+        sections=tuple(sections),
+        taps=(rng.normal(size=poles), rng.normal(size=2)),
+        constant=0.2,
+        scaling=Scaling(input_offset=(45.0, 70.0), input_scale=(45.0, 20.0), output_offset=38.0, output_scale=40.0),
+        mapping=Mapping.parse("BP+AR -> BC"),
+        sample_time=0.1,
+        input_units=("psi", "psi"),
+        output_unit="psi",
+        rest_output=0.0,
+    )
+
+
+MODELS = {
+    "discrete": build,
+    "continuous": lambda: build(Domain.CONTINUOUS),
+    "without dead time": lambda: build(delays=(0, 0)),
+    "20 poles an input": lambda: build(poles=20),
+}
+KINDS = ("step", "sequence")
+PAIRS = [(name, kind) for name in FORMATS for kind in KINDS if (name, kind) != ("torch-export", "sequence")]
+
+
+@pytest.fixture(params=MODELS)
+def model(request: pytest.FixtureRequest) -> TransferFunctionModel:
+    return MODELS[request.param]()
+
+
+def opened(name: str, kind: str, surrogate: Surrogate, folder):
+    exporter = EXPORTERS[name]
+    (file,) = [file for file in exporter.write(surrogate, folder) if file.name.startswith(kind)]
+    return exporter.load(file, folder)
+
+
+@pytest.mark.parametrize(("name", "kind"), PAIRS, ids=[" ".join(pair) for pair in PAIRS])
+def test_files_compute_what_the_model_computes(model, name, kind, inputs, tmp_path) -> None:
+    surrogate = Surrogate.of(model, RANGES)
+    run = opened(name, kind, surrogate, tmp_path)
+    cars = [inputs(200, 2, seed=seed) for seed in (1, 2)]
+    histories = [
+        History(inputs=inputs(30, 2, seed=9), output=np.linspace(0.0, 30.0, 30)),
+        History.at_rest(inputs=cars[1][0], output=0.0),
+    ]
+    states = np.stack([layout_of(model).from_history(history) for history in histories])
+    whole = run(np.stack(cars, axis=1), states)
+    for i, (u, history) in enumerate(zip(cars, histories, strict=True)):
+        expected = model.simulate(u, history)
+        assert largest_difference(whole.output[:, i, 0], expected) <= 1e-9
+        np.testing.assert_array_equal(whole.flags[:, i], expected_flags(surrogate, u, expected[:, np.newaxis]))
+    half = run(np.stack(cars, axis=1)[:70], states)
+    rest = run(np.stack(cars, axis=1)[70:], half.state)
+    np.testing.assert_array_equal(np.concatenate([half.output, rest.output]), whole.output)
+    np.testing.assert_array_equal(rest.state, whole.state)
+
+
+@pytest.mark.parametrize(("name", "kind"), PAIRS, ids=[" ".join(pair) for pair in PAIRS])
+def test_a_cascade_may_hold_one(narx, name, kind, inputs, tmp_path) -> None:
+    from sysid.models import NARX
+
+    second = replace(build(), mapping=Mapping.parse("BC+AR -> X"))
+    surrogate = Surrogate.wired([narx(NARX(input_delays=2, output_delays=2, neurons=3)), second], RANGES)
+    run = opened(name, kind, surrogate, tmp_path)
+    u = inputs(100, 2)
+    result = run(u[:, np.newaxis], surrogate.at_rest(u[0])[np.newaxis])
+    assert largest_difference(result.output[:, 0], surrogate.simulate(u)) <= 1e-9
+
+
+def test_at_rest_can_be_computed_from_what_the_manifest_says(model) -> None:
+    surrogate = Surrogate.of(model, RANGES)
+    (space,) = surrogate.state_text()["state_spaces"]
+    u = np.array([88.0, 70.0])
+    scaled = model.scaling.scale_inputs(u[np.newaxis])[0]
+    np.testing.assert_allclose(np.array(space["at_rest"]) @ scaled, surrogate.at_rest(u), atol=1e-9)
+    assert space["size"] == surrogate.state_size
+
+
+def test_a_bundle_carries_one(model, traces, tmp_path) -> None:
+    fit = FitResult(
+        model=model, status=Status.CONVERGED, loop=Loop.CLOSED, train_time_s=1.0,
+        history={"iteration": np.arange(2.0), "mse": np.array([2.0, 1.0])},
+    )  # fmt: skip
+    export_bundle(fit, traces, tmp_path / "bundle", start=Start(), formats=("onnx", "torchscript"))
+    again = read_bundle(tmp_path / "bundle").model
+    u = traces["EST01"].columns(["BP", "AR"])
+    np.testing.assert_array_equal(again.simulate(u), model.simulate(u))
+
+
+@pytest.mark.parametrize("name", ["c", "fmi2", "fmi3"])
+def test_formats_with_delay_lines_refuse_and_say_what_to_use(model, name, tmp_path) -> None:
+    with pytest.raises(ConfigError, match="onnx, torchscript"):
+        EXPORTERS[name].write(Surrogate.of(model, RANGES), tmp_path)
