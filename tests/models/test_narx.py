@@ -43,7 +43,7 @@ STRUCTURES = [
 
 def signals(n: int = 200, seed: int = 1) -> tuple[np.ndarray, np.ndarray, History]:
     rng = np.random.default_rng(seed)
-    inputs = [*np.cumsum(rng.standard_normal((n, 2)), axis=0), 60.0, 80.0]
+    inputs = np.cumsum(rng.standard_normal((n, 2)), axis=0) + np.array([60.0, 80.0])
     history = History(inputs=rng.uniform(40.0, 90.0, (9, 2)), output=rng.uniform(0.0, 60.0, 9))
     return inputs, rng.uniform(0.0, 60.0, n), history
 
