@@ -1,6 +1,6 @@
 """A second implementation agrees: numbers from GNU Octave 7.3.0 with its control package 3.4.0.
 
-The record is made from formulas, so that both programs see the same numbers. In Octave, with ``u`` and ``y`` as columns::
+The record is made from formulas, so that both programs see the same numbers. In Octave, ``u`` and ``y`` columns::
 
     sys = arx(iddata(y, u, 1), 'na', 2, 'nb', 2)                       % ARX
     [q, r] = qr([Phi Y], 0); r(end, end)^2 / length(Y)                 % losses; rows 4 to 200 of lagged columns
