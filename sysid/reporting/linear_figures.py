@@ -96,7 +96,7 @@ def pole_zero_figure(model: TransferFunctionModel, uncertainty: Uncertainty, *, 
         for j, name in enumerate(model.mapping.inputs):
             _, F = _drawn(model, uncertainty, j, seed)
             cloud = np.concatenate([np.roots(f if discrete else f[::-1]) for f in F])
-            axes[j].plot(cloud.real, cloud.imag, ".", color="#BBBBBB", markersize=2, label=f"{DRAWS} draws of the poles")
+            axes[j].plot(cloud.real, cloud.imag, ".", color="#BBBBBB", markersize=2, label=f"{DRAWS} draws")
             for roots, marker, kind in ((model.poles(j), "x", "poles"), (model.zeros(j), "o", "zeros")):
                 axes[j].plot(roots.real, roots.imag, marker, color=PALETTE[0], fillstyle="none", label=kind)
             if discrete:
