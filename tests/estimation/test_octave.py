@@ -6,7 +6,8 @@ The record is made from formulas, so that both programs see the same numbers. In
     [q, r] = qr([Phi Y], 0); r(end, end)^2 / length(Y)                 % losses; rows 4 to 200 of lagged columns
     th = (filter(l, 1, Z)(5:end, :)' * filter(l, 1, Phi)(5:end, :)) \\ ...  % IV4 of Ljung 1999, section 15.3
 
-The dead time that Octave's ``arx`` counts is one less than ours. Its package has no instrumental variables; those are
+The dead time that Octave's ``arx`` counts is one less than ours. SIPPY 1.0.1 (package ``sippy_unipi``) gives the numbers
+of the longer dead time too, counting in the same way. Its package has no instrumental variables; those are
 written out from the textbook there.
 """
 
@@ -53,6 +54,13 @@ def test_arx(trace: Trace) -> None:
     model = fit_arx([trace], MAPPING, ORDERS, start=measured(2)).model
     np.testing.assert_allclose(-model.a, [-1.50261668306, 0.702779524832], rtol=1e-10)
     np.testing.assert_allclose(model.b[0], [1.00915074978, 0.481774269667], rtol=1e-10)
+
+
+def test_arx_with_a_longer_dead_time(trace: Trace) -> None:
+    """Octave: 'nk', 1. SIPPY: system_identification(y, u, 'ARX', ARX_orders=[2, 2, 1])."""
+    model = fit_arx([trace], MAPPING, ARX(na=2, nb=(2,), nk=(2,), intercept=False), start=measured(3)).model
+    np.testing.assert_allclose(-model.a, [-1.5746050210271714, 0.7649227326009992], rtol=1e-10)
+    np.testing.assert_allclose(model.b[0], [1.0465951672799245, 0.0027913436525338173], rtol=1e-8)
 
 
 def test_instrumental_variables(trace: Trace) -> None:
