@@ -6,9 +6,9 @@ The record is made from formulas, so that both programs see the same numbers. In
     [q, r] = qr([Phi Y], 0); r(end, end)^2 / length(Y)                 % losses; rows 4 to 200 of lagged columns
     th = (filter(l, 1, Z)(5:end, :)' * filter(l, 1, Phi)(5:end, :)) \\ ...  % IV4 of Ljung 1999, section 15.3
 
-The dead time that Octave's ``arx`` counts is one less than ours. SIPPY 1.0.1 (package ``sippy_unipi``) gives the numbers
-of the longer dead time too, counting in the same way. Its package has no instrumental variables; those are
-written out from the textbook there.
+The dead time that Octave's ``arx`` counts is one less than ours. Octave's package has no instrumental variables; those
+are written out from the textbook there. SIPPY 1.0.1 (package ``sippy_unipi``) gives the numbers of the longer dead time
+too, counting as Octave does.
 """
 
 from __future__ import annotations
