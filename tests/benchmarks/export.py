@@ -180,7 +180,8 @@ def run_times(folder: Path) -> None:
         "C, float, -O2": ["-O2", "-DBP_AR_TO_BC_FLOAT"],
     }.items():
         middle, least, step, late, worst = time_c(surrogate, folder, one[:, 0], *flags)
-        note = f"{label} (least {least / 1e6:.1f} ms; single step {step:.0f} ns, 99.9 % {late:.0f} ns, most {worst:.0f} ns)"
+        spread = f"single step {step:.0f} ns, 99.9 % {late:.0f} ns, most {worst:.0f} ns"
+        note = f"{label} (least {least / 1e6:.1f} ms; {spread})"
         say(note, f"{middle / 1e6:.2f}", f"{middle / 1e3 / SAMPLES:.3f}", f"{middle / 1e6 / own:.2f}", "see parity")
     for name, exporter in EXPORTERS.items():
         for file in exporter.write(surrogate, folder):
