@@ -78,7 +78,9 @@ def fit_narx(
     )
     candidates = starts.run(race)
     chosen = min(candidates, key=lambda candidate: starts.rank(candidate, training.choose_by))
-    status = _status(chosen, candidates, interrupted=race.stop.is_set())
+    records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
+    records += [(t.columns(mapping.inputs), None) for t in selection]
+    status = _status(chosen, candidates, records, interrupted=race.stop.is_set())
     return _result(chosen, candidates, training, status, time.perf_counter() - began)
 
 
@@ -141,12 +143,25 @@ def _initial_parameters(initial: FitResult | None, network: NARX) -> NDArray[np.
     return initial.model.theta
 
 
-def _status(chosen: starts.Candidate, candidates: Sequence[starts.Candidate], *, interrupted: bool) -> Status:
+def _status(
+    chosen: starts.Candidate,
+    candidates: Sequence[starts.Candidate],
+    records: Sequence[tuple[NDArray[np.float64], History | None]],
+    *,
+    interrupted: bool,
+) -> Status:
     if interrupted:
         return Status.INTERRUPTED
+    if any(_leaves_its_bounds(chosen.model, inputs, history) for inputs, history in records):
+        return Status.UNSTABLE
     iteration = chosen.solution.state.iteration
     later = any(c.number == chosen.number and c.solution.state.iteration > iteration for c in candidates)
     return Status.STOPPED_EARLY if later else chosen.solution.status
+
+
+def _leaves_its_bounds(model: NARXModel, inputs: NDArray[np.float64], history: History | None) -> bool:
+    scaled = model.scaling.scale_output(model.simulate(inputs, history))
+    return not bool(np.all(np.abs(scaled) < model.clamp * (1.0 - 1e-9)))
 
 
 def _result(

@@ -24,9 +24,6 @@ class Status(enum.Enum):
     STOPPED_EARLY = "Stopped early: this state did better on the selection traces than any later one."
     STALLED = "No step improves the loss any more although its gradient is not zero; try another start."
     NOT_IMPROVED = "The fit did not improve on where it started; try another start, or more damping."
-    EARLY = (
-        "Further steps suit the estimation traces better and the selection traces worse; this is the model before them."
-    )
     INTERRUPTED = "Interrupted; this is the best model up to then."
     UNSTABLE = "The free run leaves its bounds on at least one record; choose another start or fewer lags."
 

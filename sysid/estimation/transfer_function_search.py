@@ -238,7 +238,7 @@ class AbstractProblem(ABC):
                 continue
             end = self._long_run(candidate, began, on_iteration)
             first = candidate.provider.poles.theta(candidate.start.sections)
-            early = Status.EARLY if self.training.max_iterations else end.status
+            early = Status.STOPPED_EARLY if self.training.max_iterations else end.status
             for theta, status, how in (
                 (end.theta, end.status, "at its minimum"),
                 (candidate.theta, early, "after a short run"),

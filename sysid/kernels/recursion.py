@@ -188,8 +188,11 @@ def activations(
                 total += w[i] * x[i]
         row = h[t]
         _neurons(W_columns, b, x, row)
+        # A loop that sums and writes is guarded by a check for overlapping memory, and takes another order of summation
+        # where the guard, by where the arrays happen to lie, fires: results would depend on addresses.
         for k in range(n_neurons):
             total += v[k] * row[k]
+        for k in range(n_neurons):
             slopes[k] = v[k] * (1.0 - row[k] * row[k])
         for i in range(n_out):
             column = W_columns[n_in + i]

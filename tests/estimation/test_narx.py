@@ -68,6 +68,14 @@ def test_the_seed_decides_and_not_the_number_of_workers(workers):
     assert fit.seed in {5, 6, 7}
 
 
+def test_a_repeated_fit_is_the_same_to_the_last_bit_wherever_its_arrays_lie():
+    fits, elsewhere = [], []
+    for size in (0, 17, 1001, 4096):
+        elsewhere.append(np.empty(size))
+        fits.append(fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=10)))
+    assert all(np.array_equal(fit.model.theta, fits[0].model.theta) for fit in fits)
+
+
 def test_what_is_chosen_has_the_least_error_on_the_selection_traces():
     selection = [tank(2), tank(4)]
     fit = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=40, starts=4), selection=selection)
@@ -122,7 +130,7 @@ def test_offsets_are_copies_of_the_record_that_differ_in_level_alone():
     copy = Trace(name="copy", sample_time=0.5, channels=shifted.channels, values=values)
     by_hand = fit_narx([tank(1), copy], TANK, SMALL, Training(max_iterations=15))
     by_option = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=15, offsets=[{"pump": 0.3}]))
-    np.testing.assert_array_equal(by_option.model.theta, by_hand.model.theta)
+    np.testing.assert_allclose(by_option.model.theta, by_hand.model.theta, rtol=1e-9)
 
 
 def test_an_offset_of_what_is_no_input_is_refused():
@@ -143,6 +151,19 @@ def test_an_interruption_keeps_the_best_model_so_far():
     assert fit.status is Status.INTERRUPTED
     assert np.isfinite(fit.model.theta).all()
     assert len(fit.history["mse"]) >= 10
+
+
+def test_a_free_run_that_leaves_its_bounds_says_so():
+    # One iteration from a start whose first record is all that it has seen; the selection trace is far outside.
+    far = tank(2)
+    values = far.values.copy()
+    values[:, 0] *= 1e3
+    outside = Trace(name="outside", sample_time=0.5, channels=far.channels, values=values)
+    fit = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=30), selection=[outside])
+    bound = fit.model.clamp * fit.model.scaling.output_scale
+    level = fit.model.simulate(outside.columns(["pump"])) - fit.model.scaling.output_offset
+    assert np.abs(level).max() == pytest.approx(bound)
+    assert fit.status is Status.UNSTABLE
 
 
 def test_progress_ends_at_the_whole():

@@ -97,7 +97,7 @@ MISTAKES = [
     ),
     pytest.param("max_iterations: 12", "max_iterations: 0", ["max_iterations is too small"], id="no iterations"),
     pytest.param(
-        "starts: 3", "choose_by: dice", ["choose between starts", "selection or evidence"], id="unknown choice"
+        "starts: 3", "choose_by: dice", ["unknown value of choose_by", "selection or evidence"], id="unknown choice"
     ),
     pytest.param("mapping: a+b -> y", "mapping: a+b = y", ["not a mapping", "->"], id="no arrow"),
     pytest.param("mapping: a+b -> y", "mapping: a+y -> y", ["not a mapping"], id="output among the inputs"),

@@ -45,8 +45,8 @@ def rewrite(workspace: Path, old: str, new: str) -> None:
 
 def test_own_data_from_a_yaml(workspace: Path) -> None:
     rewrite(workspace, "neurons: 2", "neurons: 6")
-    rewrite(workspace, "max_iterations: 8", "max_iterations: 80")
-    rewrite(workspace, "{loop: closed, ", "{loop: closed, starts: 4, ")
+    rewrite(workspace, "max_iterations: 8", "max_iterations: 400")
+    rewrite(workspace, "{loop: closed, ", "{loop: closed, starts: 8, ")
     rewrite(workspace, "export: null", "export: {tolerance: 1.0e-9}")
     results, stored = run(workspace)
     assert stored == dict.fromkeys(FITS, False)
