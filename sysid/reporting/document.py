@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from sysid.reporting import figures
+from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.moments import Moment, worst_moments
 from sysid.reporting.numbers import number
+from sysid.reporting.parts import Part, Picture, Section, identifier, picture
 from sysid.reporting.published import PublishedTable
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.signals import CaseSignals, read_signals
-from sysid.reporting.style import svg
 from sysid.reporting.tables import (
     DIVERGED,
     Cell,
@@ -32,37 +31,6 @@ from sysid.reporting.tables import (
     scored_cases,
 )
 from sysid.reporting.verdict import Verdict, verdict
-
-
-@dataclass(frozen=True, kw_only=True)
-class Picture:
-    """A figure as markup.
-
-    Args:
-        svg: Inline SVG element.
-        caption: Stands below it.
-    """
-
-    svg: str
-    caption: str
-
-
-Part = Table | Picture | str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Section:
-    """A heading and what stands under it.
-
-    Args:
-        anchor: Its id in the page.
-        title: Its heading.
-        parts: Tables, pictures and paragraphs, in order.
-    """
-
-    anchor: str
-    title: str
-    parts: tuple[Part, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +72,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     columns = _columns(results)
     if best is not None:
         sections.append(_best(best, signals[best.slug], moments, columns))
+    sections += evidence_sections(folder, results)
     sections += [_run_times(results, published), _tried(results)]
     exports = export_table(results)
     if exports is not None:
@@ -141,7 +110,7 @@ def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
         series.append(figures.Series(name="published", values=published, published=True))
     figure = figures.cases_figure(series, cases, quantity=f"free-run mse [{fits[0].unit}²]")
     caption = f"Free-run mse by case and fit, {mapping}; logarithmic, lower is better. A fit without a mark diverges."
-    return _picture(figure, f"Free-run mse by case, {mapping}", caption, name)
+    return picture(figure, f"Free-run mse by case, {mapping}", caption, name)
 
 
 def _best(fit: FitRecord, signals: Dict[str, CaseSignals], moments: list[Moment], columns: int) -> Section:
@@ -150,13 +119,13 @@ def _best(fit: FitRecord, signals: Dict[str, CaseSignals], moments: list[Moment]
     output = fit.mapping.rpartition("->")[2].strip()
     if moments:
         title = f"{fit.name}: the {len(moments)} worst moments"
-        picture = figures.moments_figure(moments, signals, title=title, label=output, unit=fit.unit)
-        parts.append(_picture(picture, title, "Zooms at the largest errors of the free run, worst first.", "moments"))
+        drawing = figures.moments_figure(moments, signals, title=title, label=output, unit=fit.unit)
+        parts.append(picture(drawing, title, "Zooms at the largest errors of the free run, worst first.", "moments"))
         parts.append(_moments_table(fit, moments))
     r = {case: record.free_run.r for case, record in fit.cases.items()}
-    picture = figures.regression_figure(signals, r, label=output, unit=fit.unit)
+    drawing = figures.regression_figure(signals, r, label=output, unit=fit.unit)
     caption = "Free run against target: a perfect model lies on the line."
-    parts.append(_picture(picture, f"{fit.name}: target-output regression", caption, "regression"))
+    parts.append(picture(drawing, f"{fit.name}: target-output regression", caption, "regression"))
     return Section(anchor="best", title=f"The chosen model: {fit.name}", parts=tuple(parts))
 
 
@@ -179,7 +148,7 @@ def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int
             f"mse {number(case.free_run.mse, missing='diverged')} {fit.unit}², largest error "
             f"{number(case.free_run.max_abs_error, missing='diverged')} {fit.unit}."
         )
-        parts.append(_picture(figure, f"{fit.name} on {name}", caption, f"case-{_identifier(fit.slug)}-{index}"))
+        parts.append(picture(figure, f"{fit.name} on {name}", caption, f"case-{identifier(fit.slug)}-{index}"))
     return parts
 
 
@@ -210,7 +179,7 @@ def _run_times(results: Results, published: PublishedTable | None) -> Section:
     }
     figure = figures.run_time_figure(per_thousand, quantity="run time for 1000 simulated seconds [ms]")
     caption = "Free run, median over the cases."
-    parts.append(_picture(figure, "Run time of each fit", caption, "run-time"))
+    parts.append(picture(figure, "Run time of each fit", caption, "run-time"))
     machine = results.environment.get("cpu") or "the machine named below"
     protocol = (
         f"Protocol: the free run of each whole case, median of repeats after one that warms up, measured on {machine}."
@@ -235,7 +204,7 @@ def _tried(results: Results) -> Section:
         unit, mapping = fits[0].unit, fits[0].mapping
         caption = f"Learning curves on the estimation records, {mapping}; open loop learns the error of one step."
         parts.append(
-            _picture(figures.learning_figure(curves, unit=unit), "Learning curves", caption, f"learning-{index}")
+            picture(figures.learning_figure(curves, unit=unit), "Learning curves", caption, f"learning-{index}")
         )
     notes = [(fit.name, " ".join(fit.notes)) for fit in results.fits if fit.notes]
     if notes:
@@ -256,7 +225,7 @@ def _others(results: Results, signals: Dict[str, Dict[str, CaseSignals]], column
     best = results.best_fit
     return [
         Section(
-            anchor=f"fit-{_identifier(fit.slug)}",
+            anchor=f"fit-{identifier(fit.slug)}",
             title=f"Every case: {fit.name}",
             parts=(
                 quality_table(fit, "free_run"),
@@ -267,11 +236,3 @@ def _others(results: Results, signals: Dict[str, Dict[str, CaseSignals]], column
         for fit in results.fits
         if fit is not best
     ]
-
-
-def _picture(figure: Figure, title: str, caption: str, name: str) -> Picture:
-    return Picture(svg=svg(figure, title=title, description=caption, name=name), caption=caption)
-
-
-def _identifier(slug: str) -> str:
-    return re.sub(r"[^A-Za-z0-9-]", "-", slug)

@@ -8,7 +8,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 import sysid
-from sysid.reporting.document import Document, Picture
+from sysid.reporting.document import Document
+from sysid.reporting.parts import Picture
 from sysid.reporting.tables import Table, facts
 
 

@@ -164,6 +164,25 @@ class BestRecord(_Record):
     chosen_by: str = Field(description="One sentence: by which figure, on which traces.")
 
 
+class AmplitudeRecord(_Record):
+    """The best linear model and the best network at one amplitude."""
+
+    amplitude: str = Field(description="minimum, intermediate or full: how far the output of its cases moves.")
+    cases: list[str]
+    linear: str = Field(description="Name of the linear fit with the highest mean fit over these cases.")
+    linear_fit: Number = Field(description="That free-run fit in percent.")
+    network: str = Field(description="Name of the network with the highest mean fit over these cases.")
+    network_fit: Number = Field(description="That free-run fit in percent.")
+
+
+class LinearityRecord(_Record):
+    """Whether a linear model is enough, amplitude by amplitude."""
+
+    answer: str = Field(description="LINEAR, NETWORK, NEITHER or UNKNOWN.")
+    text: str = Field(description="The answer as a sentence.")
+    rows: list[AmplitudeRecord] = []
+
+
 class Results(_Record):
     """All of results.json."""
 
@@ -179,6 +198,7 @@ class Results(_Record):
     selection: SelectionRecord | None = None
     fits: list[FitRecord] = Field(min_length=1)
     best: BestRecord | None = None
+    linearity: LinearityRecord | None = Field(default=None, description="Whether a linear model is enough.")
     published: str | None = Field(default=None, description="Reference table to set beside ours.")
 
     @property

@@ -109,6 +109,20 @@ class ResidualAnalysis:
         """Whether the residuals may be independent of every past input."""
         return all(correlation.passed for correlation in self.inputs)
 
+    @property
+    def sentences(self) -> tuple[str, str]:
+        """What the two tests say, for a person to read: whiteness, then independence of the inputs."""
+        p = f"Ljung-Box p = {self.ljung_box_p:.2g}"
+        if self.white:
+            whiteness = f"White at 99 %: past residuals tell nothing of the next one ({p})."
+        else:
+            most = int(self.whiteness.lags[np.argmax(np.abs(self.whiteness.values))])
+            whiteness = f"Not white at 99 %: past residuals tell something of the next one, most at lag {most} ({p})."
+        owed = ", ".join(correlation.name for correlation in self.inputs if not correlation.passed)
+        if owed:
+            return whiteness, f"Not independent of past {owed}: the model leaves out some of what they do."
+        return whiteness, "Independent of every past input."
+
     def to_dict(self) -> dict[str, Any]:
         """The analysis as JSON values."""
         return {
@@ -120,6 +134,7 @@ class ResidualAnalysis:
             "white": self.white,
             "inputs": [correlation.to_dict() for correlation in self.inputs],
             "independent": self.independent,
+            "sentences": list(self.sentences),
         }
 
 

@@ -16,6 +16,7 @@ from sysid.reporting.results import Results, parse_results, read_results, write_
 from sysid.workbench import events, steps
 from sysid.workbench.config import FitConfig, Pipeline
 from sysid.workbench.environment import environment
+from sysid.workbench.evidence import residuals
 from sysid.workbench.record import (
     export_record,
     is_final,
@@ -23,6 +24,7 @@ from sysid.workbench.record import (
     read_scores,
     results_document,
     write_fit,
+    write_residuals,
     write_scores,
 )
 from sysid.workbench.store import RunFolder, code_digest, digest, strict, write_bytes, write_json
@@ -183,7 +185,7 @@ class _Run:
         if reuse and self._done(step, key):
             return key, read_scores(folder), True
         scores = steps.score(result, data, config)
-        files = write_scores(folder, scores)
+        files = write_scores(folder, scores) + write_residuals(folder, residuals(result, data, config))
         if final:
             self.store.mark_done(step, key, files)
         return key, scores, False

@@ -16,6 +16,7 @@ from sysid.traces import Role
 from sysid.validation import CaseResult, Evaluation, Figures
 from sysid.workbench.config import PipelineConfig
 from sysid.workbench.events import FitReady
+from sysid.workbench.evidence import linearity
 from sysid.workbench.steps import Choice, Data, Scores
 from sysid.workbench.store import read_arrays, read_json, write_arrays, write_json
 
@@ -58,6 +59,20 @@ def write_scores(folder: Path, scores: Scores) -> list[Path]:
     figures = {name: case.to_dict() for name, case in cases.items()}
     write_json(folder / "evaluation.json", {"cases": figures, "selection_mse": scores.selection_mse})
     return [folder / "signals.npz", folder / "evaluation.json"]
+
+
+def write_residuals(folder: Path, residuals: Mapping[str, Any]) -> list[Path]:
+    """Store what :func:`sysid.workbench.evidence.residuals` found.
+
+    Args:
+        folder: The fit's folder.
+        residuals: JSON values.
+
+    Returns:
+        The files written.
+    """
+    write_json(folder / "residuals.json", residuals)
+    return [folder / "residuals.json"]
 
 
 def read_scores(folder: Path) -> Scores:
@@ -175,6 +190,7 @@ def results_document(
         "start": {"kind": start.kind.value, "n_measured": start.n_measured if start.kind is StartKind.MEASURED else 0},
         "fits": [fit_record(ready, exports if ready.config.name == first else ()) for ready in fits],
         "best": {"name": choice.name, "chosen_by": choice.chosen_by} if choice else None,
+        "linearity": linearity(fits),
         "published": config.report.published,
     }
 

@@ -247,8 +247,15 @@ def scores_key(fit: str, data: Data, config: PipelineConfig) -> str:
         64 hexadecimal digits.
     """
     code = code_digest("validation", "models", "kernels")
-    selection = [trace.digest for trace in data.selection]
-    return digest({"fit": fit, "traces": data.traces.digest, "selection": selection, "code": code} | _common(config))
+    terms = {
+        "fit": fit,
+        "traces": data.traces.digest,
+        "selection": [trace.digest for trace in data.selection],
+        # Scores of a release that kept no residuals are made again.
+        "kept": ["figures", "signals", "residuals"],
+        "code": code,
+    }
+    return digest(terms | _common(config))
 
 
 def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -51,3 +53,12 @@ def test_the_step_response_ends_at_the_gain() -> None:
     y = figure.axes[0].lines[0].get_ydata()
     assert y[-1] == pytest.approx(fit.model.response(0, np.array([0.0]))[0].real, rel=1e-6)
     assert svg(figure, title="Step", description="Step response", name="step").startswith("<svg")
+
+
+def test_a_zero_far_off_is_counted_and_does_not_shrink_the_circle() -> None:
+    fit = fitted(0.01, "discrete")
+    far = dataclasses.replace(fit.model, taps=tuple(np.array([0.01, 1.0]) for _ in fit.model.taps))
+    assert np.abs(far.zeros(0)).max() > 1.5
+    axes = pole_zero_figure(far, None).axes[0]
+    assert axes.get_xlim() == (-1.5, 1.5)
+    assert "zeros (1 outside)" in [text.get_text() for text in axes.get_legend().get_texts()]

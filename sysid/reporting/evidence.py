@@ -1,0 +1,172 @@
+"""The sections that show why a model may be believed: its residuals, its frequency response, and linear or not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult
+from sysid.models import ARXModel, TransferFunctionModel
+from sysid.reporting.linear_figures import bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.parts import Part, Section, identifier, picture
+from sysid.reporting.residual_figure import residual_figure
+from sysid.reporting.residuals import GroupRecord, read_residuals
+from sysid.reporting.results import FitRecord, LinearityRecord, Results
+from sysid.reporting.tables import Cell, Table, figure_cell
+
+LINEAR_KINDS = ("ARX", "TransferFunction")
+
+
+def evidence_sections(folder: Path, results: Results) -> list[Section]:
+    """The sections for which the run stored something.
+
+    Args:
+        folder: The run's folder.
+        results: Its results.
+
+    Returns:
+        In the order they are read; none for a run that stored neither residuals nor models.
+
+    Raises:
+        ConfigError: If a stored file is damaged.
+    """
+    sections = [] if results.linearity is None else [_linear_enough(results.linearity)]
+    residuals = {fit.name: read_residuals(folder / "fits" / fit.slug) for fit in results.fits}
+    if any(residuals.values()):
+        sections.append(_residuals(results, residuals))
+    parts = [part for fit in results.fits if _linear(fit) for part in _responses(folder, fit)]
+    if parts:
+        sections.append(Section(anchor="frequency-response", title="Frequency response", parts=tuple(parts)))
+    return sections
+
+
+def _linear(fit: FitRecord) -> bool:
+    return fit.structure.get("kind") in LINEAR_KINDS
+
+
+def _linear_enough(linearity: LinearityRecord) -> Section:
+    parts: list[Part] = [linearity.text]
+    if linearity.rows:
+        rows = tuple(
+            (
+                Cell(text=row.amplitude, header=True, below=", ".join(row.cases)),
+                Cell(text=row.linear),
+                figure_cell(row.linear_fit),
+                Cell(text=row.network),
+                figure_cell(row.network_fit),
+            )
+            for row in linearity.rows
+        )
+        table = Table(
+            caption="Free-run fit of the best linear model and the best network by amplitude [%], unseen cases.",
+            head=(("amplitude", "cases"), ("linear model", ""), ("fit", "%"), ("network", ""), ("fit", "%")),
+            rows=rows,
+            note="Amplitude: how far the output moves, relative to the case where it moves furthest. 100 % is exact.",
+        )
+        parts.append(table)
+    return Section(anchor="linearity", title="Is linear enough?", parts=tuple(parts))
+
+
+def _residuals(results: Results, residuals: dict[str, dict[str, GroupRecord]]) -> Section:
+    parts: list[Part] = [_residual_table(results, residuals)]
+    if any(fit.structure.get("kind") == "TransferFunction" for fit in results.fits):
+        parts.append(
+            "A transfer function here has no model of the noise: one step ahead it does what it does in free run, and "
+            "its residuals need not be white, only independent of the inputs."
+        )
+    best = results.best_fit
+    for fit in results.fits:
+        groups = {name: group.analysis for name, group in residuals[fit.name].items() if group.analysis is not None}
+        if not groups or not (fit is best or _linear(fit)):
+            continue
+        said = " ".join(f"{name.capitalize()} cases: {' '.join(found.sentences)}" for name, found in groups.items())
+        caption = f"{fit.name}: correlation of the one-step residuals, with 99 % bounds in grey. {said}"
+        name = f"residuals-{identifier(fit.slug)}"
+        parts.append(picture(residual_figure(groups), f"Residuals of {fit.name}", caption, name))
+    return Section(anchor="residuals", title="Residuals", parts=tuple(parts))
+
+
+def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord]]) -> Table:
+    rows = []
+    for fit in results.fits:
+        for name, group in residuals[fit.name].items():
+            found = group.analysis
+            head = (Cell(text=fit.name, header=True), Cell(text=name, below=", ".join(group.cases)))
+            if found is None:
+                rows.append(
+                    (
+                        *head,
+                        *(Cell(text="not analysed", below=group.reason) if i == 0 else Cell(text="") for i in range(4)),
+                    )
+                )
+                continue
+            owed = ", ".join(entry.name for entry in found.inputs if not entry.passed)
+            rows.append(
+                (
+                    *head,
+                    figure_cell(found.variance),
+                    figure_cell(found.ljung_box_p),
+                    Cell(text="white" if found.white else "not white"),
+                    Cell(text=f"not of {owed}" if owed else "independent"),
+                )
+            )
+    return Table(
+        caption="What is left one step ahead: white, and independent of past inputs? Tests at 99 %.",
+        head=(
+            ("fit", ""),
+            ("cases", ""),
+            ("variance", f"{results.fits[0].unit}²"),
+            ("Ljung-Box", "p"),
+            ("residuals", "whiteness"),
+            ("past inputs", "independence"),
+        ),
+        rows=tuple(rows),
+        note="Of a reference without noise a model leaves structure, never noise: with enough samples no model passes, "
+        "and the size of what is left counts.",
+    )
+
+
+def _responses(folder: Path, fit: FitRecord) -> list[Part]:
+    stored = _read_fit(folder / "fits" / fit.slug / "fit.json")
+    if stored is None or not isinstance(stored.model, ARXModel | TransferFunctionModel):
+        return []
+    model, uncertainty, name = stored.model, stored.uncertainty, identifier(fit.slug)
+    band = "Grey: 95 % of what the covariance of the parameters allows." if uncertainty else "Uncertainty not known."
+    return [
+        picture(
+            bode_figure(model, uncertainty),
+            f"Bode diagram of {fit.name}",
+            f"{fit.name}, {fit.label}: frequency response up to the Nyquist frequency. {band}",
+            f"bode-{name}",
+        ),
+        picture(
+            step_figure(model, uncertainty),
+            f"Step responses of {fit.name}",
+            f"{fit.name}: change of the output after a step of one unit in each input. {band}",
+            f"step-{name}",
+        ),
+        picture(
+            pole_zero_figure(model, uncertainty),
+            f"Poles and zeros of {fit.name}",
+            f"{fit.name}: poles (crosses) and zeros (circles) by input. Grey: poles of models drawn from the "
+            "distribution of the parameters. What lies far outside the unit circle is counted in the legend.",
+            f"poles-{name}",
+        ),
+    ]
+
+
+def _read_fit(path: Path) -> FitResult | None:
+    """The stored fit; ``None`` if the run stored none."""
+    try:
+        return FitResult.from_dict(json.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ConfigError(
+            "the stored fit cannot be read",
+            where=path,
+            expected="a fit as the run wrote it",
+            got=f"{type(error).__name__}: {error!s:.200}",
+            remedy="run the pipeline again; it resumes from what is finished",
+        ) from error
