@@ -155,7 +155,8 @@ def _by_amplitude(evaluations: Sequence[Evaluation]) -> dict[Amplitude, tuple[st
     largest = max(spans.values(), default=0.0)
     groups: dict[Amplitude, tuple[str, ...]] = {}
     for name, span in spans.items():
-        if largest > 0.0:
+        # A target that does not vary has no amplitude, and no fit in percent either.
+        if span > 0.0:
             part = span / largest
             kind = Amplitude.MINIMUM if part <= SMALL else Amplitude.FULL if part >= LARGE else Amplitude.INTERMEDIATE
             groups[kind] = (*groups.get(kind, ()), name)

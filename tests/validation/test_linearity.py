@@ -14,6 +14,7 @@ SPANS = {
     "MIN": (10.0, Role.VALIDATION),
     "MID": (35.0, Role.VALIDATION),
     "FULL": (60.0, Role.TEST),
+    "STILL": (0.0, Role.TEST),
 }
 
 
@@ -64,3 +65,11 @@ def test_one_kind_alone_gives_no_answer(missing: str) -> None:
     some = {"x": evaluation(MIN=1.0, MID=1.0, FULL=1.0)}
     kinds = {"linear": some, "networks": some} | {missing: {}}
     assert judge_linearity(**kinds).answer is Answer.UNKNOWN
+
+
+def test_a_case_that_does_not_vary_has_no_say():
+    verdict = judge_linearity(
+        {"arx": evaluation(MIN=97.0, FULL=98.0, STILL=np.nan)}, {"narx": evaluation(MIN=99.0, FULL=99.0, STILL=np.nan)}
+    )
+    assert verdict.answer is Answer.LINEAR
+    assert "STILL" not in {case for row in verdict.rows for case in row.cases}
