@@ -17,13 +17,21 @@ async function main(bundle) {
     // At rest: the inputs of the first row, and the declared value of the output.
     const rest = { ...about.initialisation.values };
     about.inputs.forEach((channel, i) => (rest[channel.name] = rows[0][1 + i]));
-    const state = about.state.lines.flatMap((line) =>
-      Array(line.length).fill((rest[line.channel] - line.offset) / line.scale)
-    );
+    const state = new Float64Array(about.state.size);
+    for (const line of about.state.lines) {
+      state.fill((rest[line.channel] - line.offset) / line.scale, line.first, line.first + line.length);
+    }
+    for (const space of about.state.state_spaces ?? []) {
+      const { input_offset, input_scale } = about.scaling;
+      const scaled = about.inputs.map((_, i) => (rows[0][1 + i] - input_offset[i]) / input_scale[i]);
+      space.at_rest.forEach((row, i) => {
+        state[space.first + i] = row.reduce((sum, number, j) => sum + number * scaled[j], 0);
+      });
+    }
     const u = rows.flatMap((row) => row.slice(1, 1 + nInputs));
     const result = await session.run({
       u: new ort.Tensor("float64", Float64Array.from(u), [rows.length, 1, nInputs]),
-      state: new ort.Tensor("float64", Float64Array.from(state), [1, about.state.size]),
+      state: new ort.Tensor("float64", state, [1, about.state.size]),
     });
     let worst = 0;
     rows.forEach((row, i) => {

