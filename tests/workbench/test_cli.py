@@ -18,7 +18,7 @@ from sysid.workbench import cli
 from sysid.workbench.cli import run_cli
 
 SYSID = [str(Path(sys.executable).with_name("sysid"))]
-COMMANDS = ("run", "ingest", "simulate", "export", "report", "ui", "init")
+COMMANDS = ("run", "ingest", "simulate", "export", "promote", "report", "ui", "init")
 
 
 def test_help_is_quick() -> None:
@@ -145,9 +145,10 @@ def test_a_workspace_of_ones_own_from_first_to_last(tmp_path: Path) -> None:
     assert output.channel_names == ("pump", "level")
     np.testing.assert_array_equal(output["level"], bundle.model.simulate(inputs.columns(["pump"])))
 
-    exported = sysid(mine, "export", "tank", "--fit", "ARX", "--out", "linear")
+    exported = sysid(mine, "export", "tank", "--fit", "ARX", "--out", "linear", "--zip")
     assert (exported.returncode, exported.stderr) == (0, "")
-    assert read_bundle(mine / "linear").model.structure.label == "ARX [2; 2; 1]"
+    for bundle_path in (mine / "linear", mine / "linear.zip"):
+        assert read_bundle(bundle_path).model.structure.label == "ARX [2; 2; 1]"
     assert read_bundle(mine / "runs/tank/bundle").model.structure.label == "NARX 2/2/5"
 
     (mine / "runs/tank/report/index.html").unlink()
