@@ -119,23 +119,39 @@ def run(race: Race) -> list[Candidate]:
     seen: list[Candidate] = []
     total = _work(training.starts, rungs)
     # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(min(training.workers, training.starts)) as pool:
+    with threadpool_limits(1, "blas"):
         for rung, share in enumerate(rungs):
             before = rungs[rung - 1] if rung else 0.0
-            seconds = training.max_time_s * (share - before) * pool._max_workers / total
-            futures = [pool.submit(_advance, race, n, latest.get(n), share, seconds) for n in numbers]
-            try:
-                done = [future.result() for future in futures]
-            except KeyboardInterrupt:
-                race.stop.set()
-                done = [future.result() for future in futures if not future.cancel()]
-            seen += [candidate for candidate in done if candidate is not latest.get(candidate.number)]
-            latest = {candidate.number: candidate for candidate in done}
+            seconds = training.max_time_s * (share - before) * training.workers / total
+            reached = _rung(race, numbers, latest, share, seconds)
+            seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
             if race.stop.is_set():
                 break
-            done.sort(key=lambda candidate: (not candidate.solution.status.usable, candidate.loss))
-            numbers = [candidate.number for candidate in done[: max(1, (len(done) + 1) // 2)]]
+            latest = reached
+            order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
+            numbers = [candidate.number for candidate in order[: max(1, (len(order) + 1) // 2)]]
     return seen
+
+
+def _rung(
+    race: Race, numbers: Sequence[int], latest: dict[int, Candidate], share: float, seconds: float
+) -> dict[int, Candidate]:
+    """One rung of the race. The workers leave what they reach in a table: an interruption at any moment loses none."""
+    reached: dict[int, Candidate] = {}
+
+    def work(number: int) -> None:
+        if not race.stop.is_set():
+            reached[number] = _advance(race, number, latest.get(number), share, seconds)
+
+    with ThreadPoolExecutor(min(race.training.workers, len(numbers))) as pool:  # leaving it waits for those that run
+        try:
+            for future in [pool.submit(work, number) for number in numbers]:
+                future.result()
+        except KeyboardInterrupt:
+            race.stop.set()
+    if not reached and not latest:  # interrupted before anything had begun: the start as it is
+        reached[numbers[0]] = _advance(race, numbers[0], None, share, seconds)
+    return reached
 
 
 def rank(candidate: Candidate, choose_by: str) -> tuple[bool, float]:
