@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,20 @@ from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Run
 from sysid.export.surrogate import Surrogate
 
 
+@dataclass(frozen=True, kw_only=True)
 class CExporter(AbstractExporter):
-    """Writes a source and its header, which compute in float64, or in float32 when a macro is set."""
+    """Writes a source and its header, which compute in float64, or in float32 when a macro is set.
 
-    name = "c"
+    Args:
+        name: Name in the table.
+        dtype: The number type in which the source is run against the model; the files are the same for both.
+    """
+
+    name: str = "c"
+    dtype: str = "float64"
 
     def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
-        """Write both files. They are listed once for each number type, because each is run against the model."""
+        """Write both files."""
         from sysid.export.c_source import c_files
 
         for name, text in c_files(surrogate).items():
@@ -33,17 +41,15 @@ class CExporter(AbstractExporter):
             "n_outputs": len(surrogate.outputs),
             "float32_macro": f"{prefix.upper()}_FLOAT",
         }
-        return tuple(
-            ExportedFile(
-                name=f"{prefix}.c",
-                format=self.name,
-                kind=Kind.SEQUENCE,
-                dtype=dtype,
-                details=details,
-                companions=(f"{prefix}.h",),
-            )
-            for dtype in ("float64", "float32")
+        file = ExportedFile(
+            name=f"{prefix}.c",
+            format=self.name,
+            kind=Kind.SEQUENCE,
+            dtype=self.dtype,
+            details=details,
+            companions=(f"{prefix}.h",),
         )
+        return (file,)
 
     def load(self, file: ExportedFile, folder: Path) -> Runner:
         """Build the source with this machine's compiler, and call it."""

@@ -18,6 +18,7 @@ EXPORTERS: dict[str, AbstractExporter] = {
         TorchScriptExporter(),
         TorchExportExporter(),
         CExporter(),
+        CExporter(name="c-float32", dtype="float32"),
         FmuExporter(name="fmi2", version=2),
         FmuExporter(name="fmi3", version=3),
     )

@@ -61,7 +61,7 @@ def write_verification(
     for network in networks[:1]:
         python = values | {"onnx": network.name, "dtype": network.dtype, "tolerance": repr(tolerances[network.dtype])}
         texts["verify.py"] = (render("verify.py.j2", **python), f"runs {network.name} over the records")
-    if any(file.format == "c" for file in files):
+    if any(file.name.endswith(".c") for file in files):
         texts["verify.c"] = (render("verify.c.j2", **values), f"runs {surrogate.identifier}.c over the records")
     (folder / FOLDER).mkdir()
     for name, (text, _) in texts.items():

@@ -214,11 +214,10 @@ def sizes(folder: Path) -> None:
         for name in ("c", "fmi2", "fmi3", "onnx"):
             for file in EXPORTERS[name].write(surrogate, folder):
                 stack = ""
-                if name == "c" and file.dtype == "float64":
+                if name == "c":
                     macro = f"-D{surrogate.identifier.upper()}_FLOAT"
                     stack = f"{stack_bytes(surrogate, folder)}, {stack_bytes(surrogate, folder, macro)}"
-                if file.dtype == "float64":
-                    say(label, file.name, (folder / file.name).stat().st_size, stack)
+                say(label, file.name, (folder / file.name).stat().st_size, stack)
     middle, _, _, _, worst = time_c(cascade(), folder, excitation(cascade(), 1)[:, 0], "-O2")
     say("combined cascade, C -O2", "one step [us]", f"{middle / 1e3 / SAMPLES:.3f}", f"most {worst / 1e3:.1f} us")
 

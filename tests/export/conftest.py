@@ -135,7 +135,7 @@ ROWS = {
     "TorchScript, sequence": Row(format="torchscript", name="sequence.torchscript.pt"),
     "torch.export, step": Row(format="torch-export", name="step.pt2"),
     "C": Row(format="c", name="{name}.c"),
-    "C, float": Row(format="c", name="{name}.c", dtype="float32", tolerance=1e-3),
+    "C, float": Row(format="c-float32", name="{name}.c", dtype="float32", tolerance=1e-3),
     "FMI 2.0": Row(format="fmi2", name="{name}.fmi2.fmu"),
     "FMI 3.0": Row(format="fmi3", name="{name}.fmi3.fmu"),
 }

@@ -241,7 +241,7 @@ def test_what_is_not_a_bundle_is_never_replaced(fit, traces, start, tmp_path, ki
 def test_unknown_format_is_refused_with_those_there_are(fit, traces, start, tmp_path):
     with pytest.raises(
         ConfigError,
-        match=r"(?s)unknown export format.*one of onnx, onnx-float32, torchscript, torch-export, c, fmi2, fmi3.*onyx",
+        match=r"(?s)unknown export format.*one of onnx, onnx-float32, torchscript, torch-export, c, c-float32, fmi2, fmi3.*onyx",
     ):
         export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onyx"])
 
@@ -259,3 +259,12 @@ def test_importing_the_package_imports_no_heavy_library():
     )
     done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_model_too_fine_for_float_is_still_exported_in_double(fit, traces, start, tmp_path, models):
+    fine = replace(fit, model=models["ARX, two inputs, dead times"]())
+    kept = export_bundle(fine, traces, tmp_path / "b", start=start, formats=["c"], tolerance_float32=1e-9)
+    assert [(file.name, file.dtype) for file in kept.files] == [("bp_ar_to_bc.c", "float64")]
+    assert "float, which was not compared with the model" in (tmp_path / "b" / "MODEL_CARD.md").read_text("utf-8")
+    with pytest.raises(ParityError, match=r"bp_ar_to_bc\.c does not reproduce"):
+        export_bundle(fine, traces, tmp_path / "b", start=start, formats=["c", "c-float32"], tolerance_float32=1e-9)

@@ -191,7 +191,7 @@ def test_channel_names_cannot_end_a_comment(models, declared, tmp_path):
 
 def test_without_a_compiler_the_user_is_told(models, declared, tmp_path, monkeypatch):
     exporter, surrogate = EXPORTERS["c"], declared(models["ARX"]())
-    (file, _) = exporter.write(surrogate, tmp_path)
+    (file,) = exporter.write(surrogate, tmp_path)
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(ConfigError, match=r"(?s)need a C compiler.*no-such-compiler.*install gcc"):
         exporter.load(file, tmp_path)
@@ -206,7 +206,7 @@ def test_a_source_that_does_not_compile_is_shown_with_the_compilers_words(tmp_pa
 def test_a_long_memory_is_moved_not_copied_line_by_line(narx, declared, inputs, tmp_path):
     model = narx(NARX(input_delays=[1, 2, 4, 64], output_delays=[1, 32], neurons=3))
     surrogate, exporter = declared(model), EXPORTERS["c"]
-    (file, _) = exporter.write(surrogate, tmp_path)
+    (file,) = exporter.write(surrogate, tmp_path)
     u = inputs(300, 2)
     run = exporter.load(file, tmp_path)(u[:, np.newaxis], surrogate.at_rest(u[0])[np.newaxis])
     np.testing.assert_allclose(run.output[:, 0], surrogate.simulate(u), rtol=0.0, atol=1e-9)

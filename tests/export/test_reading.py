@@ -29,7 +29,7 @@ FILES = [
 
 @pytest.fixture(scope="module")
 def original(fit, traces, start, tmp_path_factory):
-    formats = ["onnx", "onnx-float32", "torchscript", "c", "fmi2", "fmi3"]
+    formats = ["onnx", "onnx-float32", "torchscript", "c", "c-float32", "fmi2", "fmi3"]
     return export_bundle(fit, traces, tmp_path_factory.mktemp("original") / "b", start=start, formats=formats)
 
 

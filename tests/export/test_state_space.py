@@ -126,7 +126,7 @@ def test_a_bundle_carries_one(model, traces, tmp_path) -> None:
     assert done.stdout.count(": as recorded") == 3
 
 
-@pytest.mark.parametrize("name", ["c", "fmi2", "fmi3"])
+@pytest.mark.parametrize("name", ["c", "c-float32", "fmi2", "fmi3"])
 def test_formats_with_delay_lines_refuse_and_say_what_to_use(model, name, tmp_path) -> None:
     with pytest.raises(ConfigError, match="onnx, torchscript"):
         EXPORTERS[name].write(Surrogate.of(model, RANGES), tmp_path)
