@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ChannelError, ConfigError, ParityError
-from sysid.export import export_bundle, read_bundle
+from sysid.export import EXPORTERS, export_bundle, read_bundle
 from sysid.models import NARX, History
 from sysid.traces import TraceSet
 from sysid.validation import evaluate
