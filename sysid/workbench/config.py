@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
 
@@ -114,6 +114,7 @@ class PipelineConfig(BaseModel):
     """A pipeline.
 
     Args:
+        kind: ``fits``; other kinds of pipelines are in :mod:`sysid.workbench.kinds`.
         name: Name of the run folder; letters, digits, dots, dashes and underscores.
         description: What it is for.
         data: Name of a data set, or path of its ``dataset.yaml``.
@@ -129,6 +130,7 @@ class PipelineConfig(BaseModel):
 
     model_config = STRICT
 
+    kind: Literal["fits"] = "fits"
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
     description: str = ""
     data: str

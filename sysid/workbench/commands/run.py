@@ -9,6 +9,7 @@ from rich.console import Console
 
 from sysid.workbench.config import find_pipeline, read_pipeline
 from sysid.workbench.events import Warned, Watcher
+from sysid.workbench.kinds import KINDS, RunRequest, kind_of
 from sysid.workbench.pipeline import run_pipeline
 from sysid.workbench.screen import LogFile, Screen, table_of_fits
 from sysid.workbench.tracking import Tracker
@@ -42,9 +43,26 @@ def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool)
     Raises:
         UserError: If the pipeline, its data or its options cannot be used.
     """
-    read = read_pipeline(find_pipeline(pipeline))
+    path = find_pipeline(pipeline)
+    request = RunRequest(path=path, typed=pipeline, fresh=fresh, out=out, tracking=tracking)
+    return KINDS[kind_of(path)].load_runner()(request)
+
+
+def run_fits(request: RunRequest) -> int:
+    """Run a pipeline of kind ``fits``.
+
+    Args:
+        request: What was asked.
+
+    Returns:
+        Exit code, as :func:`run_command`.
+
+    Raises:
+        UserError: If the pipeline, its data or its options cannot be used.
+    """
+    read, out, tracking = read_pipeline(request.path), request.out, request.tracking
     folder = out or Path("runs") / read.config.name
-    words = ["sysid", "run", pipeline, *(["--out", str(out)] if out else [])]
+    words = ["sysid", "run", request.typed, *(["--out", str(out)] if out else [])]
     target = console()
     screen, log = Screen(target), LogFile()
     watchers: list[Watcher] = [screen, log]
@@ -56,7 +74,7 @@ def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool)
     tracker = Tracker.of_workspace(Path.cwd(), warn) if tracking else None
     watchers += [tracker] if tracker else []
     try:
-        results = run_pipeline(read, folder, command=shlex.join(words), fresh=fresh, watchers=watchers)
+        results = run_pipeline(read, folder, command=shlex.join(words), fresh=request.fresh, watchers=watchers)
     finally:
         screen.close()
     target.print()

@@ -1,0 +1,101 @@
+"""Kinds of pipelines: what the ``kind`` at the top of a pipeline's YAML means, and who runs it.
+
+One row a kind, in :data:`KINDS`. A row names its configuration and its runner as ``module:attribute``, so that nothing
+is imported before it is used.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sysid.errors import ConfigError
+from sysid.yaml_files import read_yaml
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+DEFAULT = "fits"
+"""The kind of a pipeline that names none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRequest:
+    """What a person asked of ``sysid run``.
+
+    Args:
+        path: The pipeline's file.
+        typed: The pipeline as it was typed, for the command that makes the run again.
+        fresh: Do everything again.
+        out: The run folder; ``None`` for ``runs/<name>``.
+        tracking: Whether the run is tracked in MLflow.
+    """
+
+    path: Path
+    typed: str
+    fresh: bool = False
+    out: Path | None = None
+    tracking: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """One kind of pipeline.
+
+    Args:
+        config: Its pydantic model, as ``module:attribute``.
+        runner: A function of a :class:`RunRequest` that gives the exit code, as ``module:attribute``.
+    """
+
+    config: str
+    runner: str
+
+    def load_config(self) -> type[BaseModel]:
+        """The pydantic model."""
+        loaded: type[BaseModel] = _load(self.config)
+        return loaded
+
+    def load_runner(self) -> Callable[[RunRequest], int]:
+        """The runner."""
+        loaded: Callable[[RunRequest], int] = _load(self.runner)
+        return loaded
+
+
+KINDS: dict[str, Kind] = {
+    DEFAULT: Kind(config="sysid.workbench.config:PipelineConfig", runner="sysid.workbench.commands.run:run_fits"),
+}
+"""The kinds by name."""
+
+
+def kind_of(path: Path) -> str:
+    """The kind of a pipeline, read from its file.
+
+    Args:
+        path: The YAML file.
+
+    Returns:
+        A key of :data:`KINDS`.
+
+    Raises:
+        ConfigError: If the file cannot be read, or there is no such kind.
+    """
+    name = read_yaml(path).get("kind", DEFAULT)
+    if not isinstance(name, str) or name not in KINDS:
+        near = difflib.get_close_matches(str(name), KINDS, n=1)
+        raise ConfigError(
+            "unknown kind of pipeline",
+            where=f"{path}, kind",
+            expected=f"one of {', '.join(KINDS)}",
+            got=repr(name),
+            remedy=f"did you mean {near[0]}?" if near else f"leave kind out for a pipeline of {DEFAULT}",
+        )
+    return name
+
+
+def _load(address: str) -> Any:
+    module, _, attribute = address.partition(":")
+    return getattr(import_module(module), attribute)

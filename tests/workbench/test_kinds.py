@@ -1,0 +1,33 @@
+"""Kinds of pipelines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from sysid.errors import ConfigError
+from sysid.workbench.kinds import KINDS, kind_of
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_has_a_strict_configuration_and_a_runner(name: str) -> None:
+    config = KINDS[name].load_config()
+    assert issubclass(config, BaseModel)
+    assert config.model_config["extra"] == "forbid"
+    assert callable(KINDS[name].load_runner())
+
+
+@pytest.mark.parametrize(("text", "kind"), [("name: a", "fits"), ("kind: fits\nname: a", "fits")])
+def test_a_pipeline_without_a_kind_fits(tmp_path: Path, text: str, kind: str) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text(text, encoding="utf-8")
+    assert kind_of(file) == kind
+
+
+def test_a_misspelt_kind_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("kind: fit\nname: a", encoding="utf-8")
+    with pytest.raises(ConfigError, match="did you mean fits"):
+        kind_of(file)
