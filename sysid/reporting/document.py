@@ -22,6 +22,7 @@ from sysid.reporting.tables import (
     Table,
     accuracy_table,
     case_columns,
+    coverage_table,
     data_table,
     export_table,
     figure_cell,
@@ -69,6 +70,9 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         judged = scored_cases(best) or best.cases
         moments = worst_moments({name: signals[best.slug][name] for name in judged}, 5)
     sections = [_accuracy(results, published)]
+    intervals = coverage_table(results)
+    if intervals is not None:
+        sections.append(Section(anchor="intervals", title="How sure the networks are", parts=(intervals,)))
     columns = _columns(results)
     if best is not None:
         sections.append(_best(best, signals[best.slug], moments, columns))
@@ -141,12 +145,20 @@ def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int
     for index, (name, case) in enumerate(fit.cases.items()):
         signal = signals[name]
         figure = figures.case_figure(
-            signal.time, signal.target, signal.simulated, title=name, label=output, unit=fit.unit, columns=columns
+            signal.time,
+            signal.target,
+            signal.simulated,
+            title=name,
+            label=output,
+            unit=fit.unit,
+            columns=columns,
+            interval=None if signal.low is None or signal.high is None else (signal.low, signal.high),
         )
         caption = (
             f"{fit.name} on {name} ({case.role.value}): target and free run above, error below. "
             f"mse {number(case.free_run.mse, missing='diverged')} {fit.unit}², largest error "
             f"{number(case.free_run.max_abs_error, missing='diverged')} {fit.unit}."
+            f"{'' if signal.low is None else ' Shaded: the 95 % interval of the free run.'}"
         )
         parts.append(picture(figure, f"{fit.name} on {name}", caption, f"case-{identifier(fit.slug)}-{index}"))
     return parts

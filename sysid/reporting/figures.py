@@ -48,6 +48,7 @@ def case_figure(
     label: str,
     unit: str,
     predicted: NDArray[np.float64] | None = None,
+    interval: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     columns: int = 450,
 ) -> Figure:
     """One model on one case: target and free run over time, and the error below.
@@ -60,6 +61,8 @@ def case_figure(
         label: What the output is, for the axis.
         unit: Its unit.
         predicted: One step ahead, shape ``(n_samples,)``; left out if not given.
+        interval: Lower and upper end of the free run's 95 % interval, drawn around the error's zero; left out if not
+            given.
         columns: How finely lines are drawn: up to four points in each of so many columns.
 
     Returns:
@@ -76,6 +79,8 @@ def case_figure(
             _line(above, time, predicted, columns, **_ONE_STEP, label="one step ahead")
             _line(below, time, predicted - target, columns, **_ONE_STEP)
         _line(above, time, simulated, columns, **_FREE_RUN, label="free run")
+        if interval is not None:
+            _band(below, time, simulated - interval[1], simulated - interval[0], columns)
         _line(below, time, simulated - target, columns, color=PALETTE[0], linewidth=1.0)
         below.axhline(0.0, color=TARGET, linewidth=0.6)
         _limit(above, below, target, simulated)
@@ -90,6 +95,16 @@ def case_figure(
 
 def _line(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], columns: int, **style: Any) -> None:
     axes.plot(*thin(x, np.where(np.isfinite(y), y, np.nan), columns), **style)
+
+
+def _band(
+    axes: Axes, x: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64], columns: int
+) -> None:
+    """A shaded band, in each of so many stretches as wide as at its widest place there."""
+    edges = np.unique(np.linspace(0, len(x), min(columns // 2, len(x)), endpoint=False).astype(int))
+    bottom, top = np.minimum.reduceat(low, edges), np.maximum.reduceat(high, edges)
+    if np.isfinite(bottom).all() and np.isfinite(top).all():
+        axes.fill_between(x[edges], bottom, top, color=PALETTE[0], alpha=0.18, linewidth=0.0, step="post")
 
 
 def _limit(above: Axes, below: Axes, target: NDArray[np.float64], simulated: NDArray[np.float64]) -> None:

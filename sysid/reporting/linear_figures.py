@@ -87,11 +87,11 @@ def step_figure(
             y = np.squeeze(response.outputs)
             every = -(-n // SHOWN)
             if len(view.B) > 1:
-                low, high = np.percentile(_step_responses(view, n), BAND, axis=0)[:, ::every]
-                place.fill_between(time[::every], low, high, color=BAND_COLOUR, label="95 %")
                 # A draw that is not stable must not take the picture with it.
                 room = max(float(np.ptp(y)), 1e-12)
-                place.set_ylim(max(place.get_ylim()[0], y.min() - room), min(place.get_ylim()[1], y.max() + room))
+                band = np.percentile(_step_responses(view, n), BAND, axis=0)[:, ::every]
+                low, high = np.clip(band, y.min() - room, y.max() + room)
+                place.fill_between(time[::every], low, high, color=BAND_COLOUR, label="95 %")
             shape = "steps-post" if every == 1 else "default"
             place.plot(
                 time[::every], y[::every], drawstyle=shape, color=PALETTE[0], label=f"{view.name}, 1 {view.unit}"

@@ -61,6 +61,15 @@ class PublishedRecord(_Record):
     ratio: Number = Field(description="Our figure divided by the published one.")
 
 
+class CoverageRecord(_Record):
+    """How often an interval of the output holds what was measured."""
+
+    level: Number = Field(description="How often it should, 0 to 1.")
+    share: Number = Field(description="How often it does, 0 to 1.")
+    share_before_spread: Number = Field(description="How often the interval from the estimation records alone does.")
+    mean_half_width: Number = Field(description="In the output's unit.")
+
+
 class CaseRecord(_Record):
     """One fit on one case."""
 
@@ -70,6 +79,9 @@ class CaseRecord(_Record):
     run_time_s: Number = Field(description="Seconds that the free run took: median of repeats, warm.")
     n_samples: int = Field(ge=1)
     simulated_s: Number = Field(description="Length of the case in seconds.")
+    coverage: dict[str, CoverageRecord] | None = Field(
+        default=None, description="Of the output's interval, free_run and one_step, where the fit has a posterior."
+    )
     published: dict[str, PublishedRecord] | None = Field(
         default=None, description="By kind of figure: free_run, one_step (mse) or run_time."
     )

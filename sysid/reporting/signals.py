@@ -14,6 +14,7 @@ from sysid.errors import ConfigError
 
 SIGNALS_FILE: Final = "signals.npz"
 _PARTS: Final = ("time", "target", "simulated", "predicted")
+_INTERVAL: Final = ("low", "high")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,12 +26,16 @@ class CaseSignals:
         target: Measured output, shape ``(n_samples,)``.
         simulated: Free run, shape ``(n_samples,)``.
         predicted: One step ahead, shape ``(n_samples,)``.
+        low: Lower end of the free run's interval, shape ``(n_samples,)``; ``None`` where there is none.
+        high: Upper end of it.
     """
 
     time: NDArray[np.float64]
     target: NDArray[np.float64]
     simulated: NDArray[np.float64]
     predicted: NDArray[np.float64]
+    low: NDArray[np.float64] | None = None
+    high: NDArray[np.float64] | None = None
 
     @property
     def error(self) -> NDArray[np.float64]:
@@ -67,7 +72,8 @@ def _case(stored: np.lib.npyio.NpzFile, case: str, path: Path) -> CaseSignals:
     missing = [f"{case}/{part}" for part in _PARTS if f"{case}/{part}" not in stored.files]
     if missing:
         raise _damaged(path, ", ".join(missing), f"arrays of {_present(stored)}")
-    parts = {part: np.asarray(stored[f"{case}/{part}"], dtype=np.float64) for part in _PARTS}
+    kept = [*_PARTS, *(part for part in _INTERVAL if f"{case}/{part}" in stored.files)]
+    parts = {part: np.asarray(stored[f"{case}/{part}"], dtype=np.float64) for part in kept}
     shapes = {array.shape for array in parts.values()}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
         raise _damaged(path, f"arrays of case {case} with one and the same length", sorted(shapes))

@@ -11,7 +11,7 @@ from scipy import signal
 from sysid.estimation import FitResult, TransferFunctionTraining, fit_transfer_function
 from sysid.models import Mapping, TransferFunction
 from sysid.reporting.linear_figures import bode_figure, pole_zero_figure, step_figure
-from sysid.reporting.style import svg
+from sysid.reporting.svg import svg
 from tests.estimation.linear_systems import steps, trace_of
 
 
