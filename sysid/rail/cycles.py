@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
+from sysid.rail.ato import AtoSettings, CardDriver
 from sysid.rail.brake import ReferenceBrake
+from sysid.rail.card import STRAIGHT, CardCode, CardRow, TrackCard
 from sysid.rail.constants import KMH
 from sysid.rail.drive import AbstractDriver, Controls, Limits, Observation, Run, drive
 from sysid.rail.motion import MovingTrain
@@ -92,6 +94,68 @@ class CycleBrakingDriver(AbstractDriver):
         if self._reduction > 0.0 or excess > 0.0:
             return 0
         return min(self._highest, int(np.ceil(-excess / s.band * self._highest)))
+
+
+class NotchAndBrakeDriver(AbstractDriver):
+    """Notches by the track card, dynamic brake among them; the air brake by cycles where that is not enough.
+
+    Args:
+        train: What it drives.
+        track: The line; its card is what the driver knows of it.
+        settings: Habits with the air brake; their target is the speed to hold.
+        seed: Of the hand.
+
+    Raises:
+        ConfigError: If the train has no notches.
+    """
+
+    def __init__(
+        self, *, train: Train, track: TrackProfile, settings: HabitSettings | None = None, seed: int = 0
+    ) -> None:
+        self.settings = settings or HabitSettings()
+        margin = AtoSettings().margin
+        card = card_of(track, limit=self.settings.target + margin)
+        self._notches = CardDriver(train=train, card=card, section=LINE, stop=np.inf, point=np.inf)
+        self._brake = CycleBrakingDriver(settings=self.settings, seed=seed)
+
+    def act(self, seen: Observation, most: int) -> Controls:
+        """Notch and handle for one sample: no power against the brake."""
+        handle = float(self._brake.act(seen, most).handle[0])
+        notch = int(self._notches.act(seen, most).notch[0])
+        return Controls.single(notch=min(notch, 0) if handle < self.settings.running else notch, handle=handle)
+
+
+LINE = "LINE"
+"""Section code of a card made from a line."""
+
+
+def card_of(track: TrackProfile, *, limit: float) -> TrackCard:
+    """The track card of a line.
+
+    Args:
+        track: The line, from position 0 on.
+        limit: Speed limit in m/s where the line has none.
+
+    Returns:
+        A card of one section.
+
+    Example:
+        >>> [row.value for row in card_of(TrackProfile.level(), limit=20.0).rows]
+        [0.0, 99999.0, 72.0]
+    """
+    rows: dict[tuple[CardCode, float], CardRow] = {}
+    for start, grade, curvature, allowed in zip(
+        np.maximum(track.starts, 0.0), track.grades, track.curvatures, track.speed_limits, strict=True
+    ):
+        values = {
+            CardCode.GRADE: 1000.0 * float(grade),
+            CardCode.CURVE: STRAIGHT if curvature == 0.0 else 1.0 / abs(float(curvature)),
+            CardCode.LIMIT: min(float(allowed), limit) / KMH,
+        }
+        for code, value in values.items():
+            # Of what lies before position 0 the last counts.
+            rows[code, float(start)] = CardRow(section=LINE, distance=float(start), code=code, value=value)
+    return TrackCard(rows=tuple(rows.values()))
 
 
 def rolling_line(seed: int, *, length: float = 40_000.0) -> TrackProfile:

@@ -48,15 +48,28 @@ def compare(scenarios: Mapping[str, Scenario], *, reference: MakeBrake, other: M
     Raises:
         ConfigError: If a brake does not fit the train.
     """
-    differences = {}
-    for name, scenario in scenarios.items():
-        trusted, judged = scenario.run(reference()), scenario.run(other())
-        differences[name] = Difference(
-            reference=consequence(scenario, trusted),
-            other=consequence(scenario, judged),
-            mse=cylinder_mse(trusted, judged),
-        )
-    return Comparison(differences=differences)
+    return Comparison(
+        differences={
+            name: difference(scenario, scenario.run(reference()), scenario.run(other()))
+            for name, scenario in scenarios.items()
+        }
+    )
+
+
+def difference(scenario: Scenario, trusted: Run, judged: Run) -> Difference:
+    """One run against another.
+
+    Args:
+        scenario: That both were made in.
+        trusted: With the reference.
+        judged: With the brake that is judged.
+
+    Returns:
+        The difference.
+    """
+    return Difference(
+        reference=consequence(scenario, trusted), other=consequence(scenario, judged), mse=cylinder_mse(trusted, judged)
+    )
 
 
 class ErringBrake(AbstractBrake):
@@ -110,51 +123,80 @@ class ErringBrake(AbstractBrake):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tolerable:
-    """How large an error may be before the consequence passes a limit.
+class Rung:
+    """What an error of one size does, in the worst of some scenarios.
 
     Args:
-        mse: The largest mean square error tried in psi2 for which it stays within the limit; NaN if none did.
-        tried: Mean square error and worst relative consequence of each size of error, in order.
+        size: Of the error in psi.
+        mse: Mean square error of the cylinder pressures that comes of it, in psi2: mean over the scenarios.
+        distance: Largest relative difference of the distance.
+        time: Of the time.
+        force: Of the largest coupler force.
     """
 
+    size: float
     mse: float
-    tried: tuple[tuple[float, float], ...]
+    distance: float
+    time: float
+    force: float
 
 
-def tolerable_mse(
-    scenarios: Mapping[str, Scenario],
-    *,
-    reference: MakeBrake,
-    sizes: Sequence[float],
-    figure: str = "distance",
-    limit: float = 0.01,
-    biased: bool = True,
-    seed: int = 0,
-) -> Tolerable:
-    """At what mean square error of the cylinder pressure a consequence falls under a limit.
+def error_rung(
+    scenarios: Mapping[str, Scenario], *, reference: MakeBrake, size: float, biased: bool = True, seed: int = 0
+) -> Rung:
+    """Run scenarios with a brake that errs by so much.
 
     Args:
         scenarios: By name.
         reference: Makes the trusted brake.
-        sizes: Of the error in psi, increasing.
-        figure: ``distance``, ``time`` or ``force``.
-        limit: Of its relative difference in the worst scenario.
+        size: Of the error in psi.
         biased: Whether the error is a bias of every car, the worst that an error of a size can be, or noise.
         seed: Of the noise.
 
     Returns:
-        The error.
+        What came of it.
+
+    Raises:
+        ConfigError: If the brake does not fit the train.
     """
-    tried = []
-    for size in sizes:
+    error = {"bias": size} if biased else {"noise": size}
+    comparison = compare(
+        scenarios, reference=reference, other=lambda: ErringBrake(reference(), **error, seed=seed)
+    )
+    return Rung(
+        size=size,
+        mse=float(np.mean([difference.mse for difference in comparison.differences.values()])),
+        distance=comparison.worst("distance"),
+        time=comparison.worst("time"),
+        force=comparison.worst("force"),
+    )
 
-        def erring(size: float = size) -> AbstractBrake:
-            error = {"bias": size} if biased else {"noise": size}
-            return ErringBrake(reference(), **error, seed=seed)
 
-        comparison = compare(scenarios, reference=reference, other=erring)
-        mse = float(np.mean([difference.mse for difference in comparison.differences.values()]))
-        tried.append((mse, comparison.worst(figure)))
-    within = [mse for mse, worst in tried if worst <= limit]
-    return Tolerable(mse=max(within, default=float("nan")), tried=tuple(tried))
+def tolerable_mse(ladder: Sequence[Rung], *, figure: str = "distance", limit: float = 0.01) -> float:
+    """At what mean square error a consequence passes a limit.
+
+    Args:
+        ladder: Rungs with rising errors.
+        figure: ``distance``, ``time`` or ``force``.
+        limit: Of its relative difference.
+
+    Returns:
+        In psi2, between the last rung up to which all are within the limit and the next, in proportion on logarithmic
+        scales; NaN if the first rung is beyond it, infinite if none is.
+
+    Example:
+        >>> rungs = [Rung(size=s, mse=s * s, distance=0.002 * s, time=0.0, force=0.0) for s in (1.0, 10.0)]
+        >>> tolerable_mse(rungs), tolerable_mse(rungs, figure="time")
+        (25.0, inf)
+    """
+    worst = [float(getattr(rung, figure)) for rung in ladder]
+    beyond = next((k for k, value in enumerate(worst) if value > limit), None)
+    if beyond is None:
+        return float("inf")
+    if beyond == 0:
+        return float("nan")
+    (low, high), (a, b) = worst[beyond - 1 : beyond + 1], (ladder[beyond - 1].mse, ladder[beyond].mse)
+    if low <= 0.0:
+        return a
+    share = np.log(limit / low) / np.log(high / low)
+    return float(round(np.exp(np.log(a) + share * np.log(b / a)), 12))

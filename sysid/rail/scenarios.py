@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.airbrake.command import EMERGENCY, Command
+from sysid.airbrake.command import Command
 from sysid.errors import ConfigError
 from sysid.rail.brake import AbstractBrake
-from sysid.rail.constants import KMH
-from sysid.rail.drive import Limits, Run, Schedule, drive
+from sysid.rail.drive import AbstractDriver, Limits, Run, Schedule, drive
 from sysid.rail.motion import MovingTrain, Peak
+from sysid.rail.tail_unit import TwoEndedBrake
 from sysid.rail.track import TrackProfile
 from sysid.rail.train import Train
 
@@ -27,12 +27,13 @@ class Scenario:
         name: Short.
         train: The vehicles.
         track: The line.
-        command: The handle.
+        command: The handle; where somebody drives, only its duration counts.
         speed: At the beginning in m/s.
         position: Of the first vehicle in m.
         notch: From a time in s on, rows of time and notch.
-        duration: Longest time in s; the run ends when the train stands.
-        until_still: Whether it ends then.
+        driver: Makes the one who sets handle and notch instead, by what the train does.
+        two_ended: Whether a two-way end-of-train device brakes the tail too.
+        until_still: Whether the run ends when the train stands.
     """
 
     name: str
@@ -42,6 +43,8 @@ class Scenario:
     speed: float
     position: float = 0.0
     notch: tuple[tuple[float, int], ...] = ((0.0, 0),)
+    driver: Callable[[], AbstractDriver] | None = None
+    two_ended: bool = False
     until_still: bool = True
 
     def run(self, brake: AbstractBrake) -> Run:
@@ -56,10 +59,6 @@ class Scenario:
         Raises:
             ConfigError: If the brake does not fit the train.
         """
-        handle = self.command.sampled(sample_time=brake.sample_time)
-        starts = [round(time / brake.sample_time) for time, _ in self.notch]
-        rows = np.searchsorted(starts, np.arange(len(handle)), side="right") - 1
-        notches = np.array([notch for _, notch in self.notch], dtype=np.int64)[np.maximum(rows, 0)]
         moving = MovingTrain(
             train=self.train,
             track=self.track,
@@ -67,8 +66,16 @@ class Scenario:
             position=self.position,
             sample_time=brake.sample_time,
         )
-        driver = Schedule(handle=handle, notch=notches, sample_time=brake.sample_time)
-        return drive(moving, brake, driver, Limits(duration=self.command.duration, until_still=self.until_still))
+        driver = self._schedule(brake.sample_time) if self.driver is None else self.driver()
+        limits = Limits(duration=self.command.duration, until_still=self.until_still)
+        return drive(moving, TwoEndedBrake(brake) if self.two_ended else brake, driver, limits)
+
+    def _schedule(self, sample_time: float) -> Schedule:
+        handle = self.command.sampled(sample_time=sample_time)
+        starts = [round(time / sample_time) for time, _ in self.notch]
+        rows = np.searchsorted(starts, np.arange(len(handle)), side="right") - 1
+        notches = np.array([notch for _, notch in self.notch], dtype=np.int64)[np.maximum(rows, 0)]
+        return Schedule(handle=handle, notch=notches, sample_time=sample_time)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,71 +166,6 @@ def consequence(scenario: Scenario, run: Run) -> Consequence:
         clock=motion.time,
         speed=run.speed,
     )
-
-
-def _command(*rows: tuple[float, float], duration: float) -> Command:
-    return Command.from_rows([list(row) for row in rows], duration=duration)
-
-
-FULL_SERVICE, HALF_SERVICE, RUNNING = 64.2, 77.0, 90.0
-"""Handle positions in psi gauge: the dissertation's full service, half of its reduction, released."""
-
-
-def standard_scenarios(train: Train, *, speed: float = 80.0 * KMH) -> Mapping[str, Scenario]:
-    """The scenarios of the consequence report.
-
-    Stops on the level (full service, emergency, half service), over a crest, through a sag and in a curve, and an
-    application that is released and made again. All begin five seconds after the record.
-
-    Args:
-        train: The vehicles.
-        speed: At the beginning in m/s.
-
-    Returns:
-        Scenarios by name.
-
-    Example:
-        >>> from sysid.rail.train import heavy_haul
-        >>> sorted(standard_scenarios(heavy_haul(pairs=1)))[:3]
-        ['crest, full service', 'curve, full service', 'emergency']
-    """
-    level, length = TrackProfile.level(), train.length
-    crest = TrackProfile.from_steps("crest", grade=[(-4000.0, 0.008), (0.0, -0.008)])
-    sag = TrackProfile.from_steps("sag", grade=[(-4000.0, -0.008), (0.0, 0.008)])
-    curve = TrackProfile.from_steps("curve", curvature=[(0.0, 1.0 / 300.0), (600.0, 0.0)])
-    full = _command((0.0, RUNNING), (5.0, FULL_SERVICE), duration=400.0)
-    made = [
-        Scenario(name="full service", train=train, track=level, command=full, speed=speed),
-        Scenario(
-            name="emergency",
-            train=train,
-            track=level,
-            command=_command((0.0, RUNNING), (5.0, EMERGENCY), duration=400.0),
-            speed=speed,
-        ),
-        Scenario(
-            name="half service",
-            train=train,
-            track=level,
-            command=_command((0.0, RUNNING), (5.0, HALF_SERVICE), duration=600.0),
-            speed=speed,
-        ),
-        Scenario(
-            name="release and reapply",
-            train=train,
-            track=level,
-            command=_command(
-                (0.0, RUNNING), (5.0, HALF_SERVICE), (35.0, RUNNING), (95.0, FULL_SERVICE), duration=600.0
-            ),
-            speed=speed,
-        ),
-        Scenario(
-            name="crest, full service", train=train, track=crest, command=full, speed=speed, position=0.25 * length
-        ),
-        Scenario(name="sag, full service", train=train, track=sag, command=full, speed=speed, position=0.25 * length),
-        Scenario(name="curve, full service", train=train, track=curve, command=full, speed=speed),
-    ]
-    return {scenario.name: scenario for scenario in made}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

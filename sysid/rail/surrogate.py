@@ -15,10 +15,11 @@ from sysid.errors import ConfigError
 from sysid.models import AbstractModel, Recursion
 from sysid.rail import kernel_bank
 from sysid.rail.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
+from sysid.rail.equalising import equalising_from_handle
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
 
-COMMAND, TAIL_VENT, SPEED, CYLINDER = "STP", "TV", "V", "BC"
-"""Channels that the train provides (psi gauge, m2, m/s), and the one that it wants (psi gauge)."""
+COMMAND, TAIL_VENT, SPEED, PIPE, CYLINDER = "STP", "TV", "V", "BP", "BC"
+"""Channels that the train provides (psi gauge, m2, m/s), the pipe, and the one that the train wants (psi gauge)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,7 +128,9 @@ class SurrogateBrake(AbstractBrake):
     """A chain of fitted stages for every valve of a train: ``STP -> BP``, ``BP -> AR``, ``BP+AR -> BC`` or shorter.
 
     An input is the command (``STP``), the tail vent (``TV``), the speed (``V``) or the output of an earlier stage. The
-    last stage gives ``BC``, in psi gauge, as the data sets have it.
+    last stage gives ``BC``, in psi gauge, as the data sets have it. Where a stage gives ``BP``, the first and the last
+    valve's are the pipe at the head and at the tail, and the equalising reservoir follows the handle as in the
+    reference, so that a two-way end-of-train device can read them.
 
     Args:
         stages: In order.
@@ -164,6 +167,7 @@ class SurrogateBrake(AbstractBrake):
             )
         self.sample_time, self.vehicles, self.consist = stages[0].models[0].sample_time, consist.vehicles, consist
         self._columns = valve_of_vehicle(consist)
+        self._equalising = consist.running_pressure
         self._knows_tail = any(TAIL_VENT in stage.models[0].mapping.inputs for stage in stages)
 
     def advance(self, command: NDArray[np.float64], *, speed: Signal = 1.0, tail_vent: Signal = 0.0) -> BrakeOutput:
@@ -184,7 +188,21 @@ class SurrogateBrake(AbstractBrake):
             )
             for name, value in given.items()
         }
-        return BrakeOutput(cylinders=_cylinders(self._banks, signals, self._columns))
+        cylinders = _cylinders(self._banks, signals, self._columns)
+        if PIPE not in signals:
+            return BrakeOutput(cylinders=cylinders)
+        pipe = signals[PIPE] * PSI_IN_PA
+        return BrakeOutput(
+            cylinders=cylinders, equalising=self._equalise(command), head_pipe=pipe[:, 0], tail_pipe=pipe[:, -1]
+        )
+
+    def _equalise(self, command: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The equalising reservoir, which the next chunk goes on from."""
+        levels = equalising_from_handle(
+            np.concatenate([[self._equalising], np.asarray(command, dtype=np.float64)]), self.sample_time
+        )
+        self._equalising = float(levels[-1])
+        return levels[1:] * PSI_IN_PA
 
 
 def _cylinders(
@@ -206,37 +224,41 @@ VALVE_CHANNELS = {"BP": "pipe", "AR": "auxiliary", "ER": "emergency"}
 
 
 class ValveSurrogateBrake(AbstractBrake):
-    """Surrogate valves on the reference pipe: each car's own pressures go into a model that gives its cylinder.
+    """Surrogate valves on the reference pipe: each car's own pressures go into models that give its cylinder.
 
-    The way is one: the reservoirs are the reference's, emptied by its cylinders. So the error of the valve model is
-    seen alone, at every car.
+    The way is one: the pipe, and a reservoir that no stage gives, are the reference's, emptied by its valves. So the
+    error of the valve's models is seen alone, at every car.
 
     Args:
-        stage: From ``BP``, ``AR`` and ``ER``, or some of them, to ``BC``; one model for all cars or one per car.
+        stages: In order; the last gives ``BC``, the others a reservoir. Inputs are ``BP``, ``AR`` and ``ER``, the
+            reference's or an earlier stage's. One model for all cars or one per car in each.
         consist: The train.
         variant: The reading of the reference.
         time_step: Of the reference in s.
 
     Raises:
-        ConfigError: If the stage takes or gives another channel.
+        ConfigError: If a stage takes or gives another channel.
     """
 
-    def __init__(self, *, stage: Stage, consist: Consist, variant: Variant = PHYSICAL, time_step: float = 1e-3) -> None:
-        model = stage.models[0]
-        if not set(model.mapping.inputs) <= set(VALVE_CHANNELS) or model.mapping.output != CYLINDER:
-            raise ConfigError(
-                "not a model of a valve",
-                where=str(model.mapping),
-                expected=f"inputs among {', '.join(VALVE_CHANNELS)} and the output {CYLINDER}",
-                got=str(model.mapping),
-            )
-        rest = [consist.running_pressure] * len(model.mapping.inputs)
-        self._bank = ModelBank(stage=stage, cars=consist.pairs, rest_inputs=rest)
-        self.sample_time, self.vehicles, self.consist = model.sample_time, consist.vehicles, consist
+    def __init__(
+        self, *, stages: Sequence[Stage], consist: Consist, variant: Variant = PHYSICAL, time_step: float = 1e-3
+    ) -> None:
+        _check_valve(stages)
+        sample_time = stages[0].models[0].sample_time
+        self.sample_time, self.vehicles, self.consist = sample_time, consist.vehicles, consist
+        known: dict[str, float] = {}
+        self._banks, self._measured = [], []
+        for stage in stages:
+            mapping = stage.models[0].mapping
+            for name in mapping.inputs:
+                if name not in known:
+                    known[name] = consist.running_pressure
+                    self._measured.append(name)
+            rest = [known[name] for name in mapping.inputs]
+            self._banks.append(ModelBank(stage=stage, cars=consist.pairs, rest_inputs=rest))
+            known[mapping.output] = stage.models[0].rest_output
         nodes = [
-            Probe(quantity=VALVE_CHANNELS[name], node=node)
-            for name in model.mapping.inputs
-            for node in consist.valve_nodes
+            Probe(quantity=VALVE_CHANNELS[name], node=node) for name in self._measured for node in consist.valve_nodes
         ]
         ends = [Probe(quantity="pipe", node=node) for node in (1, 2, consist.vehicles)]
         self._train = BrakedTrain(
@@ -244,19 +266,33 @@ class ValveSurrogateBrake(AbstractBrake):
             variant=variant,
             probes=(*nodes, *ends),
             time_step=time_step,
-            sample_time=model.sample_time,
+            sample_time=sample_time,
         )
         self._columns = valve_of_vehicle(consist)
 
     def advance(self, command: NDArray[np.float64], *, speed: Signal = 1.0, tail_vent: Signal = 0.0) -> BrakeOutput:
         """Advance; see :meth:`AbstractBrake.advance`."""
         pressures = self._train.advance(command, speed=speed, tail_vent=tail_vent) - STANDARD_ATMOSPHERE_PA
-        pairs, names = self.consist.pairs, self._bank.mapping.inputs
+        pairs, names = self.consist.pairs, self._measured
         signals = {name: pressures[:, k * pairs : (k + 1) * pairs] / PSI_IN_PA for k, name in enumerate(names)}
         equalising, head, tail = pressures[:, len(names) * pairs :].T
         return BrakeOutput(
-            cylinders=_cylinders([self._bank], signals, self._columns),
+            cylinders=_cylinders(self._banks, signals, self._columns),
             equalising=equalising,
             head_pipe=head,
             tail_pipe=tail,
+        )
+
+
+def _check_valve(stages: Sequence[Stage]) -> None:
+    mappings = [stage.models[0].mapping for stage in stages]
+    reservoirs = set(VALVE_CHANNELS) - {PIPE}
+    good = bool(mappings) and mappings[-1].output == CYLINDER
+    good = good and all(set(mapping.inputs) <= set(VALVE_CHANNELS) for mapping in mappings)
+    if not good or not all(mapping.output in reservoirs for mapping in mappings[:-1]):
+        raise ConfigError(
+            "not a model of a valve",
+            where=", ".join(str(mapping) for mapping in mappings) or "no stage",
+            expected=f"inputs among {', '.join(VALVE_CHANNELS)}, reservoirs and in the end {CYLINDER} as outputs",
+            got=[str(mapping) for mapping in mappings],
         )

@@ -56,7 +56,7 @@ def cascade() -> SurrogateBrake:
 
 def valves() -> ValveSurrogateBrake:
     """One network for every valve, on the reference pipe."""
-    return ValveSurrogateBrake(stage=Stage(models=(network("BP+AR -> BC", seed=1),)), consist=CONSIST)
+    return ValveSurrogateBrake(stages=[Stage(models=(network("BP+AR -> BC", seed=1),))], consist=CONSIST)
 
 
 BRAKES: dict[str, Callable[[], AbstractBrake]] = {

@@ -18,7 +18,7 @@ from sysid.estimation import Training, fit_narx
 from sysid.models import NARX, AbstractModel, Mapping
 from sysid.rail.brake import ReferenceBrake
 from sysid.rail.judge import compare, tolerable_mse
-from sysid.rail.scenarios import standard_scenarios
+from sysid.rail.scenario_catalogue import standard_scenarios
 from sysid.rail.surrogate import Stage, ValveSurrogateBrake
 from sysid.rail.train import heavy_haul
 from sysid.traces import Channel, Trace
@@ -61,7 +61,7 @@ def main() -> None:
     comparison = compare(
         scenarios,
         reference=lambda: ReferenceBrake(consist=CONSIST),
-        other=lambda: ValveSurrogateBrake(stage=stage, consist=CONSIST),
+        other=lambda: ValveSurrogateBrake(stages=[stage], consist=CONSIST),
     )
     for name, d in comparison.differences.items():
         print(

@@ -68,7 +68,7 @@ BRAKES = {
         pressures=np.linspace(0.0, 4e5, 200)[:, None] * (np.arange(7) > 0), sample_time=0.1
     ),
     "surrogate": lambda: SurrogateBrake(stages=[pipe_models(), cylinder_models()], consist=TRAIN),
-    "valves": lambda: ValveSurrogateBrake(stage=Stage(models=(network(2, "BP+AR"),)), consist=TRAIN),
+    "valves": lambda: ValveSurrogateBrake(stages=[Stage(models=(network(2, "BP+AR"),))], consist=TRAIN),
     "network": lambda: SurrogateBrake(stages=[pipe_models(), Stage(models=(network(1),))], consist=TRAIN),
 }
 
@@ -160,7 +160,7 @@ def test_a_chain_is_its_models_one_after_the_other() -> None:
 def test_surrogate_valves_are_their_model_on_the_reference_s_pressures() -> None:
     command = Command.from_rows([[0, 90], [2, 70], [20, 70]])
     model = network(3, "BP+AR")
-    output = ValveSurrogateBrake(stage=Stage(models=(model,)), consist=TRAIN).advance(command.sampled(sample_time=0.1))
+    output = ValveSurrogateBrake(stages=[Stage(models=(model,))], consist=TRAIN).advance(command.sampled(sample_time=0.1))
     probes = tuple(Probe(quantity=quantity, node=5) for quantity in ("pipe", "auxiliary"))
     inputs = (simulate(command, consist=TRAIN, probes=probes).pressures - 101_325.0) / PSI_IN_PA
     alone = model.simulate(inputs, History.at_rest(inputs=[90.0, 90.0], output=0.0))
@@ -168,7 +168,7 @@ def test_surrogate_valves_are_their_model_on_the_reference_s_pressures() -> None
 
 
 def test_surrogate_valves_are_braked_from_both_ends_too() -> None:
-    brake = TwoEndedBrake(ValveSurrogateBrake(stage=Stage(models=(network(2, "BP+AR"),)), consist=TRAIN))
+    brake = TwoEndedBrake(ValveSurrogateBrake(stages=[Stage(models=(network(2, "BP+AR"),))], consist=TRAIN))
     brake.advance(np.repeat([90.0, 0.0], [5, 40]))
     assert brake.log[0][0].order is Order.EMERGENCY
 
@@ -176,7 +176,7 @@ def test_surrogate_valves_are_braked_from_both_ends_too() -> None:
 @pytest.mark.parametrize("mapping", ["STP", "BP+AR+PS"])
 def test_a_model_that_is_none_of_a_valve_is_refused(mapping: str) -> None:
     with pytest.raises(ConfigError, match="model of a valve"):
-        ValveSurrogateBrake(stage=Stage(models=(network(1, mapping),)), consist=TRAIN)
+        ValveSurrogateBrake(stages=[Stage(models=(network(1, mapping),))], consist=TRAIN)
 
 
 def test_a_surrogate_that_knows_no_open_tail_says_so() -> None:

@@ -12,7 +12,7 @@ import sysid
 from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
 from sysid.rail.coupler import Coupler
-from sysid.rail.scenarios import standard_scenarios
+from sysid.rail.scenario_catalogue import standard_scenarios
 from sysid.rail.track import TrackProfile, read_track
 from sysid.rail.train import Train, heavy_haul, read_train
 from sysid.rail.vehicle import Davis, NotchCurves, Rigging, Shoe, Vehicle, diesel_electric, modified_davis

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
 from sysid.rail.brake import RecordedBrake, ReferenceBrake, no_brake
 from sysid.rail.drive import Limits, Schedule, drive
-from sysid.rail.judge import ErringBrake, compare, cylinder_mse, tolerable_mse
+from sysid.rail.judge import ErringBrake, Rung, compare, cylinder_mse, error_rung, tolerable_mse
 from sysid.rail.motion import MovingTrain
-from sysid.rail.scenarios import Consequence, Scenario, consequence, standard_scenarios
+from sysid.rail.scenario_catalogue import standard_scenarios
+from sysid.rail.scenarios import Consequence, Scenario, consequence
 from sysid.rail.tail_unit import TwoEndedBrake
 from sysid.rail.track import TrackProfile
 from sysid.rail.train import Train, heavy_haul
@@ -154,12 +156,18 @@ def test_noise_has_the_spread_asked_for_and_comes_from_its_seed() -> None:
 
 
 def test_the_tolerable_error_is_where_the_consequence_passes_the_limit() -> None:
-    found = tolerable_mse(TWO, reference=reference, sizes=(0.1, 0.4, 1.6, 6.4))
-    worst = [w for _, w in found.tried]
+    ladder = [error_rung(TWO, reference=reference, size=size) for size in (0.1, 0.4, 1.6, 6.4)]
+    worst = [rung.distance for rung in ladder]
     assert worst == sorted(worst)
     assert worst[0] < 0.01 < worst[-1]
-    within = [mse for mse, w in found.tried if w <= 0.01]
-    assert found.mse == max(within)
+    found = tolerable_mse(ladder)
+    assert max(r.mse for r in ladder if r.distance <= 0.01) <= found <= min(r.mse for r in ladder if r.distance > 0.01)
+
+
+def test_where_no_error_or_every_error_is_tolerable_that_is_said() -> None:
+    rung = Rung(size=1.0, mse=1.0, distance=0.02, time=0.0, force=0.5)
+    assert math.isnan(tolerable_mse([rung]))
+    assert tolerable_mse([rung], figure="time") == math.inf
 
 
 def test_the_mean_square_error_is_over_the_braked_vehicles() -> None:
