@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.lags import Lags
 from sysid.models.mapping import Mapping
+from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
 from sysid.models.scaling import Scaling
 
@@ -36,9 +37,9 @@ class ARX(AbstractStructure):
         'ARX [2; 2; 3]'
     """
 
-    na: int
-    nb: tuple[int, ...]
-    nk: tuple[int, ...]
+    na: Annotated[int, IntRange(low=1, high=30)]
+    nb: Annotated[tuple[int, ...], IntRange(low=1, high=30)]
+    nk: Annotated[tuple[int, ...], IntRange(low=0, high=3)]
     intercept: bool = True
 
     kind = "ARX"

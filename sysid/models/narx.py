@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.lags import Lags, LagSpec, parse_lags
 from sysid.models.mapping import Mapping
+from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
 from sysid.models.scaling import Scaling
 
@@ -43,9 +44,9 @@ class NARX(AbstractStructure):
         7
     """
 
-    input_delays: tuple[tuple[int, ...], ...]
-    output_delays: tuple[int, ...]
-    neurons: int
+    input_delays: Annotated[tuple[tuple[int, ...], ...], IntRange(low=1, high=5)]
+    output_delays: Annotated[tuple[int, ...], IntRange(low=1, high=5)]
+    neurons: Annotated[int, IntRange(low=1, high=20)]
     feedthrough: bool = True
 
     kind = "NARX"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from sysid.models import ladder as ladders
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.ladder import Domain, Rung
 from sysid.models.mapping import Mapping
+from sysid.models.ranges import IntRange
 from sysid.models.realisation import Realisation, realise
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
@@ -42,8 +43,8 @@ class TransferFunction(AbstractStructure):
         'TF [2; 1; 3]'
     """
 
-    poles: tuple[int, ...]
-    zeros: tuple[int, ...]
+    poles: Annotated[tuple[int, ...], IntRange(low=1, high=8)]
+    zeros: Annotated[tuple[int, ...], IntRange(low=0, high=7)]
     delays: tuple[int, ...] | None = None
     domain: Domain = Domain.DISCRETE
     intercept: bool = True
