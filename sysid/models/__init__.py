@@ -2,17 +2,24 @@
 
 from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.cascade import Cascade, simulate_family
+from sysid.models.cascade_program import Limit
+from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.form import AbstractForm
 from sysid.models.history import History, Start, StartKind
 from sysid.models.ladder import Domain
 from sysid.models.lags import Lags
 from sysid.models.mapping import Mapping
 from sysid.models.narx import NARX, NARXModel
+from sysid.models.neural_form import NeuralForm
+from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
 from sysid.models.recursion import Recursion, parameter_count
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
-from sysid.models.store import model_from_dict, structure_from_dict
+from sysid.models.store import cascade_from_dict, model_from_dict, structure_from_dict
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
+from sysid.models.vector_narx import VectorMapping, VectorNARX, VectorNARXModel, VectorScaling
+from sysid.models.wiring import Ends, Member, Wiring
 
 __all__ = [
     "ARX",
@@ -21,11 +28,20 @@ __all__ = [
     "AbstractForm",
     "AbstractModel",
     "AbstractStructure",
+    "Activity",
+    "Cascade",
+    "CascadeRun",
     "Domain",
+    "Ends",
     "History",
     "Lags",
+    "Limit",
     "Mapping",
+    "Member",
     "NARXModel",
+    "NeuralForm",
+    "NeuralStateSpace",
+    "NeuralStateSpaceModel",
     "Recursion",
     "Scaling",
     "Start",
@@ -33,7 +49,14 @@ __all__ = [
     "StateSpace",
     "TransferFunction",
     "TransferFunctionModel",
+    "VectorMapping",
+    "VectorNARX",
+    "VectorNARXModel",
+    "VectorScaling",
+    "Wiring",
+    "cascade_from_dict",
     "model_from_dict",
     "parameter_count",
+    "simulate_family",
     "structure_from_dict",
 ]

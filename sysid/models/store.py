@@ -8,17 +8,24 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.cascade import Cascade
+from sysid.models.cascade_program import Limit
 from sysid.models.narx import NARX, NARXModel
+from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
+from sysid.models.vector_narx import VectorNARX, VectorNARXModel
+from sysid.models.wiring import Member
 
 _MODELS: dict[str, type[AbstractModel]] = {
     ARX.kind: ARXModel,
     NARX.kind: NARXModel,
+    NeuralStateSpace.kind: NeuralStateSpaceModel,
     TransferFunction.kind: TransferFunctionModel,
 }
 _STRUCTURES: dict[str, type[AbstractStructure]] = {
     ARX.kind: ARX,
     NARX.kind: NARX,
+    NeuralStateSpace.kind: NeuralStateSpace,
     TransferFunction.kind: TransferFunction,
 }
 
@@ -77,3 +84,53 @@ def structure_from_dict(fields: Dict[str, Any]) -> AbstractStructure:
             got=", ".join(fields),
             remedy="correct the field's name",
         ) from error
+
+
+def member_from_dict(fields: Dict[str, Any]) -> Member:
+    """Build the member of a cascade that some model's ``to_dict`` wrote.
+
+    Args:
+        fields: What it wrote.
+
+    Returns:
+        A model of one output, or of several.
+
+    Raises:
+        ConfigError: If the kind is unknown or a field is missing.
+    """
+    if fields.get("structure", {}).get("kind") != VectorNARX.kind:
+        return model_from_dict(fields)
+    try:
+        return VectorNARXModel.from_dict(fields)
+    except KeyError as error:
+        raise ConfigError(
+            f"the stored {VectorNARX.kind} model lacks the field {error}",
+            remedy="store the model again; this file is incomplete",
+        ) from error
+
+
+def cascade_from_dict(fields: Dict[str, Any]) -> Cascade:
+    """Build the cascade that :meth:`Cascade.to_dict` wrote.
+
+    Args:
+        fields: What it wrote.
+
+    Returns:
+        The cascade.
+
+    Raises:
+        ConfigError: If it is no cascade, or a member's kind is unknown, or a field is missing.
+    """
+    kind = fields.get("structure", {}).get("kind")
+    if kind != Cascade.kind or "members" not in fields:
+        raise ConfigError(
+            "not a stored cascade",
+            expected=f"the kind {Cascade.kind} and its members",
+            got=f"kind {kind!r} with the fields {', '.join(fields)}",
+            remedy="store the cascade again, or use model_from_dict for a single model",
+        )
+    return Cascade(
+        models=tuple(member_from_dict(member) for member in fields["members"]),
+        rest=fields.get("rest", {}),
+        limits={name: Limit(**limit) for name, limit in fields.get("limits", {}).items()},
+    )

@@ -1,0 +1,411 @@
+"""Cascade: models wired output to input, simulated as one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.kernels import cascade as kernel
+from sysid.models.base import AbstractModel
+from sysid.models.cascade_program import Limit, Part, program_of
+from sysid.models.cascade_run import CascadeRun
+from sysid.models.history import History
+from sysid.models.wiring import Ends, Member, Wiring
+from sysid.traces import Trace
+
+Level = float | str
+"""A value at rest in the channel's unit, or the input whose first sample it is."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stage:
+    """Members that run in one pass over the samples.
+
+    Args:
+        ends: Their inputs and outputs.
+        depth: Past samples that they read.
+        program: Their tables; ``None`` for a model with a state of its own, which is run by itself.
+        model: That model.
+    """
+
+    ends: tuple[Ends, ...]
+    depth: int
+    program: kernel.Program | None = None
+    model: AbstractModel | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cascade:
+    """Models wired by the names of their channels: whatever one writes, the others read at the same sample.
+
+    Inputs of the whole are the channels that no member writes. Before the first sample the system is at rest: each
+    output at its declared level, each input at its own first sample unless a level is declared. Nothing is taken from a
+    measured output.
+
+    Args:
+        models: The members, in any order; kept in the order in which they run.
+        rest: Level of channels at rest: a value in the channel's unit, or the name of an input whose first sample it is
+            (a reservoir charged at the running pressure). By default an output's is its model's ``rest_output``.
+        limits: Limits of outputs, by channel.
+
+    Raises:
+        ConfigError: If the models cannot be wired (circle, channel computed twice, units, sample times), or a level or
+            limit names a channel that it cannot.
+
+    Example:
+        >>> from sysid.models import ARX, ARXModel, Mapping
+        >>> def model(text: str) -> ARXModel:
+        ...     return ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.5, 0.5]), intercept=0.0,
+        ...         mapping=Mapping.parse(text), sample_time=0.1, input_units=("psi",), output_unit="psi",
+        ...         rest_output=0.0)
+        >>> cascade = Cascade(models=(model("BP -> AR"), model("STP -> BP")), rest={"BP": "STP", "AR": "STP"})
+        >>> cascade.inputs, cascade.outputs
+        (('STP',), ('BP', 'AR'))
+        >>> cascade.simulate(np.array([[90.0], [82.0], [82.0]]))["AR"].tolist()
+        [90.0, 88.0, 86.0]
+    """
+
+    models: tuple[Member, ...]
+    rest: Dict[str, Level] = field(default_factory=dict)
+    limits: Dict[str, Limit] = field(default_factory=dict)
+
+    kind = "Cascade"
+
+    def __post_init__(self) -> None:
+        wiring = Wiring.of(tuple(self.models))
+        object.__setattr__(self, "models", tuple(self.models[i] for i in wiring.order))
+        object.__setattr__(self, "rest", dict(self.rest))
+        object.__setattr__(self, "limits", dict(self.limits))
+        _check_names("rest", self.rest, wiring.channels)
+        _check_names("limits", self.limits, wiring.outputs)
+        for name, level in self.rest.items():
+            if isinstance(level, str):
+                _check_names(f"rest of {name}", [level], wiring.inputs)
+        for i, name in enumerate(wiring.outputs):
+            _check_names(
+                f"limits of {name}",
+                self.limits.get(name, Limit()).channels,
+                (*wiring.inputs, *wiring.outputs[:i]),
+            )
+
+    @cached_property
+    def wiring(self) -> Wiring:
+        """What reads what; the members' own order."""
+        return Wiring.of(self.models)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Channels that no member writes."""
+        return self.wiring.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Channels that the members write, in the order in which they are computed."""
+        return self.wiring.outputs
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every channel."""
+        return self.wiring.units
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds."""
+        return self.models[0].sample_time
+
+    @property
+    def n_parameters(self) -> int:
+        """Parameters of all members."""
+        return sum(model.n_parameters for model in self.models)
+
+    @property
+    def label(self) -> str:
+        """The structures of the members."""
+        return ", ".join(f"{model.mapping} {model.structure.label}" for model in self.models)
+
+    def member(self, output: str) -> Member:
+        """The member that writes a channel.
+
+        Args:
+            output: The channel.
+
+        Returns:
+            The member.
+
+        Raises:
+            ChannelError: If no member writes it.
+        """
+        for model in self.models:
+            if output in Ends.of(model).outputs:
+                return model
+        raise ChannelError([output], self.outputs, where="outputs of the cascade")
+
+    def with_member(self, model: Member) -> Cascade:
+        """The same cascade with the member replaced that writes these outputs.
+
+        Args:
+            model: The new member.
+
+        Returns:
+            The cascade; its wiring is found anew.
+
+        Raises:
+            ConfigError: If its outputs are not those of one member.
+        """
+        outputs = set(Ends.of(model).outputs)
+        kept = tuple(other for other in self.models if set(Ends.of(other).outputs) != outputs)
+        if len(kept) != len(self.models) - 1:
+            raise ConfigError(
+                "no member to replace",
+                expected=f"the outputs of one of {', '.join(str(other.mapping) for other in self.models)}",
+                got=str(model.mapping),
+            )
+        return replace(self, models=(*kept, model))
+
+    @cached_property
+    def stages(self) -> tuple[Stage, ...]:
+        """Runs of members that the compiled pass takes together, and models with a state of their own between them."""
+        channels = self.wiring.channels
+        parts = [(model, Ends.of(model), Part.of(model)) for model in self.models]
+        stages: list[Stage] = []
+        for compiled, run in groupby(parts, key=lambda entry: entry[2] is not None):
+            together = list(run)
+            ends = tuple(end for _, end, _ in together)
+            if compiled:
+                lowered = [part for _, _, part in together if part is not None]
+                program = program_of(lowered, ends, channels, self.limits)
+                depth = max(part.lags.depth for part in lowered)
+                stages.append(Stage(ends=ends, depth=depth, program=program))
+            else:
+                alone = [model for model, _, _ in together if isinstance(model, AbstractModel)]
+                stages += [Stage(ends=(Ends.of(model),), depth=0, model=model) for model in alone]
+        return tuple(stages)
+
+    def levels(self, first: NDArray[np.float64], rest: Dict[str, Level] | None = None) -> NDArray[np.float64]:
+        """Every channel before the first sample.
+
+        Args:
+            first: The inputs' first sample, shape ``(n_inputs,)``.
+            rest: Levels that take the place of the declared ones.
+
+        Returns:
+            Shape ``(n_inputs + n_outputs,)``, in units.
+
+        Raises:
+            ChannelError: If a level names a channel that it cannot.
+        """
+        start = dict(zip(self.inputs, map(float, first), strict=True))
+        own = {
+            name: level
+            for end in map(Ends.of, self.models)
+            for name, level in zip(end.outputs, end.rest_outputs, strict=True)
+        }
+        declared = {**self.rest, **(rest or {})}
+        _check_names("rest", declared, self.wiring.channels)
+        levels = []
+        for name in self.wiring.channels:
+            level = declared.get(name, start.get(name, own.get(name, 0.0)))
+            if isinstance(level, str):
+                _check_names(f"rest of {name}", [level], self.inputs)
+                level = start[level]
+            levels.append(float(level))
+        return np.array(levels)
+
+    def simulate(self, inputs: NDArray[np.float64], *, rest: Dict[str, Level] | None = None) -> CascadeRun:
+        """Free run of the whole from its inputs alone.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the order of :attr:`inputs` and in their units.
+            rest: Levels at rest that take the place of the declared ones in this run.
+
+        Returns:
+            Every channel at every sample, and what was held.
+
+        Raises:
+            TraceError: If the number of inputs is not the cascade's.
+            ChannelError: If a level names a channel that it cannot.
+        """
+        inputs = self._checked(inputs, 2)
+        return self._wrapped(*self._run(inputs, rest))
+
+    def simulate_trace(self, trace: Trace, *, rest: Dict[str, Level] | None = None) -> CascadeRun:
+        """Free run over a trace's inputs; its other channels are not read.
+
+        Args:
+            trace: The trace.
+            rest: As in :meth:`simulate`.
+
+        Returns:
+            The run.
+
+        Raises:
+            ChannelError: If the trace lacks an input.
+            TraceError: If the trace has another sample time.
+        """
+        if not np.isclose(trace.sample_time, self.sample_time, rtol=1e-9, atol=0.0):
+            raise TraceError(
+                "the trace has another sample time than the cascade",
+                where=f"trace {trace.name}",
+                expected=f"{self.sample_time:g} s",
+                got=f"{trace.sample_time:g} s",
+                remedy="resample it at ingest",
+            )
+        return self.simulate(trace.columns(self.inputs), rest=rest)
+
+    def simulate_batch(
+        self, inputs: NDArray[np.float64], *, rest: Dict[str, Level] | None = None, workers: int = 2
+    ) -> CascadeRun:
+        """Free runs over independent records of equal length: the cars of a train, the sequences of a stress test.
+
+        Args:
+            inputs: Shape ``(n_records, n_samples, n_inputs)``.
+            rest: As in :meth:`simulate`.
+            workers: Threads.
+
+        Returns:
+            One run whose arrays have a first axis of records.
+
+        Raises:
+            TraceError: If the number of inputs is not the cascade's.
+            ChannelError: If a level names a channel that it cannot.
+        """
+        return simulate_family([self] * len(inputs), inputs, rest=rest, workers=workers)
+
+    def _checked(self, inputs: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
+        inputs = np.asarray(inputs, dtype=np.float64)
+        if inputs.ndim != axes or inputs.shape[-1] != len(self.inputs) or inputs.shape[-2] == 0:
+            raise TraceError(
+                "the inputs do not fit the cascade",
+                expected=f"{axes} axes, the last of them {len(self.inputs)}: {', '.join(self.inputs)}",
+                got=f"shape {inputs.shape}",
+                remedy="give one column per input, in the order of cascade.inputs",
+            )
+        return inputs
+
+    def _wrapped(self, values: NDArray[np.float64], held: NDArray[np.int8]) -> CascadeRun:
+        return CascadeRun(
+            inputs=self.inputs, outputs=self.outputs, values=values, held=held, units=self.units,
+            sample_time=self.sample_time,
+        )  # fmt: skip
+
+    def _run(
+        self,
+        inputs: NDArray[np.float64],
+        rest: Dict[str, Level] | None,
+        values: NDArray[np.float64] | None = None,
+        held: NDArray[np.int8] | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
+        n = len(inputs)
+        values = np.empty((n, len(self.wiring.channels))) if values is None else values
+        held = np.empty((n, len(self.outputs)), dtype=np.int8) if held is None else held
+        values[:, : inputs.shape[1]] = inputs
+        levels = self.levels(inputs[0], rest)
+        at = 0
+        for stage in self.stages:
+            count = sum(len(end.outputs) for end in stage.ends)
+            columns = slice(at, at + count)
+            if stage.program is not None:
+                z = np.empty((stage.depth + n, len(stage.program.column_channel)))
+                kernel.run(stage.program, stage.depth, levels, values, z, _NOTHING, held[:, columns])
+            elif stage.model is not None:
+                self._alone(stage.model, levels, values, held[:, columns])
+            at += count
+        return values, held
+
+    def _alone(
+        self,
+        model: AbstractModel,
+        levels: NDArray[np.float64],
+        values: NDArray[np.float64],
+        held: NDArray[np.int8],
+    ) -> None:
+        """Run a model with a state of its own; a limit holds its output and leaves its state."""
+        channels = self.wiring.channels
+        sources, name = [channels.index(one) for one in model.mapping.inputs], model.mapping.output
+        column = channels.index(name)
+        history = History.at_rest(inputs=levels[sources], output=float(levels[column]))
+        output = model.simulate(values[:, sources], history)
+        limit = self.limits.get(name, Limit())
+        held[:] = kernel.FREE
+        for side, constant, channel, sign in (
+            (limit.high, kernel.HIGH, kernel.HIGH_CHANNEL, 1.0),
+            (limit.low, kernel.LOW, kernel.LOW_CHANNEL, -1.0),
+        ):
+            if side is not None:
+                bound = values[:, channels.index(side)] if isinstance(side, str) else np.full(len(values), side)
+                beyond = sign * output > sign * bound
+                output = np.where(beyond, bound, output)
+                held[beyond, 0] = channel if isinstance(side, str) else constant
+        values[:, column] = output
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the cascade again, as JSON values."""
+        return {
+            "structure": {"kind": self.kind},
+            "members": [model.to_dict() for model in self.models],
+            "rest": dict(self.rest),
+            "limits": {name: limit.to_dict() for name, limit in self.limits.items()},
+        }
+
+
+_NOTHING = np.empty((0, 0))
+
+
+def simulate_family(
+    cascades: Sequence[Cascade],
+    inputs: NDArray[np.float64],
+    *,
+    rest: Dict[str, Level] | None = None,
+    workers: int = 2,
+) -> CascadeRun:
+    """Free runs of several cascades with the same channels, each over its own record: a model for each car.
+
+    Args:
+        cascades: One for each record.
+        inputs: Shape ``(n_records, n_samples, n_inputs)``.
+        rest: As in :meth:`Cascade.simulate`.
+        workers: Threads.
+
+    Returns:
+        One run whose arrays have a first axis of records.
+
+    Raises:
+        ConfigError: If the cascades have different channels, or their number is not that of the records.
+        TraceError: If the number of inputs is not the cascades'.
+        ChannelError: If a level names a channel that it cannot.
+    """
+    inputs = np.asarray(inputs, dtype=np.float64)
+    kinds = {(one.wiring.channels, one.sample_time) for one in cascades}
+    if len(cascades) != len(inputs) or len(kinds) != 1:
+        raise ConfigError(
+            "the cascades do not fit the records",
+            expected=f"{len(inputs)} cascades with the same channels in the same order, and at least one",
+            got=f"{len(cascades)} cascades of {len(kinds)} kinds",
+        )
+    first = cascades[0]
+    inputs = first._checked(inputs, 3)
+    values = np.empty((*inputs.shape[:2], len(first.wiring.channels)))
+    held = np.empty((*inputs.shape[:2], len(first.outputs)), dtype=np.int8)
+
+    def work(i: int) -> None:
+        cascades[i]._run(inputs[i], rest, values[i], held[i])
+
+    with ThreadPoolExecutor(max(1, workers)) as pool:
+        for future in [pool.submit(work, i) for i in range(len(inputs))]:
+            future.result()
+    return first._wrapped(values, held)
+
+
+def _check_names(where: str, names: Any, known: Sequence[str]) -> None:
+    strangers = [name for name in names if name not in known]
+    if strangers:
+        raise ChannelError(strangers, known, where=f"{where} of the cascade" if where in {"rest", "limits"} else where)

@@ -1,0 +1,158 @@
+"""Wiring: which model reads what from whom, and in which order they run. Cascades and exporters share this notion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from sysid.errors import ConfigError
+from sysid.models.base import AbstractModel
+from sysid.models.vector_narx import VectorNARXModel
+
+Member = AbstractModel | VectorNARXModel
+"""What can be wired: a model of one output, or of several."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ends:
+    """What goes into a model and comes out.
+
+    Args:
+        inputs: Names of the channels that it reads.
+        outputs: Names of the channels that it writes.
+        input_units: Unit of each input.
+        output_units: Unit of each output.
+        rest_outputs: Each output at rest, in its unit.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    output_units: tuple[str, ...]
+    rest_outputs: tuple[float, ...]
+
+    @classmethod
+    def of(cls, model: Member) -> Ends:
+        """The ends of a model of one output, or of several."""
+        if isinstance(model, VectorNARXModel):
+            return cls(
+                inputs=model.mapping.inputs,
+                outputs=model.mapping.outputs,
+                input_units=model.input_units,
+                output_units=model.output_units,
+                rest_outputs=model.rest_outputs,
+            )
+        return cls(
+            inputs=model.mapping.inputs,
+            outputs=(model.mapping.output,),
+            input_units=model.input_units,
+            output_units=(model.output_unit,),
+            rest_outputs=(model.rest_output,),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wiring:
+    """Models wired by the names of their channels.
+
+    Args:
+        inputs: Channels that no model writes: what goes into the whole, in the order in which they are first read.
+        outputs: Channels that the models write, in the order in which they are computed.
+        order: Positions of the models in the order in which they run. Models that were given in an order that can run
+            keep it.
+        units: Unit of every channel.
+
+    Example:
+        >>> from sysid.models import ARX, ARXModel, Mapping
+        >>> def model(text: str) -> ARXModel:
+        ...     mapping = Mapping.parse(text)
+        ...     n = len(mapping.inputs)
+        ...     return ARXModel(orders=ARX(na=1, nb=(1,) * n, nk=(0,) * n), coefficients=[0.5] * (n + 1), intercept=0.0,
+        ...         mapping=mapping, sample_time=0.1, input_units=("psi",) * n, output_unit="psi", rest_output=0.0)
+        >>> wiring = Wiring.of([model("BP+AR -> BC"), model("BP -> AR"), model("STP -> BP")])
+        >>> wiring.inputs, wiring.outputs, wiring.order
+        (('STP',), ('BP', 'AR', 'BC'), (2, 1, 0))
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    order: tuple[int, ...]
+    units: dict[str, str]
+
+    @classmethod
+    def of(cls, models: Sequence[Member]) -> Wiring:
+        """Wire models.
+
+        Args:
+            models: In any order.
+
+        Returns:
+            The wiring.
+
+        Raises:
+            ConfigError: If there is no model, a channel is computed twice, the models read each other in a circle,
+                or sample times or units differ.
+        """
+        ends = [Ends.of(model) for model in models]
+        units, faults = _units(ends)
+        computed = [name for end in ends for name in end.outputs]
+        faults += [f"{name} is computed twice" for name in sorted(set(computed)) if computed.count(name) > 1]
+        faults += [] if models else ["there is no model"]
+        if len({model.sample_time for model in models}) > 1:
+            faults.append("the sample times differ")
+        order = () if faults else _order(ends, faults)
+        if faults:
+            raise ConfigError(
+                "the models cannot be wired",
+                expected="models that do not read each other in a circle, each channel computed by one of them, "
+                "with one sample time, and one unit for each channel",
+                got="; ".join(dict.fromkeys(faults)),
+                remedy="give one model for each channel; channels that need each other within a sample are the outputs "
+                "of one model (VectorNARX)",
+            )
+        return cls(
+            inputs=tuple(dict.fromkeys(n for i in order for n in ends[i].inputs if n not in computed)),
+            outputs=tuple(name for i in order for name in ends[i].outputs),
+            order=order,
+            units=units,
+        )
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Inputs, then outputs."""
+        return (*self.inputs, *self.outputs)
+
+
+def _units(ends: Sequence[Ends]) -> tuple[dict[str, str], list[str]]:
+    units: dict[str, str] = {}
+    faults = []
+    for end in ends:
+        for name, unit in zip((*end.inputs, *end.outputs), (*end.input_units, *end.output_units), strict=True):
+            if units.setdefault(name, unit) != unit:
+                faults.append(f"{name} is in {units[name]} and in {unit}")
+    return units, faults
+
+
+def _order(ends: Sequence[Ends], faults: list[str]) -> tuple[int, ...]:
+    """First the first model, in the order given, whose inputs are all known; then again, until none is left."""
+    owner = {name: i for i, end in enumerate(ends) for name in end.outputs}
+    reads = [{owner[name] for name in end.inputs if name in owner} for end in ends]
+    order: list[int] = []
+    while len(order) < len(ends):
+        ready = [i for i in range(len(ends)) if i not in order and reads[i] <= set(order)]
+        if not ready:
+            faults.append(_circle(ends, reads, order))
+            return ()
+        order.append(ready[0])
+    return tuple(order)
+
+
+def _circle(ends: Sequence[Ends], reads: Sequence[set[int]], order: Sequence[int]) -> str:
+    """Name one circle: among models that wait, following what each waits for must come back."""
+    walk = [next(i for i in range(len(ends)) if i not in order)]
+    while walk.count(walk[-1]) == 1:
+        walk.append(min(reads[walk[-1]] - set(order)))
+    circle = walk[walk.index(walk[-1]) :][::-1]
+    parts = [f"{'+'.join(ends[b].outputs)} needs {'+'.join(ends[a].outputs)}" for a, b in pairwise(circle)]
+    return f"a circle: {', '.join(parts)}"
