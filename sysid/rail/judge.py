@@ -160,9 +160,7 @@ def error_rung(
         ConfigError: If the brake does not fit the train.
     """
     error = {"bias": size} if biased else {"noise": size}
-    comparison = compare(
-        scenarios, reference=reference, other=lambda: ErringBrake(reference(), **error, seed=seed)
-    )
+    comparison = compare(scenarios, reference=reference, other=lambda: ErringBrake(reference(), **error, seed=seed))
     return Rung(
         size=size,
         mse=float(np.mean([difference.mse for difference in comparison.differences.values()])),
