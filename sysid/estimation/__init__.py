@@ -3,7 +3,9 @@
 from sysid.estimation.arx import fit_arx
 from sysid.estimation.instrumental import fit_iv4
 from sysid.estimation.narx import fit_narx
+from sysid.estimation.neural_state_space import fit_neural_state_space
 from sysid.estimation.operating_point import OperatingPoint
+from sysid.estimation.posterior import Posterior
 from sysid.estimation.result import Evidence, FitResult, Loop, Status
 from sysid.estimation.training import FitProgress, Training
 from sysid.estimation.transfer_function import fit_transfer_function
@@ -16,6 +18,7 @@ __all__ = [
     "FitResult",
     "Loop",
     "OperatingPoint",
+    "Posterior",
     "Status",
     "Training",
     "TransferFunctionTraining",
@@ -23,5 +26,6 @@ __all__ = [
     "fit_arx",
     "fit_iv4",
     "fit_narx",
+    "fit_neural_state_space",
     "fit_transfer_function",
 ]

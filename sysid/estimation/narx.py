@@ -13,12 +13,15 @@ from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import starts
 from sysid.estimation.arx import first_output
 from sysid.estimation.basis import RebasedProvider, RegressorBasis
+from sysid.estimation.checkpoint import Checkpoint
+from sysid.estimation.growing import grown
 from sysid.estimation.initialise import Layout
+from sysid.estimation.posterior import calibrate, laplace
 from sysid.estimation.provider import Experiment, RecursionProvider, experiments_of
 from sysid.estimation.regression import lagged
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.training import FitProgress, Training
-from sysid.models import NARX, History, Mapping, NARXModel, Scaling, Start
+from sysid.models import NARX, ARXModel, History, Mapping, NARXModel, Scaling, Start
 from sysid.traces import Trace
 
 
@@ -32,6 +35,8 @@ def fit_narx(
     rest_output: float | None = None,
     selection: Sequence[Trace] = (),
     initial: FitResult | None = None,
+    resume: Checkpoint | None = None,
+    on_checkpoint: Callable[[Checkpoint], None] = lambda _: None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> FitResult:
     """Fit a NARX network by Levenberg-Marquardt with Bayesian regularisation.
@@ -46,7 +51,10 @@ def fit_narx(
         start: What stands before each trace; at rest by default.
         rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
         selection: Traces that choose between starts; without them the evidence chooses.
-        initial: A fit with the same structure whose parameters are the first start.
+        initial: A fit whose parameters are the first start: of the same structure, of a smaller network over some of
+            its lags, or of a linear model over them.
+        resume: Where the fit of a single start was put aside; it goes on as if it had not been.
+        on_checkpoint: Given the checkpoint from which the chosen start can go on.
         on_progress: Called after every iteration, from the threads that train.
 
     Returns:
@@ -73,15 +81,21 @@ def fit_narx(
         template=template,
         selection=selection,
         start=start,
-        initial=_initial_parameters(initial, network),
+        initial=_initial_parameters(initial, template, layout, to_plain, training.seed),
         on_progress=on_progress,
+        resume=resume,
     )
     candidates = starts.run(race)
     chosen = min(candidates, key=lambda candidate: starts.rank(candidate, training.choose_by))
+    on_checkpoint(Checkpoint.of(chosen.solution.state))
     records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     records += [(t.columns(mapping.inputs), None) for t in selection]
-    status = _status(chosen, candidates, records, interrupted=race.stop.is_set())
-    return _result(chosen, candidates, training, status, time.perf_counter() - began)
+    status = raced_status(chosen, candidates, records, interrupted=race.stop.is_set())
+    posterior = laplace(chosen.solution.state, chosen.model, to_plain, experiments, 1 + len(training.offsets))
+    if posterior is not None:
+        posterior = calibrate(posterior, chosen.model, experiments_of(selection, mapping, start, rest))
+    fit = raced_result(chosen, candidates, training, status, time.perf_counter() - began)
+    return replace(fit, posterior=posterior)
 
 
 def _offset(experiments: Sequence[Experiment], mapping: Mapping, training: Training) -> list[Experiment]:
@@ -129,27 +143,49 @@ def _basis(
     return RegressorBasis.levels_and_rates(layout.lags, np.concatenate(records))
 
 
-def _initial_parameters(initial: FitResult | None, network: NARX) -> NDArray[np.float64] | None:
+def _initial_parameters(
+    initial: FitResult | None, template: NARXModel, layout: Layout, to_plain: NDArray[np.float64], seed: int
+) -> NDArray[np.float64] | None:
+    """Plain parameters of the first start; what the initial fit lacks is drawn as a random start draws it."""
     if initial is None:
         return None
-    if not isinstance(initial.model, NARXModel) or initial.model.network != network:
+    if not isinstance(initial.model, ARXModel | NARXModel):
         raise ConfigError(
-            "the initial fit has another structure",
+            "the initial fit is neither a network nor an ARX model",
             where="initial",
-            expected=network.label,
+            expected=f"{template.network.label}, a smaller network, or an ARX model over its lags",
             got=initial.model.structure.label,
-            remedy="name a fit with the same delays and neurons, or leave initial out",
+            remedy="name such a fit, or leave initial out",
         )
-    return initial.model.theta
+    if isinstance(initial.model, NARXModel) and _same(initial.model, template):
+        return initial.model.theta
+    centre = np.linalg.solve(to_plain, layout.centre())
+    fresh = to_plain @ layout.draw(np.random.default_rng(seed), np.asarray(centre, dtype=np.float64))
+    return grown(initial.model.recursion, template.recursion, fresh)
 
 
-def _status(
+def _same(model: NARXModel, template: NARXModel) -> bool:
+    return model.network == template.network and model.scaling == template.scaling
+
+
+def raced_status(
     chosen: starts.Candidate,
     candidates: Sequence[starts.Candidate],
     records: Sequence[tuple[NDArray[np.float64], History | None]],
     *,
     interrupted: bool,
 ) -> Status:
+    """How a race ended.
+
+    Args:
+        chosen: The candidate chosen.
+        candidates: All of them.
+        records: Inputs and history of each record over which the free run must stay within its bounds.
+        interrupted: Whether the race was.
+
+    Returns:
+        The status.
+    """
     if interrupted:
         return Status.INTERRUPTED
     if any(_leaves_its_bounds(chosen.model, inputs, history) for inputs, history in records):
@@ -159,18 +195,30 @@ def _status(
     return Status.STOPPED_EARLY if later else chosen.solution.status
 
 
-def _leaves_its_bounds(model: NARXModel, inputs: NDArray[np.float64], history: History | None) -> bool:
+def _leaves_its_bounds(model: starts.Network, inputs: NDArray[np.float64], history: History | None) -> bool:
     scaled = model.scaling.scale_output(model.simulate(inputs, history))
     return not bool(np.all(np.abs(scaled) < model.clamp * (1.0 - 1e-9)))
 
 
-def _result(
+def raced_result(
     chosen: starts.Candidate,
     candidates: Sequence[starts.Candidate],
     training: Training,
     status: Status,
     seconds: float,
 ) -> FitResult:
+    """What a race found.
+
+    Args:
+        chosen: The candidate chosen.
+        candidates: All of them, for the notes.
+        training: How they were trained.
+        status: How it ended.
+        seconds: Wall time.
+
+    Returns:
+        The result.
+    """
     curve = chosen.solution.curve
     scale = chosen.model.scaling.output_scale**2
     return FitResult(

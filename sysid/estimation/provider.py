@@ -226,6 +226,24 @@ class RecursionProvider(AbstractProvider):
             blocks += [block.copy() for _, block in self._blocks(record, theta, passed)]
         return np.concatenate(blocks)
 
+    def output_variance(self, theta: NDArray[np.float64], factor: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variance of the scaled output that is due to the parameters, to first order.
+
+        Args:
+            theta: Flat parameters.
+            factor: ``F`` with covariance ``F F^T`` of the parameters, shape ``(n_parameters, n_directions)``.
+
+        Returns:
+            Shape ``(n_samples_of_all_records,)``, records one after the other. Memory does not grow with the Jacobian.
+        """
+        parts = []
+        for record in self._records:
+            passed = self._pass(record, theta)
+            for _, block in self._blocks(record, theta, passed):
+                moved = block @ factor
+                parts.append(np.einsum("ij,ij->i", moved, moved))
+        return np.concatenate(parts)
+
     def _blocks(
         self, record: _Record, theta: NDArray[np.float64], passed: _Pass
     ) -> Iterator[tuple[int, NDArray[np.float64]]]:

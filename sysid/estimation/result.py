@@ -5,13 +5,16 @@ from __future__ import annotations
 import enum
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import AbstractModel, model_from_dict
+
+if TYPE_CHECKING:
+    from sysid.estimation.posterior import Posterior
 
 
 class Status(enum.Enum):
@@ -80,6 +83,7 @@ class FitResult:
         seed: Seed of its random start; ``None`` where nothing is random.
         evidence: From Bayesian regularisation, where it was used.
         uncertainty: Of the parameters, where the estimator knows it.
+        posterior: Of a network's parameters, where there is one; stored beside the JSON values, as arrays.
         notes: Sentences worth knowing: choices made, restarts compared, stability.
     """
 
@@ -91,10 +95,11 @@ class FitResult:
     seed: int | None = None
     evidence: Evidence | None = None
     uncertainty: Uncertainty | None = None
+    posterior: Posterior | None = None
     notes: tuple[str, ...] = field(default=())
 
     def to_dict(self) -> dict[str, Any]:
-        """The result as JSON values."""
+        """The result as JSON values, without the posterior."""
         evidence = self.evidence
         return {
             "model": self.model.to_dict(),

@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation import Posterior
+from sysid.estimation.provider import Experiment
 from sysid.models import AbstractModel, Start
 from sysid.traces import Role, Trace, TraceSet
+from sysid.validation.intervals import CaseIntervals, case_intervals
 from sysid.validation.metrics import Figures, figures
 
 
@@ -29,6 +32,7 @@ class CaseResult:
         target: Measured output, shape ``(n_samples,)``.
         simulated: Free run, shape ``(n_samples,)``.
         predicted: One step ahead, shape ``(n_samples,)``.
+        intervals: Of the output, where the fit has a posterior.
     """
 
     case: str
@@ -40,6 +44,7 @@ class CaseResult:
     target: NDArray[np.float64]
     simulated: NDArray[np.float64]
     predicted: NDArray[np.float64]
+    intervals: CaseIntervals | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Figures and run time as JSON values, without the signals."""
@@ -50,7 +55,7 @@ class CaseResult:
             "run_time_s": self.run_time_s,
             "n_samples": len(self.target),
             "simulated_s": float(self.time[-1] - self.time[0]),
-        }
+        } | ({} if self.intervals is None else {"coverage": self.intervals.to_dict()})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +81,9 @@ class Evaluation:
         return float(np.mean(values)) if values else float("nan")
 
 
-def evaluate(model: AbstractModel, traces: TraceSet, start: Start, *, repeats: int = 5) -> Evaluation:
+def evaluate(
+    model: AbstractModel, traces: TraceSet, start: Start, *, repeats: int = 5, posterior: Posterior | None = None
+) -> Evaluation:
     """Run a model over every trace of a set.
 
     Args:
@@ -84,6 +91,7 @@ def evaluate(model: AbstractModel, traces: TraceSet, start: Start, *, repeats: i
         traces: The cases.
         start: How each free run begins, and from which sample on it is scored.
         repeats: Timed repetitions of each free run, after one that warms up.
+        posterior: Of the model's parameters, for intervals of its output; without one there are none.
 
     Returns:
         The evaluation.
@@ -92,11 +100,16 @@ def evaluate(model: AbstractModel, traces: TraceSet, start: Start, *, repeats: i
         ChannelError: If a trace lacks a channel of the mapping.
     """
     return Evaluation(
-        cases={trace.name: evaluate_case(model, trace, traces.roles[trace.name], start, repeats) for trace in traces}
+        cases={
+            trace.name: evaluate_case(model, trace, traces.roles[trace.name], start, repeats, posterior=posterior)
+            for trace in traces
+        }
     )
 
 
-def evaluate_case(model: AbstractModel, trace: Trace, role: Role, start: Start, repeats: int) -> CaseResult:
+def evaluate_case(
+    model: AbstractModel, trace: Trace, role: Role, start: Start, repeats: int, *, posterior: Posterior | None = None
+) -> CaseResult:
     """Run a model over one trace.
 
     Args:
@@ -105,6 +118,7 @@ def evaluate_case(model: AbstractModel, trace: Trace, role: Role, start: Start, 
         role: What it was used for.
         start: How the free run begins, and from which sample on it is scored.
         repeats: Timed repetitions of the free run.
+        posterior: Of the model's parameters, for intervals of its output.
 
     Returns:
         The result.
@@ -123,6 +137,10 @@ def evaluate_case(model: AbstractModel, trace: Trace, role: Role, start: Start, 
         model.simulate(inputs, history)
         seconds.append(time.perf_counter() - began)
     predicted = model.predict(inputs, target, history)
+    intervals = None
+    if posterior is not None:
+        experiment = Experiment.from_trace(trace, model.mapping, start, model.rest_output)
+        intervals = case_intervals(posterior, model, experiment, simulated, predicted)
     return CaseResult(
         case=trace.name,
         role=role,
@@ -133,4 +151,5 @@ def evaluate_case(model: AbstractModel, trace: Trace, role: Role, start: Start, 
         target=target,
         simulated=simulated,
         predicted=predicted,
+        intervals=intervals,
     )

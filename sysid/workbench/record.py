@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sysid.estimation import FitResult, Status
+from sysid.estimation import FitResult, Posterior, Status
 from sysid.models import StartKind
 from sysid.reporting.results import SCHEMA_VERSION
 from sysid.traces import Role
-from sysid.validation import CaseResult, Evaluation, Figures
+from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
 from sysid.workbench.config import PipelineConfig
 from sysid.workbench.events import FitReady
 from sysid.workbench.evidence import linearity
@@ -22,6 +23,9 @@ from sysid.workbench.store import read_arrays, read_json, write_arrays, write_js
 
 SIGNALS = ("time", "target", "simulated", "predicted")
 """What is kept of every case, sample by sample."""
+
+INTERVAL = ("low", "high")
+"""What is kept besides where there are intervals."""
 
 
 def write_fit(folder: Path, fit: FitResult) -> list[Path]:
@@ -35,12 +39,18 @@ def write_fit(folder: Path, fit: FitResult) -> list[Path]:
         The files written.
     """
     write_json(folder / "fit.json", fit.to_dict())
-    return [folder / "fit.json"]
+    posterior = folder / "posterior.npz"
+    if fit.posterior is None:
+        posterior.unlink(missing_ok=True)  # of an earlier fit
+        return [folder / "fit.json"]
+    write_arrays(posterior, fit.posterior.to_arrays())
+    return [folder / "fit.json", posterior]
 
 
 def read_fit(folder: Path) -> FitResult:
     """The fit that :func:`write_fit` stored."""
-    return FitResult.from_dict(read_json(folder / "fit.json"))
+    fit, posterior = FitResult.from_dict(read_json(folder / "fit.json")), folder / "posterior.npz"
+    return replace(fit, posterior=Posterior.from_arrays(read_arrays(posterior))) if posterior.is_file() else fit
 
 
 def write_scores(folder: Path, scores: Scores) -> list[Path]:
@@ -55,6 +65,12 @@ def write_scores(folder: Path, scores: Scores) -> list[Path]:
     """
     cases = scores.evaluation.cases
     arrays = {f"{name}/{signal}": getattr(case, signal) for name, case in cases.items() for signal in SIGNALS}
+    arrays |= {
+        f"{name}/{signal}": getattr(case.intervals, signal)
+        for name, case in cases.items()
+        if case.intervals is not None
+        for signal in INTERVAL
+    }
     write_arrays(folder / "signals.npz", arrays)
     figures = {name: case.to_dict() for name, case in cases.items()}
     write_json(folder / "evaluation.json", {"cases": figures, "selection_mse": scores.selection_mse})
@@ -86,6 +102,9 @@ def read_scores(folder: Path) -> Scores:
             free_run=_figures(fields["free_run"]),
             one_step=_figures(fields["one_step"]),
             run_time_s=fields["run_time_s"],
+            intervals=CaseIntervals.from_dict(fields["coverage"], *(arrays[f"{name}/{signal}"] for signal in INTERVAL))
+            if "coverage" in fields
+            else None,
             **{signal: np.asarray(arrays[f"{name}/{signal}"], dtype=np.float64) for signal in SIGNALS},
         )
         for name, fields in stored["cases"].items()

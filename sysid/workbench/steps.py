@@ -251,8 +251,8 @@ def scores_key(fit: str, data: Data, config: PipelineConfig) -> str:
         "fit": fit,
         "traces": data.traces.digest,
         "selection": [trace.digest for trace in data.selection],
-        # Scores of a release that kept no residuals are made again.
-        "kept": ["figures", "signals", "residuals"],
+        # Scores of a release that kept less are made again.
+        "kept": ["figures", "signals", "residuals", "intervals"],
         "code": code,
     }
     return digest(terms | _common(config))
@@ -271,7 +271,7 @@ def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
     """
     errors = [evaluate_case(fit.model, trace, Role.SELECTION, config.start, 1).free_run.mse for trace in data.selection]
     return Scores(
-        evaluation=evaluate(fit.model, data.traces, config.start),
+        evaluation=evaluate(fit.model, data.traces, config.start, posterior=fit.posterior),
         selection_mse=float(np.mean(errors)) if errors else math.nan,
     )
 

@@ -118,6 +118,9 @@ def metrics(ready: FitReady) -> dict[str, float]:
         found[f"nrmse_fit/{case_name}"] = case.free_run.nrmse_fit
         found[f"max_abs_error/{case_name}"] = case.free_run.max_abs_error
         found[f"run_time_s/{case_name}"] = case.run_time_s
+        if case.intervals is not None:
+            found[f"free_run_coverage/{case_name}"] = case.intervals.free_run.share
+            found[f"one_step_coverage/{case_name}"] = case.intervals.one_step.share
     return {name: float(value) for name, value in found.items() if math.isfinite(value)}
 
 

@@ -1,0 +1,235 @@
+"""Intervals of a model's output, and how often they hold the measured output on cases that were not trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult, Loop, Posterior
+from sysid.estimation.provider import Experiment
+from sysid.models import AbstractModel, Start
+from sysid.traces import Trace
+
+LEVEL = 0.95
+"""Probability of the intervals that are reported."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OutputInterval:
+    """A model's output with the interval in which the measured output is expected.
+
+    Args:
+        output: Free run, or one step ahead, shape ``(n_samples,)``.
+        parameter_deviation: Standard deviation that is due to the parameters, shape ``(n_samples,)``.
+        noise_deviation: Standard deviation of the residuals.
+        spread: Factor of both together that was found on traces which trained nothing; 1 where there were none.
+        level: Probability that the interval holds the measured output.
+    """
+
+    output: NDArray[np.float64]
+    parameter_deviation: NDArray[np.float64]
+    noise_deviation: float
+    spread: float
+    level: float
+
+    @property
+    def half_width(self) -> NDArray[np.float64]:
+        """Half the interval's width, in the output's unit, shape ``(n_samples,)``."""
+        quantile = float(stats.norm.ppf(0.5 + 0.5 * self.level))
+        return np.asarray(quantile * self.spread * np.hypot(self.parameter_deviation, self.noise_deviation))
+
+    @property
+    def low(self) -> NDArray[np.float64]:
+        """Lower end, in the output's unit, shape ``(n_samples,)``."""
+        return self.output - self.half_width
+
+    @property
+    def high(self) -> NDArray[np.float64]:
+        """Upper end, in the output's unit, shape ``(n_samples,)``."""
+        return self.output + self.half_width
+
+    def coverage(self, target: NDArray[np.float64], counted: NDArray[np.bool_] | None = None) -> Coverage:
+        """How often the interval holds the measured output.
+
+        Args:
+            target: Measured output, shape ``(n_samples,)``.
+            counted: Which samples count; all by default.
+
+        Returns:
+            The coverage.
+        """
+        counted = np.ones(len(target), dtype=bool) if counted is None else counted
+        error, half = np.abs(target - self.output)[counted], self.half_width[counted]
+        return Coverage(
+            level=self.level,
+            share=float(np.mean(error <= half)),
+            share_before_spread=float(np.mean(error * self.spread <= half)),
+            mean_half_width=float(np.mean(half)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coverage:
+    """How often an interval holds what was measured.
+
+    Args:
+        level: How often it should, 0 to 1.
+        share: How often it does, 0 to 1.
+        share_before_spread: How often the interval from the estimation records alone does, 0 to 1.
+        mean_half_width: In the output's unit.
+    """
+
+    level: float
+    share: float
+    share_before_spread: float
+    mean_half_width: float
+
+    def to_dict(self) -> dict[str, float]:
+        """The fields as JSON values."""
+        return {
+            "level": self.level,
+            "share": self.share,
+            "share_before_spread": self.share_before_spread,
+            "mean_half_width": self.mean_half_width,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseIntervals:
+    """The intervals of one model on one case.
+
+    Args:
+        low: Lower end for the free run, shape ``(n_samples,)``.
+        high: Upper end for the free run, shape ``(n_samples,)``.
+        free_run: Coverage of the free run's interval.
+        one_step: Coverage of the interval one step ahead.
+    """
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    free_run: Coverage
+    one_step: Coverage
+
+    def to_dict(self) -> dict[str, Any]:
+        """The coverages as JSON values, without the signals."""
+        return {"free_run": self.free_run.to_dict(), "one_step": self.one_step.to_dict()}
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any], low: NDArray[np.float64], high: NDArray[np.float64]) -> CaseIntervals:
+        """The intervals whose coverages :meth:`to_dict` wrote.
+
+        Args:
+            fields: What it wrote.
+            low: Lower end for the free run.
+            high: Upper end for the free run.
+
+        Returns:
+            The intervals.
+        """
+        return cls(low=low, high=high, free_run=Coverage(**fields["free_run"]), one_step=Coverage(**fields["one_step"]))
+
+
+def predict_interval(
+    fit: FitResult, trace: Trace, level: float = LEVEL, *, loop: Loop = Loop.CLOSED, start: Start | None = None
+) -> OutputInterval:
+    """A fitted network's output over a trace, with the interval in which the measured output is expected.
+
+    Where the interval comes from, and its limits, stand at the head of :mod:`sysid.estimation.posterior`.
+
+    Args:
+        fit: A fit with a posterior.
+        trace: The trace; a free run reads its measured output only as the start allows.
+        level: Probability that the interval holds the measured output at a sample, between 0 and 1.
+        loop: ``CLOSED`` for the free run, ``OPEN`` for one step ahead.
+        start: What stands before the trace; at rest by default.
+
+    Returns:
+        The interval, from the first sample on that is not part of the start.
+
+    Raises:
+        ChannelError: If the trace lacks a channel of the mapping.
+        ConfigError: If the fit has no posterior, or the level is not between 0 and 1.
+
+    Example:
+        >>> from sysid.estimation import Training, fit_narx
+        >>> from sysid.models import NARX, Mapping
+        >>> from sysid.traces import Channel
+        >>> rng = np.random.default_rng(0)
+        >>> u = np.repeat(rng.uniform(-1.0, 1.0, 40), 10)
+        >>> y = np.convolve(u, 0.2 * 0.8 ** np.arange(60))[:400] + 0.05 * rng.standard_normal(400)
+        >>> channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+        >>> trace = Trace(name="record", sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
+        >>> network = NARX(input_delays="0:1", output_delays=1, neurons=2)
+        >>> fit = fit_narx([trace], Mapping.parse("u -> y"), network, Training(max_iterations=60))
+        >>> interval = predict_interval(fit, trace)
+        >>> bool(0.9 < interval.coverage(trace["y"]).share <= 1.0)
+        True
+    """
+    if fit.posterior is None:
+        raise ConfigError(
+            "the fit has no posterior",
+            where=fit.model.structure.label,
+            expected="a network that was fitted for long enough that the evidence was computed (some 20 iterations)",
+            got=fit.status.value,
+            remedy="fit it again with more iterations; linear models have an uncertainty of their parameters instead",
+        )
+    if not 0.0 < level < 1.0:
+        raise ConfigError("not a probability", where="level", expected="between 0 and 1", got=level)
+    experiment = Experiment.from_trace(trace, fit.model.mapping, start or Start(), fit.model.rest_output)
+    closed = loop is Loop.CLOSED
+    model, inputs, history = fit.model, experiment.inputs, experiment.history
+    output = model.simulate(inputs, history) if closed else model.predict(inputs, experiment.output, history)
+    return _interval((fit.posterior, model), experiment, output, loop, level)
+
+
+def case_intervals(
+    posterior: Posterior,
+    model: AbstractModel,
+    experiment: Experiment,
+    simulated: NDArray[np.float64],
+    predicted: NDArray[np.float64],
+) -> CaseIntervals:
+    """The intervals of a case whose outputs are computed already.
+
+    Args:
+        posterior: Of the model's parameters.
+        model: The model.
+        experiment: The case.
+        simulated: Free run, shape ``(n_samples,)``.
+        predicted: One step ahead, shape ``(n_samples,)``.
+
+    Returns:
+        The intervals at the level that is reported.
+    """
+    counted = None if experiment.weights is None else experiment.weights > 0.0
+    free_run = _interval((posterior, model), experiment, simulated, Loop.CLOSED, LEVEL)
+    one_step = _interval((posterior, model), experiment, predicted, Loop.OPEN, LEVEL)
+    return CaseIntervals(
+        low=free_run.low,
+        high=free_run.high,
+        free_run=free_run.coverage(experiment.output, counted),
+        one_step=one_step.coverage(experiment.output, counted),
+    )
+
+
+def _interval(
+    fitted: tuple[Posterior, AbstractModel],
+    experiment: Experiment,
+    output: NDArray[np.float64],
+    loop: Loop,
+    level: float,
+) -> OutputInterval:
+    posterior, model = fitted
+    return OutputInterval(
+        output=output,
+        parameter_deviation=np.sqrt(posterior.parameter_variance(model, experiment, loop)),
+        noise_deviation=float(np.sqrt(posterior.noise.of(loop))),
+        spread=posterior.spread.of(loop),
+        level=level,
+    )
