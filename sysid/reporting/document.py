@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sysid.reporting import figures
 from sysid.reporting.evidence import evidence_sections
+from sysid.reporting.judgement import judgement_sections, read_judgements
 from sysid.reporting.moments import Moment, worst_moments
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Picture, Section, identifier, picture
@@ -33,18 +35,21 @@ from sysid.reporting.tables import (
 )
 from sysid.reporting.verdict import Verdict, verdict
 
+if TYPE_CHECKING:
+    from sysid.reporting.judgement_report import JudgementResults
+
 
 @dataclass(frozen=True, kw_only=True)
 class Document:
     """Everything that the page shows.
 
     Args:
-        results: The results it was made from.
+        results: The results it was made from: of fits, or of a judgement.
         verdict: Stands first.
         sections: The rest, in order.
     """
 
-    results: Results
+    results: Results | JudgementResults
     verdict: Verdict
     sections: tuple[Section, ...]
 
@@ -77,6 +82,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     if best is not None:
         sections.append(_best(best, signals[best.slug], moments, columns))
     sections += evidence_sections(folder, results)
+    sections += judgement_sections(read_judgements(folder))
     sections += [_run_times(results, published), _tried(results)]
     exports = export_table(results)
     if exports is not None:

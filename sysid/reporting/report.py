@@ -8,6 +8,7 @@ from sysid.atomic import replacing
 from sysid.reporting.comparison import with_published
 from sysid.reporting.document import build_document
 from sysid.reporting.html import render_html
+from sysid.reporting.judgement_report import read_judgement_results, write_judgement_report
 from sysid.reporting.published import read_published
 from sysid.reporting.results import read_results, write_results
 
@@ -27,6 +28,9 @@ def write_report(run_folder: Path, *, workspace: Path | None = None) -> Path:
             figures is not known.
     """
     folder = Path(run_folder)
+    judged = read_judgement_results(folder)
+    if judged is not None:
+        return write_judgement_report(folder, judged)
     stored = read_results(folder)
     published = None if stored.published is None else read_published(stored.published, workspace=workspace)
     results = with_published(stored, published)
