@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from sysid.estimation.checkpoint import Checkpoint
 from sysid.estimation.initialise import Layout
 from sysid.estimation.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.provider import AbstractProvider
@@ -51,6 +52,7 @@ class Race:
         start: How a free run begins.
         initial: Plain parameters of the first start; ``None`` for a random one.
         on_progress: Called after every iteration, from the threads that train.
+        resume: Where the first start was put aside; ``None`` to begin it.
     """
 
     training: Training
@@ -62,6 +64,7 @@ class Race:
     start: Start
     initial: NDArray[np.float64] | None
     on_progress: Callable[[FitProgress], None]
+    resume: Checkpoint | None = None
     stop: threading.Event = field(default_factory=threading.Event)
     iterations: dict[int, int] = field(default_factory=dict)
     """Iterations done by each start, for the progress bar."""
@@ -189,12 +192,18 @@ def _advance(race: Race, number: int, before: Candidate | None, share: float, se
     training = race.training
     iterations = max(1, round(share * training.max_iterations))
     engine = _engine(race, number, iterations, seconds)
-    if before is None:
+    if before is None and number == 0 and race.resume is not None:
+        prior = race.layout.prior(_in_basis(race, race.layout.centre()), alpha=INITIAL_ALPHA, beta=1.0)
+        seed: int | None = training.seed
+        solution = engine.resume(race.provider, race.resume.state(race.provider, prior))
+    elif before is None:
         seed, theta, centre = _begin(race, number)
         # The noise is taken to be as large as the start's error: a prior weighed against residuals of size 1 would hold
         # an open-loop fit, whose residuals are a thousand times smaller, at its start.
         beta = 0.5 * race.provider.n_samples / max(race.provider.loss(theta), np.finfo(np.float64).tiny)
-        prior = race.layout.prior(centre, alpha=INITIAL_ALPHA, beta=beta)
+        # A precision given from outside is relative to that of the residuals, and stays.
+        alpha = INITIAL_ALPHA if training.regularisation is None else training.regularisation * beta
+        prior = race.layout.prior(centre, alpha=alpha, beta=beta)
         solution = engine.minimise(race.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
         seed, solution = before.seed, engine.resume(race.provider, before.solution.state)
@@ -239,6 +248,10 @@ def _engine(race: Race, number: int, iterations: int, seconds: float) -> Levenbe
     limits = Termination(
         max_iterations=iterations, max_time_s=seconds, tolerance=training.tolerance, patience=training.patience
     )
+    if training.regularisation is not None:
+        return LevenbergMarquardt(
+            termination=limits, on_iteration=report, should_stop=race.stop.is_set, evidence_after=None
+        )
     return LevenbergMarquardt(termination=limits, on_iteration=report, should_stop=race.stop.is_set)
 
 

@@ -31,6 +31,8 @@ class Training:
             once more. A record says little about what its absolute levels do and what their changes do when the two
             always go together; copies that differ in level alone tell the network which to follow, and how far a
             sensor may be off.
+        regularisation: ``None`` lets the evidence weigh the weights' sizes against the residuals, group by group. A
+            number is that weight, the same for all and never changed: 0 is plain Levenberg-Marquardt (``trainlm``).
     """
 
     loop: Loop = Loop.CLOSED
@@ -44,6 +46,7 @@ class Training:
     workers: int = 2
     basis: str = "levels and rates"
     offsets: tuple[Mapping[str, float], ...] = ()
+    regularisation: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loop", Loop(self.loop))
@@ -60,6 +63,13 @@ class Training:
         for name in ("max_iterations", "patience", "starts", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
+        if self.regularisation is not None and not 0.0 <= self.regularisation < float("inf"):
+            raise ConfigError(
+                "not a regularisation",
+                where="regularisation",
+                expected="a number from 0 on, or nothing for the evidence's",
+                got=self.regularisation,
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
