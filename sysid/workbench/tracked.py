@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,22 +51,26 @@ def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
         "status": ready.fit.status.name,
         "data": data.traces.name,
         "data_digest": data.traces.digest,
+        "output_unit": ready.fit.model.output_unit,
         "folder": str(ready.folder),
     } | ({"initial_fit": ready.config.initial} if ready.config.initial else {})
 
 
-def description(ready: FitReady, run: RunStarted) -> str:
-    """What stands above the fit: how it ended, what is worth knowing, and the command that makes it again.
+def description(ready: FitReady, run: RunStarted, links: Mapping[str, str]) -> str:
+    """What stands above the fit: how it ended, what is worth knowing, what belongs to it, and the command.
 
     Args:
         ready: The fit.
         run: The run that it belongs to.
+        links: Addresses by what lies there.
 
     Returns:
         Markdown.
     """
     lines = [f"**{ready.config.name}** of the pipeline `{run.config.name}`. {ready.fit.status.value}", ""]
     lines += [f"* {note}" for note in ready.fit.notes]
+    if links:
+        lines += ["", " · ".join(f"[{words}]({address})" for words, address in links.items())]
     return "\n".join([*lines, "", f"Made by `{run.command}`."])
 
 
@@ -102,6 +106,7 @@ def metrics(ready: FitReady) -> dict[str, float]:
     found: dict[str, float] = {
         "mean_free_run_mse": ready.evaluation.mean_mse(*unseen),
         "worst_free_run_mse": max(case.free_run.mse for case in cases.values()),
+        "mean_nrmse_fit": _mean_fit([case.free_run.nrmse_fit for case in cases.values() if case.role in unseen]),
         "least_nrmse_fit": min(case.free_run.nrmse_fit for case in cases.values()),
         "selection_mse": ready.selection_mse,
         "parameters": fit.model.n_parameters,
@@ -122,6 +127,12 @@ def metrics(ready: FitReady) -> dict[str, float]:
             found[f"free_run_coverage/{case_name}"] = case.intervals.free_run.share
             found[f"one_step_coverage/{case_name}"] = case.intervals.one_step.share
     return {name: float(value) for name, value in found.items() if math.isfinite(value)}
+
+
+def _mean_fit(fits: list[float]) -> float:
+    """Mean over the cases whose target varies, so that a fit is defined; NaN without any."""
+    defined = [fit for fit in fits if not math.isnan(fit)]
+    return float(np.mean(defined)) if defined else math.nan
 
 
 def learning_curve(ready: FitReady) -> list[tuple[int, float]]:

@@ -23,7 +23,7 @@ from filelock import FileLock
 from numpy.typing import NDArray
 
 from sysid.atomic import replacing
-from sysid.workbench import tracked
+from sysid.workbench import tracked, views
 from sysid.workbench.events import BundleReady, DataLoaded, Event, FitReady, ReportReady, RunStarted
 from sysid.workbench.naming import slug
 from sysid.workbench.registry import register
@@ -174,7 +174,6 @@ class Tracker:
             return
         words = tracked.tags(ready, self.run, self.data) | {
             KEY_TAG: ready.key,
-            "mlflow.note.content": tracked.description(ready, self.run),
             "mlflow.source.name": self.run.command,
             "mlflow.source.type": "LOCAL",
         }
@@ -183,13 +182,31 @@ class Tracker:
         self.run_ids[ready.config.name] = run_id
         status = "FAILED"
         try:
+            self._describe(experiment, run_id, ready)
             self._log_values(run_id, ready)
             self._log_data(run_id)
             for name, picture in tracked.pictures(ready):
+                # Twice: the charts show pictures by key, and the page that compares runs shows files of one name.
                 self.client.log_image(run_id, picture, key=name, step=0)
+                self.client.log_image(run_id, picture, artifact_file=f"{name}.png")
+            _show(self.client, experiment, [tracked.key(name) for name in ready.evaluation.cases])
             status = "FINISHED"
         finally:
             self.client.set_terminated(run_id, status=status)
+
+    def _describe(self, experiment: str, run_id: str, ready: FitReady, *, exported: bool = False) -> None:
+        """What the fit is, in words, with links to what belongs to it."""
+        if self.run is None:
+            return
+        here = f"#/experiments/{experiment}/runs"
+        links = {}
+        parent = self.run_ids.get(ready.config.initial or "")
+        if parent is not None:
+            links[f"started from {ready.config.initial}"] = f"{here}/{parent}"
+            self.client.set_tag(run_id, "initial_run", parent)
+        if exported:
+            links |= {words: f"{here}/{run_id}/artifacts/{words}" for words in ("bundle", "report")}
+        self.client.set_tag(run_id, "mlflow.note.content", tracked.description(ready, self.run, links))
 
     def _experiment(self, name: str) -> str:
         """The experiment of a mapping, made or brought back if need be."""
@@ -201,7 +218,8 @@ class Tracker:
             if self.artifacts is not None:
                 location = (self.artifacts / slug(name)).resolve().as_uri()
             try:
-                return str(self.client.create_experiment(name, artifact_location=location))
+                tags = {"mlflow.note.content": f"Fits of {name}.", "mlflow.experimentKind": "custom_model_development"}
+                return str(self.client.create_experiment(name, artifact_location=location, tags=tags))
             except MlflowException:
                 # Another process has just made it.
                 found = self.client.get_experiment_by_name(name)
@@ -262,6 +280,7 @@ class Tracker:
         sequence = next((entry for entry in ready.exports if Path(entry["file"]).name == SEQUENCE_FILE), None)
         if sequence is not None:
             self._log_model(run_id, ready.folder.parent / sequence["file"], ready)
+        self._describe(self.client.get_run(run_id).info.experiment_id, run_id, ready.of, exported=True)
         self.client.set_tag(run_id, "exported", "yes")
 
     def _log_model(self, run_id: str, file: Path, ready: BundleReady) -> None:
@@ -334,6 +353,18 @@ def _signature(network: Any) -> Any:
     return ModelSignature(inputs=schema(network.graph.input), outputs=schema(network.graph.output))
 
 
+def _show(client: Any, experiment: str, cases: list[str]) -> None:
+    """Let the page of an experiment show first what matters first, and all cases known so far."""
+    found = client.get_experiment(experiment)
+    known = [case for case in found.tags.get(views.CASES_TAG, "").split("|") if case]
+    both = list(dict.fromkeys([*known, *cases]))
+    value = views.view_tag(both, found.creation_time)
+    if both != known or found.tags.get(views.TAG) != value:
+        # A tag takes 5000 characters; a list of cases as long as that is not one that anybody looks through.
+        client.set_experiment_tag(experiment, views.CASES_TAG, "|".join(both)[: views.TAG_LIMIT])
+        client.set_experiment_tag(experiment, views.TAG, value)
+
+
 def latest_experiment(uri: str) -> str | None:
     """The experiment with the newest run, the one to open first.
 
@@ -347,4 +378,8 @@ def latest_experiment(uri: str) -> str | None:
         client = connect(uri)
         experiments = [experiment.experiment_id for experiment in client.search_experiments()]
         newest = client.search_runs(experiments, order_by=["attributes.start_time DESC"], max_results=1)
-    return str(newest[0].info.experiment_id) if newest else None
+        if not newest:
+            return None
+        # The page that is opened names the view, which an experiment made by other means has not got yet.
+        _show(client, newest[0].info.experiment_id, [])
+        return str(newest[0].info.experiment_id)

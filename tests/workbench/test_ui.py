@@ -16,8 +16,8 @@ import pytest
 from sysid.workbench.commands import ui
 
 
-def test_the_page_is_the_charts_of_an_experiment() -> None:
-    assert ui.page("7") == "#/experiments/7/runs?compareRunsMode=CHART&workflowType=machine_learning"
+def test_the_page_is_the_view_of_an_experiment_that_shows_first_what_matters_first() -> None:
+    assert ui.page("7") == "#/experiments/7/runs?viewStateShareKey=sysid&workflowType=machine_learning"
     assert ui.page(None) == "#/experiments?workflowType=machine_learning"
 
 

@@ -18,6 +18,7 @@ from typing import IO
 from sysid.errors import SysidError
 from sysid.workbench.commands.run import console
 from sysid.workbench.tracking import QUIET, latest_experiment, store_uri
+from sysid.workbench.views import VIEW
 
 START_LIMIT_S = 60.0
 """Seconds that a server may take; 8 to 10 s were measured on two cores."""
@@ -74,7 +75,7 @@ def page(experiment: str | None) -> str:
     # Without workflow_type MLflow opens in its mode for language models.
     if experiment is None:
         return "#/experiments?workflowType=machine_learning"
-    return f"#/experiments/{experiment}/runs?compareRunsMode=CHART&workflowType=machine_learning"
+    return f"#/experiments/{experiment}/runs?viewStateShareKey={VIEW}&workflowType=machine_learning"
 
 
 def server_command(uri: str, address: str) -> list[str]:
