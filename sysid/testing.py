@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models import History, Recursion
+from sysid.models import Cascade, Ends, History, Limit, Member, Recursion, VectorNARXModel
 
 
 def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float64]) -> float:
@@ -58,6 +58,63 @@ def simulate(form: Recursion, inputs: NDArray[np.float64], history: History) -> 
     for t in range(len(inputs)):
         y.append(step(form, u[: depth + t + 1], np.array(y)))
     return np.asarray(form.scaling.unscale_output(np.array(y[depth:])), dtype=np.float64)
+
+
+def simulate_cascade(cascade: Cascade, inputs: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Free run of a cascade, sample by sample and member by member, with its limits.
+
+    Args:
+        cascade: Its members must be recursions over lagged regressors.
+        inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+
+    Returns:
+        Every channel, shape ``(n_samples,)``, in its unit.
+    """
+    past = {
+        name: [level] * 1000 for name, level in zip(cascade.wiring.channels, cascade.levels(inputs[0]), strict=True)
+    }
+    for now in inputs:
+        for name, value in zip(cascade.inputs, now, strict=True):
+            past[name].append(float(value))
+        for model in cascade.models:
+            names = Ends.of(model).outputs
+            for name, value in zip(names, _member_step(model, past), strict=True):
+                limit = cascade.limits.get(name, Limit())
+                low = past[limit.low][-1] if isinstance(limit.low, str) else -np.inf if limit.low is None else limit.low
+                high = (
+                    past[limit.high][-1]
+                    if isinstance(limit.high, str)
+                    else np.inf
+                    if limit.high is None
+                    else limit.high
+                )
+                past[name].append(float(max(min(value, high), low)))
+    return {name: np.array(values[1000:]) for name, values in past.items()}
+
+
+def _member_step(model: Member, past: dict[str, list[float]]) -> list[float]:
+    """Outputs of one member now; its inputs in ``past`` are known up to now, its outputs up to the sample before."""
+    ends = Ends.of(model)
+    if not isinstance(model, VectorNARXModel):
+        form = model.recursion
+        if not isinstance(form, Recursion):
+            raise TypeError(f"{model.mapping} is no recursion over lagged regressors")
+        inputs = form.scaling.scale_inputs(np.array([past[name] for name in ends.inputs]).T)
+        outputs = form.scaling.scale_output(np.array(past[ends.outputs[0]]))
+        return [float(form.scaling.unscale_output(np.array(step(form, inputs, outputs))))]
+    scaling, n = model.scaling, model.network.neurons
+    x = []
+    for column, (name, lags) in enumerate(zip((*ends.inputs, *ends.outputs), model.lags.inputs, strict=True)):
+        own = column >= len(ends.inputs)
+        offset = (*scaling.input_offset, *scaling.output_offset)[column]
+        scale = (*scaling.input_scale, *scaling.output_scale)[column]
+        x += [(past[name][-lag if own else -1 - lag] - offset) / scale for lag in lags]
+    r, m = len(x), len(ends.outputs)
+    W, b, V, c, w = np.split(model.theta, np.cumsum([n * r, n, m * n, m]))
+    h = np.tanh(W.reshape(n, r) @ x + b)
+    y = V.reshape(m, n) @ h + c + (w.reshape(m, r) @ x if len(w) else 0.0)
+    y = np.clip(y, -model.clamp, model.clamp)
+    return [float(v * s + o) for v, s, o in zip(y, scaling.output_scale, scaling.output_offset, strict=True)]
 
 
 def finite_difference_jacobian(

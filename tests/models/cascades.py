@@ -1,0 +1,128 @@
+"""Small cascades that tests share: random weights, three reservoirs and their command."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sysid.models import (
+    ARX,
+    NARX,
+    ARXModel,
+    Cascade,
+    Limit,
+    Mapping,
+    NARXModel,
+    Scaling,
+    VectorMapping,
+    VectorNARX,
+    VectorNARXModel,
+    VectorScaling,
+    parameter_count,
+)
+
+RESTS = {"BP": 90.0, "AR": 90.0, "ER": 90.0, "BC": 0.0}
+
+
+def network(
+    text: str, *, seed: int = 0, neurons: int = 3, inputs=(0, 1, 3), outputs=(1, 2), spread: float = 0.3
+) -> NARXModel:
+    """One network of a cascade."""
+    mapping, structure = (
+        Mapping.parse(text),
+        NARX(input_delays=list(inputs), output_delays=list(outputs), neurons=neurons),
+    )
+    n = len(mapping.inputs)
+    count = parameter_count(structure.lags(n), neurons, linear=True)
+    return NARXModel(
+        network=structure,
+        theta=spread * np.random.default_rng(seed).standard_normal(count),
+        scaling=Scaling(
+            input_offset=tuple(80.0 + i for i in range(n)),
+            input_scale=tuple(12.0 + i for i in range(n)),
+            output_offset=RESTS[mapping.output] * 0.8 + 5.0,
+            output_scale=21.0,
+        ),
+        mapping=mapping,
+        sample_time=0.1,
+        input_units=("psi",) * n,
+        output_unit="psi",
+        rest_output=RESTS[mapping.output],
+    )
+
+
+def linear(text: str) -> ARXModel:
+    """One linear member, in units."""
+    mapping = Mapping.parse(text)
+    n = len(mapping.inputs)
+    return ARXModel(
+        orders=ARX(na=2, nb=(2,) * n, nk=(0,) * n),
+        coefficients=np.array([*(0.1 / n, 0.05 / n) * n, 0.6, 0.25]),
+        intercept=0.0,
+        mapping=mapping,
+        sample_time=0.1,
+        input_units=("psi",) * n,
+        output_unit="psi",
+        rest_output=RESTS[mapping.output],
+    )
+
+
+def block(
+    text: str, *, seed: int = 0, neurons: int = 4, output_delays=(1, 2), feedthrough: bool = True
+) -> VectorNARXModel:
+    """One network for several reservoirs."""
+    mapping = VectorMapping.parse(text)
+    structure = VectorNARX(input_delays=[0, 2], output_delays=output_delays, neurons=neurons, feedthrough=feedthrough)
+    n, m = len(mapping.inputs), len(mapping.outputs)
+    return VectorNARXModel(
+        network=structure,
+        theta=0.3 * np.random.default_rng(seed).standard_normal(structure.parameter_count(n, m)),
+        scaling=VectorScaling(
+            input_offset=(80.0,) * n, input_scale=(12.0,) * n,
+            output_offset=tuple(RESTS[name] * 0.8 + 5.0 for name in mapping.outputs),
+            output_scale=tuple(21.0 + i for i in range(m)),
+        ),
+        mapping=mapping,
+        sample_time=0.1,
+        input_units=("psi",) * n,
+        output_units=("psi",) * m,
+        rest_outputs=tuple(RESTS[name] for name in mapping.outputs),
+    )  # fmt: skip
+
+
+def service() -> Cascade:
+    """Three networks, given in another order than that in which they run."""
+    return Cascade(
+        models=(network("BP+AR -> BC", seed=3), network("STP -> BP", seed=1), network("BP -> AR", seed=2)),
+        rest={"BP": "STP", "AR": "STP"},
+    )
+
+
+CASCADES = {
+    "three networks": service(),
+    "the emergency reservoir too": Cascade(
+        models=(
+            network("STP -> BP", seed=1), network("BP -> ER", seed=2, neurons=9, inputs=(2, 5)),
+            network("BP+ER -> AR", seed=3), network("BP+AR+ER -> BC", seed=4, outputs=(1, 4)),
+        )
+    ),
+    "limits": Cascade(
+        models=service().models,
+        limits={"BC": Limit(low=0.0, high="BP"), "AR": Limit(high="BP"), "BP": Limit(low=70.0, high=82.0)},
+    ),
+    "a linear member": Cascade(
+        models=(network("STP -> BP", seed=1), linear("BP -> AR"), network("BP+AR -> BC", seed=5))
+    ),
+    "a network of several outputs": Cascade(models=(network("STP -> BP", seed=1), block("BP -> AR+ER+BC", seed=2))),
+    "several outputs, a set of lags each": Cascade(
+        models=(block("STP+F -> BP+AR", seed=3, output_delays=[[1, 2], [1, 3, 4]]), network("BP+AR -> BC", seed=4))
+    ),
+    "several outputs without a linear part": Cascade(models=(block("STP -> BP+BC", seed=3, feedthrough=False),)),
+    "no neurons": Cascade(models=(network("STP -> BP", neurons=0, spread=0.15), linear("STP+BP -> BC"))),
+}  # fmt: skip
+
+
+def command(n: int = 120, inputs: int = 1, seed: int = 0) -> np.ndarray:
+    """Steps of the command, and whatever else goes in."""
+    rng = np.random.default_rng(seed)
+    steps = np.repeat(rng.uniform(64.0, 90.0, (n // 20 + 1, inputs)), 20, axis=0)[:n]
+    return np.ascontiguousarray(steps)
