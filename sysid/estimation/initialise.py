@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,41 @@ READOUT_SPREAD = 1e-3
 with gradients that mean something."""
 
 
+class AbstractLayout(ABC):
+    """Where the parameters of a network stand: what draws them, where they start."""
+
+    @abstractmethod
+    def centre(self) -> NDArray[np.float64]:
+        """What the prior draws the model's parameters to."""
+
+    @abstractmethod
+    def prior(self, centre: NDArray[np.float64], *, alpha: float, beta: float) -> Prior:
+        """The prior a fit begins with.
+
+        Args:
+            centre: What the parameters are drawn to, shape ``(n_parameters,)``.
+            alpha: Precision of every group.
+            beta: Precision of the residuals.
+
+        Returns:
+            The prior.
+        """
+
+    @abstractmethod
+    def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A random start.
+
+        Args:
+            rng: Source of randomness.
+            centre: Where the linear part starts, shape ``(n_parameters,)``.
+
+        Returns:
+            Flat parameters.
+        """
+
+
 @dataclass(frozen=True, kw_only=True)
-class Layout:
+class Layout(AbstractLayout):
     """Where each part of the flat parameter vector ``[W | b | v | c | w]`` stands.
 
     Args:

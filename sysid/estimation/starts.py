@@ -13,19 +13,20 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from sysid.estimation.checkpoint import Checkpoint
-from sysid.estimation.initialise import Layout
+from sysid.estimation.initialise import AbstractLayout
 from sysid.estimation.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.provider import AbstractProvider
 from sysid.estimation.result import Loop, Status
 from sysid.estimation.termination import Termination
 from sysid.estimation.training import FitProgress, Training
-from sysid.models import NARXModel, Start
+from sysid.models import NARXModel, NeuralStateSpaceModel, Start
 from sysid.traces import Trace
 
 RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
@@ -38,6 +39,10 @@ INITIAL_ALPHA = 1e-2
 underdetermined network small."""
 
 
+Network: TypeAlias = NARXModel | NeuralStateSpaceModel
+"""What is raced here."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Race:
     """Everything that the starts of one fit have in common.
@@ -46,7 +51,8 @@ class Race:
         training: How to train.
         layout: Where the parameters stand.
         provider: Residuals and Jacobians, in the basis of training.
-        to_plain: From the basis to plain parameters, shape ``(n_parameters, n_parameters)``.
+        to_plain: From the parameters that are trained to the model's, shape ``(n_model, n_trained)``: a change of
+            basis, or what leaves out what belongs to the records.
         template: The model to fill with parameters.
         selection: Traces that choose.
         start: How a free run begins.
@@ -56,10 +62,10 @@ class Race:
     """
 
     training: Training
-    layout: Layout
+    layout: AbstractLayout
     provider: AbstractProvider
     to_plain: NDArray[np.float64]
-    template: NARXModel
+    template: Network
     selection: Sequence[Trace]
     start: Start
     initial: NDArray[np.float64] | None
@@ -69,7 +75,7 @@ class Race:
     iterations: dict[int, int] = field(default_factory=dict)
     """Iterations done by each start, for the progress bar."""
 
-    def model(self, theta: NDArray[np.float64]) -> NARXModel:
+    def model(self, theta: NDArray[np.float64]) -> Network:
         """The model with these parameters of the basis."""
         return replace(self.template, theta=self.to_plain @ theta)
 
@@ -89,7 +95,7 @@ class Candidate:
     number: int
     seed: int | None
     solution: Solution
-    model: NARXModel
+    model: Network
     score: float
 
     @property
@@ -222,7 +228,9 @@ def _begin(race: Race, number: int) -> tuple[int | None, NDArray[np.float64], ND
 
 
 def _in_basis(race: Race, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.linalg.solve(race.to_plain, theta), dtype=np.float64)
+    if race.to_plain.shape[0] == race.to_plain.shape[1]:
+        return np.asarray(np.linalg.solve(race.to_plain, theta), dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(race.to_plain, theta, rcond=None)[0], dtype=np.float64)
 
 
 def _engine(race: Race, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
@@ -255,7 +263,7 @@ def _engine(race: Race, number: int, iterations: int, seconds: float) -> Levenbe
     return LevenbergMarquardt(termination=limits, on_iteration=report, should_stop=race.stop.is_set)
 
 
-def _score(race: Race, model: NARXModel) -> float:
+def _score(race: Race, model: Network) -> float:
     """Geometric mean over the selection traces: one trace on which every start fails must not choose alone."""
     errors = []
     for trace in race.selection:

@@ -194,12 +194,7 @@ class NARXModel(AbstractModel):
             "output_unit": self.output_unit,
             "rest_output": self.rest_output,
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
-            "scaling": {
-                "input_offset": list(self.scaling.input_offset),
-                "input_scale": list(self.scaling.input_scale),
-                "output_offset": self.scaling.output_offset,
-                "output_scale": self.scaling.output_scale,
-            },
+            "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
         }
 
@@ -207,12 +202,11 @@ class NARXModel(AbstractModel):
     def from_dict(cls, fields: Dict[str, Any]) -> NARXModel:
         """The model that :meth:`to_dict` wrote."""
         network = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        scaling: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields["scaling"].items()}
         rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output")}
         return cls(
             network=NARX(**network),
             theta=np.array(fields["theta"], dtype=np.float64),
-            scaling=Scaling(**scaling),
+            scaling=Scaling.from_dict(fields["scaling"]),
             mapping=Mapping.parse(fields["mapping"]),
             input_units=tuple(fields["input_units"]),
             clamp=np.inf if fields["clamp"] is None else fields["clamp"],

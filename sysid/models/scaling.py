@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,32 @@ class Scaling:
             input_scale=tuple(float(value) for value in half),
             output_offset=float(y_high + y_low) / 2.0,
             output_scale=float(y_high - y_low) / 2.0 if y_high > y_low else 1.0,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        return {
+            "input_offset": list(self.input_offset),
+            "input_scale": list(self.input_scale),
+            "output_offset": self.output_offset,
+            "output_scale": self.output_scale,
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Scaling:
+        """The scaling that :meth:`to_dict` wrote.
+
+        Args:
+            fields: What it wrote.
+
+        Returns:
+            The scaling.
+        """
+        return cls(
+            input_offset=tuple(fields["input_offset"]),
+            input_scale=tuple(fields["input_scale"]),
+            output_offset=fields["output_offset"],
+            output_scale=fields["output_scale"],
         )
 
     def scale_inputs(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,232 @@
+r"""The recursion of a neural state space, its free run and its exact forward sensitivities, compiled.
+
+With the state :math:`x_t` (``n`` numbers), the scaled inputs :math:`u_t` (``m``) and :math:`z_t = [x_t; u_t; 1]` one
+step is
+
+.. math::
+    x_{t+1} = \mathrm{clip}\bigl(M z_t + V\,\sigma(W z_t)\bigr), \qquad
+    \hat y_t = \mathrm{clip}\bigl(\rho(L z_t + v^T \sigma(\bar W z_t))\bigr),
+
+with ``k`` neurons in the state equation and ``q`` in the output's; :math:`\sigma` is tanh or the cube, :math:`\rho` the
+identity or the absolute value (what a sensor that counts pulses makes of a speed). The sensitivities
+:math:`S_t = dx_t/d\theta` obey
+
+.. math::
+    S_{t+1} = F_t S_t + \partial x_{t+1}/\partial\theta, \qquad
+    F_t = M_x + V\,\mathrm{diag}(\sigma'(W z_t))\,W_x,
+
+and the row of the Jacobian is :math:`\rho' (G_t S_t + \partial\hat y_t/\partial\theta)` with
+:math:`G_t = L_x + v^T \mathrm{diag}(\sigma'(\bar W z_t))\,\bar W_x` (real-time recurrent learning, Williams and Zipser
+1989). Only the parameters of the state equation and the initial state have sensitivities that live on, so a sample
+costs some :math:`n^2 p + n k (n+m)` multiply-adds: with few states this yields the whole Jacobian, which Gauss-Newton
+methods need, for a few times the price of a free run.
+
+Parameters are one flat vector ``[M (n, n+m+1) | W (k, n+m+1) | V (n, k) | L (n+m+1) | Wy (q, n+m+1) | v (q)]``;
+what follows it (the map to the initial state) is not read here. A row of the Jacobian is
+``[M, W, V | initial state (n) | L, Wy, v]``.
+
+Limits: a clipped state stops what it remembers, and its sensitivities with it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sysid.kernels.recursion import tanh_in_place
+
+_FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def _activate(weights_columns, z, cubic, h, slope):
+    """Activations and their derivatives for one ``z``; neurons stand side by side in a vector register."""
+    k = len(h)
+    for j in range(k):
+        h[j] = 0.0
+    for i in range(len(z)):
+        value = z[i]
+        column = weights_columns[i]
+        for j in range(k):
+            h[j] += column[j] * value
+    if cubic:
+        for j in range(k):
+            slope[j] = 3.0 * h[j] * h[j]
+        for j in range(k):
+            h[j] = h[j] * slope[j] / 3.0
+    else:
+        tanh_in_place(h)
+        for j in range(k):
+            slope[j] = 1.0 - h[j] * h[j]
+
+
+@njit(cache=True, nogil=True)
+def _clip(value, bound_low, bound_high):
+    return min(max(value, bound_low), bound_high) if not math.isnan(value) else value
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
+    """Run the model, writing ``y`` and leaving in ``x`` the state after the last sample.
+
+    Args:
+        u: Scaled inputs, shape ``(n_samples, n_inputs)``.
+        x: State before the first sample, shape ``(n_states,)``; overwritten.
+        theta: Parameters.
+        k: Neurons in the state equation.
+        q: Neurons in the output equation.
+        cubic: Cubes instead of tanh.
+        rectified: Whether the output is an absolute value.
+        bound: Bound of each state.
+        low: Lower bound of the output.
+        high: Upper bound of the output.
+        y: Shape ``(n_samples,)``, written.
+    """
+    n, m = len(x), u.shape[1]
+    r = n + m + 1
+    M = theta[: n * r].reshape(n, r)
+    W = np.ascontiguousarray(theta[n * r : (n + k) * r].reshape(k, r).T)
+    at = (n + k) * r
+    V = theta[at : at + n * k].reshape(n, k)
+    at += n * k
+    L = theta[at : at + r]
+    Wy = np.ascontiguousarray(theta[at + r : at + r + q * r].reshape(q, r).T)
+    v = theta[at + r + q * r : at + r + q * r + q]
+    z = np.ones(r)
+    h, slope = np.empty(k), np.empty(k)
+    hy, slope_y = np.empty(q), np.empty(q)
+    for t in range(len(u)):
+        for i in range(n):
+            z[i] = x[i]
+        for i in range(m):
+            z[n + i] = u[t, i]
+        total = 0.0
+        for i in range(r):
+            total += L[i] * z[i]
+        _activate(Wy, z, cubic, hy, slope_y)
+        for j in range(q):
+            total += v[j] * hy[j]
+        if rectified:
+            total = abs(total)
+        y[t] = _clip(total, low, high)
+        _activate(W, z, cubic, h, slope)
+        for i in range(n):
+            new = 0.0
+            for j in range(r):
+                new += M[i, j] * z[j]
+            for j in range(k):
+                new += V[i, j] * h[j]
+            x[i] = _clip(new, -bound, bound)
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J):
+    """Outputs of some samples and their derivatives; a record is walked in blocks that hand ``x`` and ``S`` on.
+
+    Args:
+        u: As in :func:`free_run`; the block's samples.
+        x: As in :func:`free_run`.
+        S: Derivative of the state, shape ``(n_states, n_dynamic + n_states)``; before the first sample of a record
+            zeros and, in its last ``n_states`` columns, the identity. Overwritten.
+        theta: As in :func:`free_run`.
+        k: As in :func:`free_run`.
+        q: As in :func:`free_run`.
+        cubic: As in :func:`free_run`.
+        rectified: As in :func:`free_run`.
+        bound: As in :func:`free_run`.
+        low: As in :func:`free_run`.
+        high: As in :func:`free_run`.
+        y: As in :func:`free_run`.
+        J: Shape ``(n_samples, n_dynamic + n_states + n_output)``, written.
+    """
+    n, m = len(x), u.shape[1]
+    r = n + m + 1
+    M = theta[: n * r].reshape(n, r)
+    plain_W = theta[n * r : (n + k) * r].reshape(k, r)
+    W = np.ascontiguousarray(plain_W.T)
+    at = (n + k) * r
+    V = theta[at : at + n * k].reshape(n, k)
+    at += n * k
+    L = theta[at : at + r]
+    plain_Wy = theta[at + r : at + r + q * r].reshape(q, r)
+    Wy = np.ascontiguousarray(plain_Wy.T)
+    v = theta[at + r + q * r : at + r + q * r + q]
+    n_S = S.shape[1]
+    at_W, at_V = n * r, (n + k) * r
+    following = np.empty_like(S)
+    F, G = np.empty((n, n)), np.empty(n)
+    z = np.ones(r)
+    h, slope = np.empty(k), np.empty(k)
+    hy, slope_y = np.empty(q), np.empty(q)
+    new_x = np.empty(n)
+    for t in range(len(u)):
+        for i in range(n):
+            z[i] = x[i]
+        for i in range(m):
+            z[n + i] = u[t, i]
+        # the output
+        total = 0.0
+        for i in range(r):
+            total += L[i] * z[i]
+        _activate(Wy, z, cubic, hy, slope_y)
+        for j in range(q):
+            total += v[j] * hy[j]
+        sign = -1.0 if rectified and total < 0.0 else 1.0
+        total *= sign
+        bounded = _clip(total, low, high)
+        y[t] = bounded
+        row = J[t]
+        if bounded != total:
+            row[:] = 0.0
+        else:
+            for i in range(n):
+                G[i] = sign * L[i]
+                for j in range(q):
+                    G[i] += sign * v[j] * slope_y[j] * plain_Wy[j, i]
+            row[:n_S] = 0.0
+            for i in range(n):
+                factor, past = G[i], S[i]
+                for p in range(n_S):
+                    row[p] += factor * past[p]
+            for i in range(r):
+                row[n_S + i] = sign * z[i]
+            for j in range(q):
+                factor = sign * v[j] * slope_y[j]
+                place = n_S + r + j * r
+                for i in range(r):
+                    row[place + i] = factor * z[i]
+                row[n_S + r + q * r + j] = sign * hy[j]
+        # the state
+        _activate(W, z, cubic, h, slope)
+        for i in range(n):
+            new = 0.0
+            for j in range(r):
+                new += M[i, j] * z[j]
+            for j in range(k):
+                new += V[i, j] * h[j]
+            new_x[i] = _clip(new, -bound, bound)
+            after = following[i]
+            after[:] = 0.0
+            if new_x[i] != new:
+                continue
+            for j in range(n):
+                derivative = M[i, j]
+                for o in range(k):
+                    derivative += V[i, o] * slope[o] * plain_W[o, j]
+                F[i, j] = derivative
+            for j in range(n):
+                factor, past = F[i, j], S[j]
+                for p in range(n_S):
+                    after[p] += factor * past[p]
+            for j in range(r):
+                after[i * r + j] += z[j]
+            for o in range(k):
+                factor = V[i, o] * slope[o]
+                place = at_W + o * r
+                for j in range(r):
+                    after[place + j] += factor * z[j]
+                after[at_V + i * k + o] += h[o]
+        S[:] = following
+        x[:] = new_x

@@ -1,0 +1,310 @@
+"""The form that a neural state space lowers to: sizes, flat parameters, free run, and the state after a history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.errors import TraceError
+from sysid.kernels import neural_state_space as kernel
+from sysid.models.form import AbstractForm
+from sysid.models.history import History
+from sysid.models.scaling import Scaling
+
+STATE_BOUND = 10.0
+"""Bound of each state. Fits scale the states to -1 to 1 over their records; ten times that is lost, and the bound
+keeps a free run finite."""
+
+HISTORY_NOISE = 1e-2
+"""Standard deviation of the output's history in scaled numbers, beside a state whose deviation from what the oldest
+sample says is of order 1: weak enough to matter only where the history does not show a state."""
+
+CORRECTIONS = 20
+"""Gauss-Newton steps at most to find the state that a history shows; it converges in a handful."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """Where each part of the flat parameters ``[M | W | V | L | Wy | v | E]`` stands; the kernel has the equations.
+
+    ``E``, of shape ``(n_states, n_inputs + 2)``, takes the oldest sample of a history (scaled inputs, scaled output, 1)
+    to the state there.
+
+    Args:
+        states: ``n``.
+        inputs: ``m``.
+        neurons: ``k``, in the state equation.
+        output_neurons: ``q``, in the output equation.
+
+    Example:
+        >>> Sizes(states=2, inputs=1, neurons=5, output_neurons=0).count
+        48
+    """
+
+    states: int
+    inputs: int
+    neurons: int
+    output_neurons: int
+
+    @property
+    def row(self) -> int:
+        """Length of ``z = [x; u; 1]``."""
+        return self.states + self.inputs + 1
+
+    @property
+    def dynamic(self) -> slice:
+        """``M``, ``W`` and ``V``: the state equation."""
+        return slice(0, (self.states + self.neurons) * self.row + self.states * self.neurons)
+
+    @property
+    def linear(self) -> slice:
+        """``M``."""
+        return slice(0, self.states * self.row)
+
+    @property
+    def hidden(self) -> slice:
+        """``W``."""
+        return slice(self.linear.stop, self.linear.stop + self.neurons * self.row)
+
+    @property
+    def readout(self) -> slice:
+        """``V``."""
+        return slice(self.hidden.stop, self.dynamic.stop)
+
+    @property
+    def output(self) -> slice:
+        """``L``, ``Wy`` and ``v``: the output equation."""
+        start = self.dynamic.stop
+        return slice(start, start + self.row + self.output_neurons * (self.row + 1))
+
+    @property
+    def output_linear(self) -> slice:
+        """``L``."""
+        return slice(self.output.start, self.output.start + self.row)
+
+    @property
+    def output_hidden(self) -> slice:
+        """``Wy``."""
+        return slice(self.output_linear.stop, self.output_linear.stop + self.output_neurons * self.row)
+
+    @property
+    def output_readout(self) -> slice:
+        """``v``."""
+        return slice(self.output_hidden.stop, self.output.stop)
+
+    @property
+    def start(self) -> slice:
+        """``E``: the map to the initial state."""
+        return slice(self.output.stop, self.output.stop + self.states * (self.inputs + 2))
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+        return int(self.start.stop)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NeuralForm(AbstractForm):
+    r"""``x(t+1) = M z + V s(W z)``, ``y(t) = L z + v s(Wy z)`` with ``z = [x; u; 1]``, in scaled numbers.
+
+    A history gives the state thus: its oldest sample is a system that has stood there (``E``); where it holds more
+    samples, the state :math:`x_0` there minimises :math:`|\hat y(x_0) - y|^2/\sigma^2 + |x_0 - E z_0|^2` over the
+    history, and the model runs on through it.
+
+    Args:
+        sizes: States, inputs, neurons.
+        theta: Flat parameters.
+        scaling: Between units and scaled numbers.
+        cubic: Cubes instead of tanh.
+        rectified: The output is an absolute value.
+        bound: Bound of each state.
+        low: Lower bound of the output in scaled numbers.
+        high: Upper bound of the output in scaled numbers.
+    """
+
+    sizes: Sizes
+    theta: NDArray[np.float64]
+    scaling: Scaling
+    cubic: bool = False
+    rectified: bool = False
+    bound: float = STATE_BOUND
+    low: float = -np.inf
+    high: float = np.inf
+
+    def __post_init__(self) -> None:
+        theta = np.array(self.theta, dtype=np.float64)
+        theta.setflags(write=False)
+        object.__setattr__(self, "theta", theta)
+        if theta.shape != (self.sizes.count,):
+            raise TraceError(
+                "the parameter vector does not fit the structure",
+                expected=f"{self.sizes.count} parameters",
+                got=f"shape {theta.shape}",
+                remedy="use parameters that were fitted with this structure",
+            )
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """The flat parameters."""
+        return self.theta
+
+    def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
+        """Free run; see the base class."""
+        scaled = self.scaled(inputs)
+        return self.scaling.unscale_output(self.run(scaled, self.state(history)))
+
+    def predict(
+        self,
+        inputs: NDArray[np.float64],
+        output: NDArray[np.float64],  # noqa: ARG002 - the noise is added to the output and says nothing about the next
+        history: History,
+        steps: int,  # noqa: ARG002 - for the same reason
+    ) -> NDArray[np.float64]:
+        """The free run: with white noise on the output alone the best prediction does not use past output."""
+        return self.simulate(inputs, history)
+
+    def state(self, history: History) -> NDArray[np.float64]:
+        """The state after some samples.
+
+        Args:
+            history: The samples, oldest first, in units; a single one is a system at rest.
+
+        Returns:
+            Shape ``(n_states,)``.
+        """
+        scaled, output = self.scaled(history.inputs), self.scaling.scale_output(history.output)
+        x = self.resting(scaled[0], float(output[0]))
+        if len(output) == 1:
+            return x
+        x = self.corrected(scaled, output, x)
+        self.run(scaled, x)
+        return x
+
+    def resting(self, inputs: NDArray[np.float64], output: float) -> NDArray[np.float64]:
+        """The state of a system that has stood at these scaled values, by the map ``E``.
+
+        Args:
+            inputs: Scaled inputs, shape ``(n_inputs,)``.
+            output: Scaled output.
+
+        Returns:
+            Shape ``(n_states,)``.
+        """
+        E = self.theta[self.sizes.start].reshape(self.sizes.states, -1)
+        return np.asarray(np.clip(E @ np.concatenate([inputs, [output, 1.0]]), -self.bound, self.bound))
+
+    def corrected(
+        self, scaled: NDArray[np.float64], output: NDArray[np.float64], x: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The state before some samples that their output shows, near the one expected.
+
+        Args:
+            scaled: Scaled inputs, shape ``(n_samples, n_inputs)``.
+            output: Scaled output, shape ``(n_samples,)``.
+            x: State expected, shape ``(n_states,)``.
+
+        Returns:
+            Shape ``(n_states,)``.
+        """
+        # What is expected may lie far outside where the records were; from there the output may not show the way back.
+        expected = np.clip(x, -1.0, 1.0)
+        found = [self._descended(scaled, output, begin, expected) for begin in (expected, np.zeros(len(x)))]
+        return min(found, key=lambda x: self._misfit(scaled, output, x, expected))
+
+    def _descended(
+        self,
+        scaled: NDArray[np.float64],
+        output: NDArray[np.float64],
+        x: NDArray[np.float64],
+        expected: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Levenberg-Marquardt from one state."""
+        n = len(x)
+        damping, best = 1e-3, self._misfit(scaled, output, x, expected)
+        for _ in range(CORRECTIONS):
+            y, J = self._linearised(scaled, x)
+            H = J.T @ J / HISTORY_NOISE**2 + np.eye(n)
+            g = J.T @ (y - output) / HISTORY_NOISE**2 + (x - expected)
+            trial = x - linalg.solve(H + damping * np.diag(np.diag(H)), g, assume_a="pos")
+            misfit = self._misfit(scaled, output, trial, expected)
+            if misfit < best:
+                done = best - misfit < 1e-9 * best
+                x, best, damping = trial, misfit, damping / 10.0
+                if done:
+                    break
+            else:
+                damping *= 10.0
+        return x
+
+    def run(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Scaled output over some scaled inputs; ``x`` becomes the state after them.
+
+        Args:
+            scaled: Scaled inputs, shape ``(n_samples, n_inputs)``.
+            x: State before the first sample, shape ``(n_states,)``; overwritten.
+
+        Returns:
+            Shape ``(n_samples,)``.
+        """
+        y = np.empty(len(scaled))
+        kernel.free_run(scaled, x, *self.arguments(self.theta), y)
+        return y
+
+    def arguments(self, theta: NDArray[np.float64]) -> tuple[object, ...]:
+        """What the kernels take between the state and the output.
+
+        Args:
+            theta: Parameters, at least those of both equations.
+
+        Returns:
+            Parameters, sizes, flags and bounds.
+        """
+        s = self.sizes
+        return (theta, s.neurons, s.output_neurons, self.cubic, self.rectified, self.bound, self.low, self.high)
+
+    def scaled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Inputs in the model's numbers.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+
+        Returns:
+            The same shape.
+
+        Raises:
+            TraceError: If the number of inputs is not the model's.
+        """
+        inputs = np.asarray(inputs, dtype=np.float64)
+        if inputs.ndim != 2 or inputs.shape[1] != self.sizes.inputs:
+            raise TraceError(
+                "the inputs do not fit the model",
+                expected=f"inputs and history of shape (n, {self.sizes.inputs})",
+                got=f"shape {inputs.shape}",
+                remedy="give one column per input of the mapping, in its order",
+            )
+        return self.scaling.scale_inputs(inputs)
+
+    def _linearised(
+        self, scaled: NDArray[np.float64], x: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Output and its derivative with respect to the state before the first sample."""
+        n, dynamic = self.sizes.states, self.sizes.dynamic.stop
+        S = np.zeros((n, dynamic + n))
+        S[:, dynamic:] = np.eye(n)
+        y = np.empty(len(scaled))
+        J = np.empty((len(scaled), dynamic + n + self.sizes.output.stop - self.sizes.output.start))
+        kernel.sensitivities(scaled, x.copy(), S, *self.arguments(self.theta), y, J)
+        return y, J[:, dynamic : dynamic + n]
+
+    def _misfit(
+        self,
+        scaled: NDArray[np.float64],
+        output: NDArray[np.float64],
+        x: NDArray[np.float64],
+        expected: NDArray[np.float64],
+    ) -> float:
+        away = self.run(scaled, x.copy()) - output
+        return float(away @ away / HISTORY_NOISE**2 + np.sum((x - expected) ** 2))

@@ -1,0 +1,186 @@
+"""Neural state space: a linear state space with neurons beside it, for systems that remember more than lags hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.mapping import Mapping
+from sysid.models.narx import CLAMP
+from sysid.models.neural_form import NeuralForm, Sizes
+from sysid.models.scaling import Scaling
+
+ACTIVATIONS = ("tanh", "cubic")
+OUTPUTS = ("plain", "absolute")
+
+
+@dataclass(frozen=True, kw_only=True)
+class NeuralStateSpace(AbstractStructure):
+    """Hidden states and neurons of ``x(t+1) = A x + B u + f(x, u)``, ``y = C x + D u + g(x, u)``.
+
+    Args:
+        states: Number of hidden states.
+        neurons: Neurons in ``f``; 0 for a linear state equation.
+        output_neurons: Neurons in ``g``; 0 for a linear output.
+        activation: ``tanh``, which saturates, or ``cubic``, the cube of each neuron's sum, which goes on growing beyond
+            the training range as springs do that stiffen.
+        output: ``plain``, or ``absolute`` for a sensor that cannot tell a sign.
+
+    Raises:
+        ConfigError: If a number or a name cannot be used.
+
+    Example:
+        >>> NeuralStateSpace(states=2, neurons=10).label
+        'NSS 2/10'
+    """
+
+    states: int
+    neurons: int
+    output_neurons: int = 0
+    activation: str = "tanh"
+    output: str = "plain"
+
+    kind = "NSS"
+
+    def __post_init__(self) -> None:
+        for name, least in (("states", 1), ("neurons", 0), ("output_neurons", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < least:
+                raise ConfigError(
+                    f"not a number of {name.replace('_', ' ')}",
+                    where=name,
+                    expected=f"a whole number from {least} on",
+                    got=repr(value),
+                    remedy="write for example {kind: NSS, states: 2, neurons: 10}",
+                )
+        for name, choices in (("activation", ACTIVATIONS), ("output", OUTPUTS)):
+            if getattr(self, name) not in choices:
+                raise ConfigError(
+                    f"unknown {name}",
+                    where=name,
+                    expected=" or ".join(choices),
+                    got=repr(getattr(self, name)),
+                    remedy=f"write for example {name}: {choices[0]}",
+                )
+
+    @property
+    def label(self) -> str:
+        """States and neurons as ``NSS 2/10``, with the output's neurons and what is not the default."""
+        numbers = [self.states, self.neurons, *([self.output_neurons] if self.output_neurons else [])]
+        words = [self.activation] * (self.activation != "tanh") + [self.output] * (self.output != "plain")
+        return " ".join(["NSS", "/".join(str(number) for number in numbers), *words])
+
+    def sizes(self, n_inputs: int) -> Sizes:
+        """Where the parameters stand for a number of inputs.
+
+        Args:
+            n_inputs: Inputs of the mapping.
+
+        Returns:
+            The sizes.
+        """
+        return Sizes(
+            states=self.states, inputs=n_inputs, neurons=self.neurons, output_neurons=self.output_neurons
+        )  # fmt: skip
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        return {
+            "kind": self.kind,
+            "states": self.states,
+            "neurons": self.neurons,
+            "output_neurons": self.output_neurons,
+            "activation": self.activation,
+            "output": self.output,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NeuralStateSpaceModel(AbstractModel):
+    """A fitted neural state space.
+
+    Args:
+        network: The structure.
+        theta: Flat parameters in scaled numbers (see :class:`Sizes`).
+        scaling: Between units and scaled numbers.
+        mapping: Which channels go in, which comes out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+        clamp: Bound of the output in scaled numbers; infinite for none.
+    """
+
+    network: NeuralStateSpace
+    theta: NDArray[np.float64]
+    scaling: Scaling
+    mapping: Mapping
+    sample_time: float
+    input_units: tuple[str, ...]
+    output_unit: str
+    rest_output: float
+    clamp: float = CLAMP
+
+    def __post_init__(self) -> None:
+        theta = np.array(self.theta, dtype=np.float64)
+        theta.setflags(write=False)
+        object.__setattr__(self, "theta", theta)
+        object.__setattr__(self, "input_units", tuple(self.input_units))
+
+    @property
+    def structure(self) -> NeuralStateSpace:
+        """States and neurons."""
+        return self.network
+
+    @property
+    def n_parameters(self) -> int:
+        """Length of ``theta``."""
+        return len(self.theta)
+
+    @property
+    def recursion(self) -> NeuralForm:
+        """The form that is run."""
+        return NeuralForm(
+            sizes=self.network.sizes(len(self.mapping.inputs)),
+            theta=self.theta,
+            scaling=self.scaling,
+            cubic=self.network.activation == "cubic",
+            rectified=self.network.output == "absolute",
+            low=-self.clamp,
+            high=self.clamp,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return {
+            "structure": self.network.to_dict(),
+            "mapping": str(self.mapping),
+            "sample_time": self.sample_time,
+            "input_units": list(self.input_units),
+            "output_unit": self.output_unit,
+            "rest_output": self.rest_output,
+            "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
+            "scaling": self.scaling.to_dict(),
+            "theta": self.theta.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> NeuralStateSpaceModel:
+        """The model that :meth:`to_dict` wrote."""
+        network = {key: value for key, value in fields["structure"].items() if key != "kind"}
+        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output")}
+        return cls(
+            network=NeuralStateSpace(**network),
+            theta=np.array(fields["theta"], dtype=np.float64),
+            scaling=Scaling.from_dict(fields["scaling"]),
+            mapping=Mapping.parse(fields["mapping"]),
+            input_units=tuple(fields["input_units"]),
+            clamp=np.inf if fields["clamp"] is None else fields["clamp"],
+            **rest,
+        )
