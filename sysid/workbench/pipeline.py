@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,19 @@ from sysid.workbench.record import (
     write_scores,
 )
 from sysid.workbench.store import RunFolder, code_digest, digest, strict, write_bytes, write_json
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GivenFit:
+    """A fit that was made elsewhere, such as by a sweep, and goes through the steps like any other.
+
+    Args:
+        key: Digest of everything that it depends on.
+        make: Gives it, when it is not stored yet.
+    """
+
+    key: str
+    make: Callable[[], FitResult]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,6 +70,7 @@ def run_pipeline(
     command: str,
     fresh: bool = False,
     watchers: Sequence[events.Watcher] = (),
+    given: Mapping[str, GivenFit] | None = None,
 ) -> Results:
     """Run a pipeline; what an earlier run has finished is not done again.
 
@@ -69,6 +83,7 @@ def run_pipeline(
         command: The command that makes the run again, for the report.
         fresh: Do everything again.
         watchers: Told everything that happens, in order.
+        given: Fits that are made already, by name.
 
     Returns:
         The contents of ``results.json``.
@@ -79,7 +94,12 @@ def run_pipeline(
         ParityError: If an exported file differs from its model.
     """
     run = _Run(
-        pipeline=pipeline, store=RunFolder(path=folder.resolve()), command=command, fresh=fresh, watchers=watchers
+        pipeline=pipeline,
+        store=RunFolder(path=folder.resolve()),
+        command=command,
+        fresh=fresh,
+        watchers=watchers,
+        given=given or {},
     )
     with run.store.locked():
         return run.all()
@@ -94,6 +114,7 @@ class _Run:
     command: str
     fresh: bool
     watchers: Sequence[events.Watcher]
+    given: Mapping[str, GivenFit]
     run_id: str = field(default_factory=lambda: time.strftime("%Y%m%d-%H%M%S"))
     environment: Mapping[str, Any] = field(default_factory=environment)
 
@@ -145,7 +166,8 @@ class _Run:
     def _fit(self, fit: FitConfig, data: steps.Data, earlier: Mapping[str, _Fitted]) -> _Fitted:
         config, folder = self.pipeline.config, self.store.fit(fit.slug)
         initial = earlier[fit.initial] if fit.initial else None
-        key = steps.fit_key(fit, config, data, initial.fit_key if initial else None)
+        given = self.given.get(fit.name)
+        key = given.key if given else steps.fit_key(fit, config, data, initial.fit_key if initial else None)
         step = (
             f"Fitting {fit.name}" if fit.name == fit.structure.label else f"Fitting {fit.name}, {fit.structure.label}"
         )
@@ -153,6 +175,8 @@ class _Run:
         fit_stored = self._done(f"fit-{fit.slug}", key)
         if fit_stored:
             result = read_fit(folder)
+        elif given is not None:
+            result = given.make()
         else:
             progress = _Progress(step=step, training=fit.training_options(config.seed), tell=self._tell)
             result = steps.fit_traces(fit, config, data, initial.ready.fit if initial else None, progress.report)
