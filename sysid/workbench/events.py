@@ -9,6 +9,7 @@ from typing import Any
 
 from sysid.estimation import FitResult
 from sysid.reporting.results import Results
+from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import TraceSet
 from sysid.validation import Evaluation
 from sysid.workbench.config import FitConfig, PipelineConfig
@@ -143,6 +144,54 @@ class ReportReady(Event):
     page: Path
     results: Path
     of: FitReady
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JudgementReady(Event):
+    """A judge has said what the error of some models does, and it is on disk.
+
+    Args:
+        kind: Name of the judge.
+        pipeline: Name of the pipeline.
+        subject: Name of what was judged.
+        digest: Of what was said of it.
+        metrics: Numbers to track with it, by name.
+        fit_keys: Keys of the fits that it is made of, as far as they are known.
+        tracked_as: Runs of the tracking store that it is made of, as far as they are known.
+        page: The HTML file.
+        document: The judgement as JSON.
+        command: The command that makes it again.
+    """
+
+    kind: str
+    pipeline: str
+    subject: str
+    digest: str
+    metrics: Mapping[str, float]
+    fit_keys: tuple[str, ...]
+    tracked_as: tuple[str, ...]
+    page: Path
+    document: Path
+    command: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SweepReady(Event):
+    """Every trial of a sweep is on disk, and its winner has gone through the steps.
+
+    Args:
+        record: The trials.
+        folder: The run folder.
+        command: The command that makes it again.
+        data: Name of the data set.
+        seed: Seed of the sweep.
+    """
+
+    record: SweepRecord
+    folder: Path
+    command: str
+    data: str
+    seed: int
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

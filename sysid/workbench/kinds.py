@@ -10,6 +10,7 @@ import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,10 +66,27 @@ class Kind:
         return loaded
 
 
+FOUND: dict[str, Kind] = {
+    "sysid.judges": Kind(
+        config="sysid.workbench.judgement.config:JudgementConfig",
+        runner="sysid.workbench.judgement.runner:run_judgement",
+    ),
+    "sysid.makers": Kind(
+        config="sysid.workbench.making.config:MakingConfig", runner="sysid.workbench.making.runner:run_making"
+    ),
+}
+"""Entry-point groups whose names are kinds too: packages bring them, and what they are about is not known here."""
+
 KINDS: dict[str, Kind] = {
     DEFAULT: Kind(config="sysid.workbench.config:PipelineConfig", runner="sysid.workbench.commands.run:run_fits"),
 }
 """The kinds by name."""
+
+
+def kinds() -> dict[str, Kind]:
+    """All kinds by name: those of :data:`KINDS`, and those that installed packages bring."""
+    found = {entry.name: kind for group, kind in FOUND.items() for entry in entry_points(group=group)}
+    return {**found, **KINDS}
 
 
 def kind_of(path: Path) -> str:
@@ -78,18 +96,19 @@ def kind_of(path: Path) -> str:
         path: The YAML file.
 
     Returns:
-        A key of :data:`KINDS`.
+        A key of :func:`kinds`.
 
     Raises:
         ConfigError: If the file cannot be read, or there is no such kind.
     """
     name = read_yaml(path).get("kind", DEFAULT)
-    if not isinstance(name, str) or name not in KINDS:
-        near = difflib.get_close_matches(str(name), KINDS, n=1)
+    known = kinds()
+    if not isinstance(name, str) or name not in known:
+        near = difflib.get_close_matches(str(name), known, n=1)
         raise ConfigError(
             "unknown kind of pipeline",
             where=f"{path}, kind",
-            expected=f"one of {', '.join(KINDS)}",
+            expected=f"one of {', '.join(known)}",
             got=repr(name),
             remedy=f"did you mean {near[0]}?" if near else f"leave kind out for a pipeline of {DEFAULT}",
         )

@@ -6,6 +6,7 @@ promote``. Whoever loads ``models:/<name>@champion`` gets what was last promoted
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,6 +55,33 @@ def registered_name(mapping: str) -> str:
         'bp-ar-to-bc'
     """
     return "-to-".join(slug(side) for side in mapping.split("->"))
+
+
+def parsed(address: str) -> tuple[str, str | None, str | None]:
+    """The parts of a registered model's address.
+
+    Args:
+        address: ``models:/<name>@<alias>`` or ``models:/<name>/<version>``.
+
+    Returns:
+        Name, alias and version; one of the latter two is ``None``.
+
+    Raises:
+        ConfigError: If it is no such address.
+
+    Example:
+        >>> parsed("models:/level@champion"), parsed("models:/level/3")
+        (('level', 'champion', None), ('level', None, '3'))
+    """
+    found = re.fullmatch(r"models:/([^/@]+)(?:@([^/@]+)|/([0-9]+))", address)
+    if found is None:
+        raise ConfigError(
+            "not the address of a registered model",
+            expected="models:/<name>@<alias> or models:/<name>/<version>",
+            got=address,
+            remedy="write for example models:/level@champion",
+        )
+    return found.group(1), found.group(2), found.group(3)
 
 
 def register(client: Any, mapping: str, *, source: str, run_id: str, model_id: str | None, fit: str) -> str:

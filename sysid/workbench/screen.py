@@ -78,6 +78,17 @@ class LogFile:
     def __init__(self) -> None:
         self._path: Path | None = None
 
+    def write_to(self, folder: Path, command: str) -> None:
+        """Begin the log of a run that does not say so itself.
+
+        Args:
+            folder: The run folder.
+            command: What was typed.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        self._path = folder / "log.txt"
+        self._write(f"run {time.strftime('%Y%m%d-%H%M%S')}: {command}")
+
     def __call__(self, event: Event) -> None:
         """Write an event down."""
         match event:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 import os
+import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -23,10 +24,21 @@ from filelock import FileLock
 from numpy.typing import NDArray
 
 from sysid.atomic import replacing
+from sysid.errors import ConfigError
+from sysid.export import zip_bundle
 from sysid.workbench import tracked, views
-from sysid.workbench.events import BundleReady, DataLoaded, Event, FitReady, ReportReady, RunStarted
+from sysid.workbench.events import (
+    BundleReady,
+    DataLoaded,
+    Event,
+    FitReady,
+    JudgementReady,
+    ReportReady,
+    RunStarted,
+)
+from sysid.workbench.judgement.logged import log_judgement
 from sysid.workbench.naming import slug
-from sysid.workbench.registry import register
+from sysid.workbench.registry import parsed, register
 
 KEY_TAG = "sysid.key"
 """Tag that holds the digest of everything a fit and its figures depend on."""
@@ -161,6 +173,8 @@ class Tracker:
                 self._log_bundle(event)
             case ReportReady():
                 self._log_report(event)
+            case JudgementReady():
+                self._log_judgement(event)
             case _:
                 pass
 
@@ -218,7 +232,8 @@ class Tracker:
             if self.artifacts is not None:
                 location = (self.artifacts / slug(name)).resolve().as_uri()
             try:
-                tags = {"mlflow.note.content": f"Fits of {name}.", "mlflow.experimentKind": "custom_model_development"}
+                # Otherwise MLflow asks every visitor what kind of experiment it is.
+                tags = {"mlflow.experimentKind": "custom_model_development"}
                 return str(self.client.create_experiment(name, artifact_location=location, tags=tags))
             except MlflowException:
                 # Another process has just made it.
@@ -277,6 +292,10 @@ class Tracker:
         if ready.stored and self.client.get_run(run_id).data.tags.get("exported") == "yes":
             return
         self.client.log_artifacts(run_id, str(ready.folder), "bundle")
+        with tempfile.TemporaryDirectory() as scratch:
+            # The page downloads files, not folders.
+            packed = zip_bundle(ready.folder, Path(scratch) / f"{slug(tracked.run_name(ready.of))}.zip")
+            self.client.log_artifact(run_id, str(packed))
         sequence = next((entry for entry in ready.exports if Path(entry["file"]).name == SEQUENCE_FILE), None)
         if sequence is not None:
             self._log_model(run_id, ready.folder.parent / sequence["file"], ready)
@@ -323,12 +342,55 @@ class Tracker:
         _, state = network.graph.input
         return {"u": columns[:, None, :], "state": np.zeros((1, state.type.tensor_type.shape.dim[1].dim_value))}
 
+    def _log_judgement(self, ready: JudgementReady) -> None:
+        from mlflow.entities import Metric
+
+        if self.client is None:
+            self.client = connect(self.uri)
+        log_judgement(
+            self.client, ready, key_tag=KEY_TAG, experiment=self._experiment(ready.kind), metric=Metric
+        )
+
     def _log_report(self, ready: ReportReady) -> None:
         run_id = self.run_ids.get(ready.of.config.name)
         if self.client is None or run_id is None:
             return
         self.client.log_artifact(run_id, str(ready.page), "report")
         self.client.log_artifact(run_id, str(ready.results), "report")
+
+
+def fetch_bundle(uri: str, address: str, folder: Path) -> tuple[Path, str]:
+    """The bundle of a registered model.
+
+    Args:
+        uri: The tracking URI.
+        address: ``models:/<name>@<alias>`` or ``models:/<name>/<version>``.
+        folder: Where it is put.
+
+    Returns:
+        The bundle's folder, and the run that tracks it.
+
+    Raises:
+        ConfigError: If there is no such model, or its run holds no bundle.
+    """
+    client = connect(uri)
+    name, alias, version = parsed(address)
+    with _no_deprecations():
+        from mlflow.exceptions import MlflowException
+
+        try:
+            found = client.get_model_version_by_alias(name, alias) if alias else client.get_model_version(name, version)
+            target = folder / f"{slug(name)}-{found.version}"
+            target.mkdir(parents=True, exist_ok=True)
+            return Path(client.download_artifacts(found.run_id, "bundle", str(target))), str(found.run_id)
+        except (MlflowException, OSError) as error:
+            raise ConfigError(
+                "the registered model cannot be had",
+                where=address,
+                expected="a model that sysid run has exported and tracked",
+                got=str(error).splitlines()[0],
+                remedy="look for its name and version under Models in sysid ui",
+            ) from error
 
 
 def _signature(network: Any) -> Any:

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from sysid.workbench.config import find_pipeline, read_pipeline
 from sysid.workbench.events import Warned, Watcher
-from sysid.workbench.kinds import KINDS, RunRequest, kind_of
+from sysid.workbench.kinds import RunRequest, kind_of, kinds
 from sysid.workbench.pipeline import run_pipeline
 from sysid.workbench.screen import LogFile, Screen, table_of_fits
 from sysid.workbench.tracking import Tracker
@@ -45,7 +45,7 @@ def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool)
     """
     path = find_pipeline(pipeline)
     request = RunRequest(path=path, typed=pipeline, fresh=fresh, out=out, tracking=tracking)
-    return KINDS[kind_of(path)].load_runner()(request)
+    return kinds()[kind_of(path)].load_runner()(request)
 
 
 def run_fits(request: RunRequest) -> int:

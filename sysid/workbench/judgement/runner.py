@@ -1,0 +1,210 @@
+"""A run of a pipeline that judges: models loaded, steps done or found again, one document, report, tracking."""
+
+from __future__ import annotations
+
+import shlex
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sysid.errors import ConfigError
+from sysid.reporting.judgement import FOLDER, parse_judgement
+from sysid.reporting.judgement_report import (
+    JudgementResults,
+    SceneRecord,
+    SubjectRecord,
+    read_judgement_results,
+    write_judgement_results,
+)
+from sysid.workbench.environment import environment
+from sysid.workbench.events import Event, JudgementReady, StepDone, StepStarted, Warned, Watcher
+from sysid.workbench.judgement.config import JudgementConfig
+from sysid.workbench.judgement.judge import Judge, find_judge
+from sysid.workbench.judgement.sources import Fetch, Found, find_model
+from sysid.workbench.kept_steps import do_steps
+from sysid.workbench.kinds import RunRequest
+from sysid.workbench.naming import slug
+from sysid.workbench.store import RunFolder, digest, strict, write_bytes, write_json
+from sysid.yaml_files import check, read_yaml
+
+
+def run_judgement(request: RunRequest) -> int:
+    """Run a pipeline that judges.
+
+    Args:
+        request: What was asked.
+
+    Returns:
+        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
+
+    Raises:
+        UserError: If the pipeline, a model or an option cannot be used.
+    """
+    from sysid.workbench.commands.run import console
+    from sysid.workbench.screen import LogFile, Screen
+    from sysid.workbench.tracking import Tracker, fetch_bundle, store_uri
+
+    config = check(JudgementConfig, read_yaml(request.path), where=request.path)
+    folder = (request.out or Path("runs") / config.name).resolve()
+    words = ["sysid", "run", request.typed, *(["--out", str(request.out)] if request.out else [])]
+    target = console()
+    screen, log = Screen(target), LogFile()
+    log.write_to(folder, shlex.join(words))
+    watchers: list[Watcher] = [screen, log]
+
+    def warn(text: str) -> None:
+        for watch in (screen, log):
+            watch(Warned(text=text))
+
+    tracker = Tracker.of_workspace(Path.cwd(), warn) if request.tracking else None
+    watchers += [tracker] if tracker else []
+    run = _Run(
+        config=config,
+        text=request.path.read_bytes(),
+        judge=find_judge(config.kind, where=request.path),
+        where=request.path,
+        store=RunFolder(path=folder),
+        command=shlex.join(words),
+        fresh=request.fresh,
+        watchers=watchers,
+        fetch=lambda address: fetch_bundle(store_uri(Path.cwd()), address, folder / "models"),
+    )
+    try:
+        with run.store.locked():
+            results, page = run.all()
+    finally:
+        screen.close()
+    target.print()
+    target.print(results.judgement.headline, soft_wrap=True)
+    target.print(f"Report:  {page}\nResults: {run.store.results}", soft_wrap=True)
+    if tracker is not None and tracker.failures:
+        target.print(
+            "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
+        )
+        return 1
+    return 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Run:
+    """One run: what its steps have in common."""
+
+    config: JudgementConfig
+    text: bytes
+    judge: Judge
+    where: Path
+    store: RunFolder
+    command: str
+    fresh: bool
+    watchers: Sequence[Watcher]
+    fetch: Fetch
+    environment: Mapping[str, Any] = field(default_factory=environment)
+
+    def all(self) -> tuple[JudgementResults, Path]:
+        """Every step, in order; the results and the page."""
+        write_bytes(self.store.path / "pipeline.yaml", self.text)
+        write_json(self.store.path / "environment.json", self.environment)
+        options = check(self.judge.options, self.config.options, where=f"{self.where}, options")
+        found = self._find()
+        subjects = {
+            subject.name: [
+                (one.model, part.options) for one, part in zip(found[subject.name], subject.parts, strict=True)
+            ]
+            for subject in self.config.subjects
+        }
+        done = do_steps(
+            self.judge.steps(options, subjects),
+            title="Judging",
+            version=self.judge.version,
+            store=self.store,
+            fresh=self.fresh,
+            tell=self._tell,
+        )
+        document = self.judge.document(options, subjects, done)
+        results = self._results(found, strict(document))
+        page = self._report(results, found)
+        self._track(results, found, page)
+        return results, page
+
+    def _tell(self, event: Event) -> None:
+        for watch in self.watchers:
+            watch(event)
+
+    def _find(self) -> dict[str, list[Found]]:
+        step = "Loading the models"
+        self._tell(StepStarted(step=step))
+        found = {}
+        for subject in self.config.subjects:
+            for part in subject.parts:
+                check(self.judge.part_options, part.options, where=f"{self.where}, {subject.name}, options")
+            found[subject.name] = [find_model(part, workspace=Path.cwd(), fetch=self.fetch) for part in subject.parts]
+        self._tell(StepDone(step=step, stored=False, detail=", ".join(found)))
+        return found
+
+    def _results(self, found: Mapping[str, Sequence[Found]], document: Any) -> JudgementResults:
+        results = JudgementResults(
+            kind=self.config.kind,
+            pipeline=self.config.name,
+            description=self.config.description,
+            command=self.command,
+            created=time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+            environment=dict(self.environment),
+            data=SceneRecord(name=f"of the judge {self.config.kind}"),
+            subjects=[SubjectRecord(name=name, parts=[one.said for one in parts]) for name, parts in found.items()],
+            judgement=parse_judgement(document, where=f"judge {self.config.kind}"),
+        )
+        before = _stored(self.store.path)
+        if before is not None and _undated(before) == _undated(results):
+            # Nothing is new, so that what was made then keeps its date.
+            return before
+        write_judgement_results(self.store.path, results)
+        return results
+
+    def _report(self, results: JudgementResults, found: Mapping[str, Sequence[Found]]) -> Path:
+        from sysid.reporting.report import write_report
+
+        step = "Writing the report"
+        self._tell(StepStarted(step=step))
+        page = write_report(self.store.path)
+        folders = dict.fromkeys(one.run_folder for parts in found.values() for one in parts if one.run_folder)
+        for folder in folders:
+            # With the fits that were judged, so that their own report shows it too.
+            write_json(folder / FOLDER / f"{slug(self.config.name)}.json", results.judgement.model_dump(mode="json"))
+            try:
+                write_report(folder)
+            except ConfigError as error:
+                self._tell(Warned(text=f"the report of {folder} is not written again: {error.what}"))
+        self._tell(StepDone(step=step, stored=False, detail=str(page)))
+        return page
+
+    def _track(self, results: JudgementResults, found: Mapping[str, Sequence[Found]], page: Path) -> None:
+        for subject, metrics in results.judgement.metrics.items():
+            parts = found[subject]
+            self._tell(
+                JudgementReady(
+                    kind=self.config.kind,
+                    pipeline=self.config.name,
+                    subject=subject,
+                    digest=digest(strict({"metrics": metrics, "headline": results.judgement.headline})),
+                    metrics=metrics,
+                    fit_keys=tuple(one.fit_key for one in parts if one.fit_key),
+                    tracked_as=tuple(one.tracked_as for one in parts if one.tracked_as),
+                    page=page,
+                    document=self.store.results,
+                    command=self.command,
+                )
+            )
+
+
+def _stored(folder: Path) -> JudgementResults | None:
+    try:
+        return read_judgement_results(folder)
+    except ConfigError:
+        # Damaged, or of another release: written anew.
+        return None
+
+
+def _undated(results: JudgementResults) -> str:
+    return results.model_copy(update={"created": ""}).model_dump_json()

@@ -1,0 +1,27 @@
+"""The YAML of a pipeline whose product is a data set."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, Field
+
+from sysid.workbench.fields import STRICT
+
+
+class MakingConfig(BaseModel):
+    """A pipeline whose product is a data set.
+
+    Args:
+        kind: Name of the maker.
+        name: Name of the data set and of the run folder; letters, digits, dots, dashes and underscores.
+        description: What it is for.
+        options: The maker's own.
+    """
+
+    model_config = STRICT
+
+    kind: str
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    description: str = ""
+    options: dict[str, Any] = Field(default_factory=dict)
