@@ -1,0 +1,132 @@
+"""MLflow's pages on the real server, as somebody sees them who compares fits."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sysid.workbench.cli import run_cli
+
+pytestmark = pytest.mark.browser
+
+MAPPING = "pump -> level"
+RUNS = ("ARX [2; 2; 1] · open", "NARX 2/2/5 · open", "NARX 2/2/5 · closed")
+BEST, PARENT = "NARX 2/2/5 · closed", "one step ahead"
+COLUMNS = ("mean_free_run_mse", "worst_free_run_mse", "mean_nrmse_fit", "mean_run_time_s", "parameters")
+CASE = "VAL"
+WIDE = "[...document.querySelectorAll('img')].filter(image => image.naturalWidth > 300)"
+"""Pictures of a fit, as told from icons."""
+
+
+@pytest.fixture(scope="module")
+def tracked_workspace(browser, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A new user's workspace after their first run: three fits, the best of them exported."""
+    workspace = tmp_path_factory.mktemp("seen") / "mine"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("MLFLOW_TRACKING_URI", raising=False)
+        assert run_cli(["init", str(workspace)]) == 0
+        patch.chdir(workspace)
+        assert run_cli(["run", "tank"]) == 0
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def address(tracked_workspace: Path) -> Iterator[str]:
+    """Where ``sysid ui`` says that fits are compared."""
+    command = [str(Path(sys.executable).with_name("sysid")), "ui", "--no-browser", "--port", "5210"]
+    process = subprocess.Popen(command, cwd=tracked_workspace, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    with process.stdout:
+        told = ""
+        while not told:
+            line = process.stdout.readline()
+            assert line, "the server ended before it told its address"
+            told = line.partition("Compare fits at ")[2].strip()
+        yield told
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=30) == 0
+
+
+def open_runs(page, address: str) -> None:
+    """The page that ``sysid ui`` opens, MLflow's assistant put away, which covers a quarter of it at first."""
+    page.goto(address)
+    page.get_by_text(RUNS[0]).first.wait_for()
+    close = page.get_by_role("button", name="Close").first
+    if close.is_visible():
+        close.click()
+
+
+def test_the_page_that_opens_lists_the_fits_best_first_with_the_columns_that_matter(page, address, picture) -> None:
+    open_runs(page, address)
+    names = [row.inner_text() for row in page.get_by_role("link", name=re.compile(f"{MAPPING} · ")).all()]
+    picture("runs")
+    assert names[0] == f"{MAPPING} · {BEST}"
+    assert set(names) == {f"{MAPPING} · {run}" for run in RUNS}
+    heads = page.locator(".ag-header-cell-text, [role=columnheader]").all_inner_texts()
+    shown = [head.strip() for head in dict.fromkeys(heads) if head.strip() in COLUMNS]
+    assert shown == list(COLUMNS)
+    figures = [float(text) for text in page.locator("[role=gridcell][col-id*=mean_free_run_mse]").all_inner_texts()]
+    assert len(figures) == 3
+    assert figures == sorted(figures)
+
+
+def test_two_fits_are_compared_with_their_pictures_side_by_side(page, address, picture) -> None:
+    open_runs(page, address)
+    boxes = [box for box in page.locator(".ag-row input[type=checkbox]").all() if box.is_visible()]
+    for box in boxes[:2]:
+        box.check()
+    page.get_by_role("button", name="Compare", exact=True).click()
+    page.get_by_text("Comparing 2 Runs from 1 Experiment").wait_for()
+    picture("comparison")
+    page.get_by_text("target and output", exact=True).first.click()
+    page.get_by_text(f"{CASE}.png").first.click()
+    page.wait_for_function(f"{WIDE}.length === 2")
+    page.evaluate(f"{WIDE}[0].scrollIntoView({{block: 'center'}})")
+    picture("pictures")
+    left, right = page.evaluate(f"{WIDE}.map(image => image.getBoundingClientRect().toJSON())")
+    assert left["top"] == right["top"]
+    assert left["right"] <= right["left"]
+
+
+def test_charts_plot_at_once_and_show_the_pictures_of_every_fit(page, address, picture) -> None:
+    open_runs(page, address.replace("viewStateShareKey", "compareRunsMode=CHART&viewStateShareKey"))
+    page.get_by_text("at a glance").wait_for()
+    page.locator(".js-plotly-plot .bars path, .js-plotly-plot .point").first.wait_for()
+    picture("charts")
+    search = page.get_by_placeholder("Search metric charts")
+    search.fill(f"target and output/{CASE}")
+    page.wait_for_function(f"{WIDE}.length === {len(RUNS)}")
+    picture("pictures")
+    search.fill("learning")
+    page.locator(".js-plotly-plot .scatterlayer path").first.wait_for()
+    picture("learning")
+
+
+def test_the_bundle_is_downloaded_from_the_fit_that_also_links_to_its_parent(
+    page, address, picture, tracked_workspace, tmp_path
+) -> None:
+    open_runs(page, address)
+    page.get_by_role("link", name=BEST).first.click()
+    page.get_by_text("Description", exact=True).wait_for()
+    picture("fit")
+    assert page.get_by_text("tank (").first.is_visible(), "the data set and its digest"
+    assert page.get_by_role("link", name=f"started from {PARENT}").is_visible()
+    page.get_by_role("link", name="bundle", exact=True).click()
+    page.get_by_text("MODEL_CARD.md").wait_for()
+    picture("bundle")
+    page.get_by_text("pump-level-narx-2-2-5-closed.zip").first.click()
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name=re.compile("[Dd]ownload")).or_(page.get_by_title("Download artifact")).first.click()
+    waiting.value.save_as(tmp_path / "bundle.zip")
+    with zipfile.ZipFile(tmp_path / "bundle.zip") as packed:
+        assert packed.testzip() is None
+        assert {"model.json", "step.onnx", "sequence.onnx"} <= set(packed.namelist())
+        model = (tracked_workspace / "runs" / "tank" / "bundle" / "model.json").read_bytes()
+        assert packed.read("model.json") == model
