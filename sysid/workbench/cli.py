@@ -113,6 +113,26 @@ def run(
     raise typer.Exit(run_command(pipeline, fresh=fresh, out=out, tracking=not no_tracking))
 
 
+@app.command(epilog="Example: sysid sweep closed-loop-sweep --workers 4")
+def sweep(  # noqa: PLR0917 - one parameter an option, by name on the command line
+    pipeline: Annotated[str, typer.Argument(help="Name of a pipeline of kind sweep, or its YAML file.")],
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes that train, one thread each; what the YAML says by default.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Only go on with a sweep that was begun; refuse to begin one.")
+    ] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Do everything again, whatever is stored.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/<pipeline> by default.")] = None,
+    no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
+) -> None:
+    """Try what is in the ranges of a pipeline and export the best. A sweep that was killed goes on where it was."""
+    from sysid.workbench.commands.sweep import sweep_command
+
+    code = sweep_command(pipeline, workers=workers, resume=resume, fresh=fresh, out=out, tracking=not no_tracking)
+    raise typer.Exit(code)
+
+
 @app.command(epilog="Example: sysid ingest measurements.csv")
 def ingest(
     source: Annotated[str, typer.Argument(help="A file with traces, or the name of a data set.")],

@@ -79,6 +79,9 @@ FOUND: dict[str, Kind] = {
 
 KINDS: dict[str, Kind] = {
     DEFAULT: Kind(config="sysid.workbench.config:PipelineConfig", runner="sysid.workbench.commands.run:run_fits"),
+    "sweep": Kind(
+        config="sysid.workbench.sweep_config:SweepConfig", runner="sysid.workbench.commands.sweep:run_sweep_request"
+    ),
 }
 """The kinds by name."""
 

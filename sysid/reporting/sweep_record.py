@@ -1,0 +1,243 @@
+"""sweep.json: what a sweep tried and found, read and written with its contract; beside ``results.json``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sysid.atomic import replacing
+from sysid.errors import ConfigError
+from sysid.reporting.results import Number
+
+SCHEMA_VERSION: Final = 1
+SWEEP_FILE: Final = "sweep.json"
+
+
+class _Record(BaseModel):
+    """Frozen; keys from a later release are kept."""
+
+    model_config = ConfigDict(frozen=True, extra="allow", protected_namespaces=())
+
+
+class TrialCase(_Record):
+    """One trial on one case."""
+
+    role: str
+    free_run_mse: Number = Field(description="In the output's unit squared.")
+    one_step_mse: Number = Field(description="In the output's unit squared.")
+    run_time_s: Number = Field(description="Seconds of the free run: least of the repeats.")
+
+
+class Trial(_Record):
+    """One point that was tried."""
+
+    number: int = Field(ge=1, description="Its place in the grid.")
+    key: str = Field(description="Digest of everything it depends on.")
+    label: str
+    structure: dict[str, Any]
+    values: dict[str, Any] = Field(default={}, description="Its value in each range.")
+    status: str = Field(description="Name of the fit's status, or FAILED.")
+    usable: bool
+    reason: str = Field(default="", description="Why it failed.")
+    dropped_at: int | None = Field(default=None, description="Look after which it was dropped, from 1 on.")
+    iterations: int = 0
+    seconds: Number = Field(default=math.nan, description="Wall time of all of its training.")
+    cpu_s: Number = Field(default=math.nan, description="Processor time of all of its training and scoring.")
+    parameters: int = 0
+    operations: int = Field(default=0, description="Multiplications of one step.")
+    log_evidence: Number = math.nan
+    selection_free_run_mse: Number = math.nan
+    selection_one_step_mse: Number = math.nan
+    cases: dict[str, TrialCase] = {}
+
+    @property
+    def in_full(self) -> bool:
+        """Whether it was trained to the end and may be chosen."""
+        return self.usable and self.dropped_at is None
+
+    def mean(self, figure: str, on: str = "cases") -> float:
+        """Mean over cases, or over the selection traces, of one of the figures of a case.
+
+        Args:
+            figure: ``free_run_mse``, ``one_step_mse`` or ``run_time_s``.
+            on: ``cases``, ``estimation`` or ``selection``.
+
+        Returns:
+            The mean; NaN without such cases.
+        """
+        if on == "selection" and figure != "run_time_s":
+            return float(getattr(self, f"selection_{figure}"))
+        cases = [case for case in self.cases.values() if on != "estimation" or case.role == "estimation"]
+        return sum(float(getattr(case, figure)) for case in cases) / len(cases) if cases else math.nan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """A figure of merit of a trial; less is better.
+
+    Args:
+        words: What it is, for axes and tables.
+        unit: Its unit; ``{unit}`` stands for the output's.
+        of: Its value for a trial, on some traces.
+        measured: Whether it changes with the load of the machine.
+    """
+
+    words: str
+    unit: str
+    of: Callable[[Trial, str], float]
+    measured: bool = False
+
+
+FIGURES: Final[dict[str, Figure]] = {
+    "free_run_mse": Figure(words="free-run mse", unit="{unit}²", of=lambda trial, on: trial.mean("free_run_mse", on)),
+    "one_step_mse": Figure(words="one-step mse", unit="{unit}²", of=lambda trial, on: trial.mean("one_step_mse", on)),
+    "run_time": Figure(words="mean run time", unit="s", of=lambda trial, _: trial.mean("run_time_s"), measured=True),
+    "operations": Figure(words="multiplications a step", unit="", of=lambda trial, _: float(trial.operations)),
+    "parameters": Figure(words="parameters", unit="", of=lambda trial, _: float(trial.parameters)),
+    "evidence": Figure(words="minus log evidence", unit="", of=lambda trial, _: -trial.log_evidence),
+    # "Best of both", error times run time: in free run, and one step ahead as in Lopes 2021, section 4.5.
+    "BB": Figure(
+        words="BB: free-run mse × run time",
+        unit="{unit}² s",
+        of=lambda trial, on: trial.mean("free_run_mse", on) * trial.mean("run_time_s"),
+        measured=True,
+    ),
+    "BB_one_step": Figure(
+        words="BB: one-step mse × run time",
+        unit="{unit}² s",
+        of=lambda trial, on: trial.mean("one_step_mse", on) * trial.mean("run_time_s"),
+        measured=True,
+    ),
+}
+"""The figures that a sweep can minimise, choose by, and show."""
+
+
+class SweepRecord(_Record):
+    """All of sweep.json."""
+
+    schema_version: int = SCHEMA_VERSION
+    name: str
+    mapping: str
+    unit: str = Field(description="Unit of the output.")
+    method: str
+    loop: str = ""
+    points: int = Field(description="Points of the grid, whether all were tried or not.")
+    objectives: list[str]
+    choose_by: str
+    choose_on: str
+    chosen_by: str = Field(description="One sentence: by which figure, on which traces.")
+    reproduces: str | None = None
+    published: str | None = None
+    warm_start: str = "none"
+    rungs: list[dict[str, Any]] = []
+    workers: int
+    wall_s: Number = Field(description="Seconds from the first trial to the last, of all sessions together.")
+    winner: int | None = Field(default=None, description="Number of the trial that was chosen.")
+    beside: list[Trial] = Field(default=[], description="Chosen by hand, trained like the trials.")
+    trials: list[Trial]
+
+    def figure(self, trial: Trial, name: str) -> float:
+        """A figure of merit of a trial, on the traces that choose."""
+        return FIGURES[name].of(trial, self.choose_on)
+
+    def choice(self, trial: Trial) -> float:
+        """The figure that chooses; infinite where it is not a number."""
+        value = self.figure(trial, self.choose_by)
+        return value if math.isfinite(value) else math.inf
+
+    @property
+    def winning(self) -> Trial | None:
+        """The trial that was chosen."""
+        return next((trial for trial in self.trials if trial.number == self.winner), None)
+
+    @property
+    def tried_in_full(self) -> list[Trial]:
+        """Trials that may be chosen, in the order of the grid."""
+        return [trial for trial in self.trials if trial.in_full]
+
+    def words(self, name: str) -> str:
+        """A figure with its unit, for an axis."""
+        figure = FIGURES[name]
+        unit = figure.unit.format(unit=self.unit)
+        return f"{figure.words} [{unit}]" if unit else figure.words
+
+    def front(self, names: list[str] | None = None) -> list[Trial]:
+        """The trials that no other beats in every one of some figures.
+
+        Args:
+            names: The figures; the objectives by default.
+
+        Returns:
+            The Pareto front, best first in the first figure.
+        """
+        chosen = names or self.objectives
+        scored = [(tuple(self.figure(trial, name) for name in chosen), trial) for trial in self.tried_in_full]
+        scored = [pair for pair in scored if all(math.isfinite(value) for value in pair[0])]
+        kept = [
+            pair
+            for pair in scored
+            if not any(
+                other != pair[0] and all(b <= a for a, b in zip(pair[0], other, strict=True)) for other, _ in scored
+            )
+        ]
+        return [trial for _, trial in sorted(kept, key=lambda pair: (pair[0], pair[1].number))]
+
+
+def has_sweep(folder: Path) -> bool:
+    """Whether a run folder holds a sweep."""
+    return (folder / SWEEP_FILE).is_file()
+
+
+def read_sweep(folder: Path) -> SweepRecord:
+    """Read what a sweep found.
+
+    Args:
+        folder: The run's folder.
+
+    Returns:
+        The record.
+
+    Raises:
+        ConfigError: If there is none, it is damaged, or it was written by a newer release.
+    """
+    path = Path(folder) / SWEEP_FILE
+    try:
+        record = SweepRecord.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise ConfigError(
+            "the record of the sweep cannot be read",
+            where=path,
+            expected=f"what sysid sweep writes, schema_version up to {SCHEMA_VERSION}",
+            got=str(error).splitlines()[0],
+            remedy="run the sweep again; it takes its finished trials from the folder",
+        ) from error
+    if record.schema_version > SCHEMA_VERSION:
+        raise ConfigError(
+            "the sweep was written by a newer release",
+            where=path,
+            expected=f"schema_version up to {SCHEMA_VERSION}",
+            got=record.schema_version,
+            remedy="upgrade the workbench",
+        )
+    return record
+
+
+def write_sweep(folder: Path, record: SweepRecord) -> Path:
+    """Write sweep.json under a temporary name that is then renamed.
+
+    Args:
+        folder: The run's folder.
+        record: What the sweep found.
+
+    Returns:
+        The file.
+    """
+    path = Path(folder) / SWEEP_FILE
+    with replacing(path) as draft:
+        draft.write_text(record.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    return path

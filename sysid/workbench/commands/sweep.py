@@ -1,0 +1,130 @@
+"""``sysid sweep``: a sweep with everybody who listens to it."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from rich.markup import escape
+from rich.table import Table
+
+from sysid.errors import ConfigError
+from sysid.reporting.sweep_record import SweepRecord, Trial
+from sysid.workbench.commands.run import console
+from sysid.workbench.config import find_pipeline
+from sysid.workbench.events import Warned, Watcher
+from sysid.workbench.kinds import KINDS, RunRequest, kind_of
+from sysid.workbench.screen import LogFile, Screen, table_of_fits
+from sysid.workbench.sweep_run import Sweep, read_sweep_file, run_sweep
+from sysid.workbench.sweep_store import TrialStore
+from sysid.workbench.tracking import Tracker
+
+SHOWN = 5
+"""Trials in the table on the screen."""
+
+
+def sweep_command(
+    pipeline: str, *, workers: int | None, resume: bool, fresh: bool, out: Path | None, tracking: bool
+) -> int:
+    """Run a sweep and show how it came out.
+
+    Args:
+        pipeline: Its name or file.
+        workers: Processes that train; what the YAML says by default.
+        resume: Only go on with a sweep that was begun.
+        fresh: Do everything again.
+        out: The run folder.
+        tracking: Whether trials are tracked in MLflow.
+
+    Returns:
+        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
+
+    Raises:
+        UserError: If the pipeline is no sweep, cannot be used, or there is nothing to go on with.
+    """
+    path = find_pipeline(pipeline)
+    kind = kind_of(path)
+    if kind != "sweep":
+        raise ConfigError(
+            f"{pipeline} is not a sweep",
+            where=path,
+            expected="a pipeline with kind: sweep",
+            got=f"kind: {kind}",
+            remedy=f"run it with: sysid run {shlex.quote(pipeline)}" if kind in KINDS else "correct the kind",
+        )
+    sweep = read_sweep_file(path)
+    if workers is not None:
+        sweep = Sweep(config=sweep.config.model_copy(update={"workers": workers}), text=sweep.text, path=sweep.path)
+    folder = out or Path("runs") / sweep.config.name
+    if resume and TrialStore(path=folder / "trials").count() == 0:
+        raise ConfigError(
+            "there is no sweep to go on with",
+            where=folder,
+            expected="a run folder with finished trials",
+            remedy="leave --resume out to begin one, or name its folder with --out",
+        )
+    words = ["sysid", "sweep", pipeline, *(["--out", str(out)] if out else [])]
+    return _run(sweep, folder, shlex.join(words), fresh=fresh, tracking=tracking)
+
+
+def run_sweep_request(request: RunRequest) -> int:
+    """``sysid run`` of a sweep.
+
+    Args:
+        request: What was asked.
+
+    Returns:
+        Exit code, as :func:`sweep_command`.
+    """
+    sweep = read_sweep_file(request.path)
+    folder = request.out or Path("runs") / sweep.config.name
+    words = ["sysid", "sweep", request.typed, *(["--out", str(request.out)] if request.out else [])]
+    return _run(sweep, folder, shlex.join(words), fresh=request.fresh, tracking=request.tracking)
+
+
+def _run(sweep: Sweep, folder: Path, command: str, *, fresh: bool, tracking: bool) -> int:
+    target = console()
+    screen, log = Screen(target), LogFile()
+    watchers: list[Watcher] = [screen, log]
+
+    def warn(text: str) -> None:
+        for watch in (screen, log):
+            watch(Warned(text=text))
+
+    tracker = Tracker.of_workspace(Path.cwd(), warn) if tracking else None
+    watchers += [tracker] if tracker else []
+    try:
+        swept = run_sweep(sweep, folder, command=command, fresh=fresh, watchers=watchers)
+    finally:
+        screen.close()
+    target.print()
+    target.print(_table_of_trials(swept.record))
+    target.print(table_of_fits(swept.results))
+    target.print(f"Best: {swept.results.fits[0].label}. {swept.record.chosen_by}", soft_wrap=True)
+    lines = {
+        "Report": folder / "report" / "index.html",
+        "Bundle": folder / "bundle",
+        "Trials": folder / "sweep.json",
+        "Results": folder / "results.json",
+    }
+    for name, path in lines.items():
+        if path.exists():
+            target.print(f"{name + ':':<9}{path}", soft_wrap=True)
+    if tracker is not None and tracker.failures:
+        target.print(
+            "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
+        )
+        return 1
+    return 0
+
+
+def _table_of_trials(record: SweepRecord) -> Table:
+    """The best trials by what chooses."""
+    table = Table(title=f"Best of {len(record.trials)} trials", title_justify="left", header_style="bold")
+    for name in ("trial", "structure", "parameters", record.words(record.choose_by), record.words("run_time")):
+        table.add_column(escape(name), justify="left" if name == "structure" else "right")
+    ranked: list[Trial] = sorted(record.tried_in_full, key=record.choice)
+    for trial in ranked[:SHOWN]:
+        cells = [str(trial.number), escape(trial.label), str(trial.parameters)]
+        table.add_row(*cells, f"{record.choice(trial):.4g}", f"{record.figure(trial, 'run_time'):.4g}")
+    return table
