@@ -154,7 +154,7 @@ class Driver:
         if before is not None:
             # A state of training belongs to its records; with longer ones only the parameters go on.
             after, resume = before.key, before.record == rung.record
-            done = before.iterations or 0
+            done = (before.iterations or 0) if resume else 0
         elif point.number in self._smaller:
             after = begun[self._smaller[point.number].number].key
         else:
