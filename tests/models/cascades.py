@@ -20,7 +20,7 @@ from sysid.models import (
     parameter_count,
 )
 
-RESTS = {"BP": 90.0, "AR": 90.0, "ER": 90.0, "BC": 0.0}
+RESTS = {"BP": 90.0, "AR": 90.0, "ER": 90.0, "BC": 0.0, "x": 0.0, "y": 0.0}
 
 
 def network(

@@ -1,0 +1,152 @@
+r"""Sensitivities of a cascade's outputs with respect to the parameters of its members, forward and exact.
+
+With the notation of ``sysid/kernels/cascade.py``, let :math:`\theta` be the parameters of all members that are trained.
+For output :math:`j` of a member, with :math:`s_{jk} = V_{jk}(1 - h_k^2)` and regressor :math:`i` reading column
+:math:`\kappa(i)` with lag :math:`l_i`,
+
+.. math::
+    \frac{d y_{j,t}}{d\theta} = \frac{\partial y_{j,t}}{\partial\theta}
+      + \sum_i c_{ji,t}\,\frac{d z_{\kappa(i),\,t-l_i}}{d\theta},
+    \qquad c_{ji,t} = w_{ji} + \sum_k s_{jk,t} W_{ki}.
+
+The sum runs over regressors whose column comes from an output of the cascade, the member's own or an upstream one: the
+sensitivity of the upstream output is an input of the downstream recursion, scaled from the one's numbers to the
+other's. Inputs of the whole contribute nothing. An output held by a constant has a zero row; held by a channel, it has
+that channel's row.
+
+Rows end after the parameters of the member itself: no output depends on members that run later.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sysid.kernels.cascade import FREE, HIGH_CHANNEL, LOW_CHANNEL
+
+_FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def _add(row, factor, past, n):
+    for i in range(n):
+        row[i] += factor * past[i]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def _add_four(row, f0, f1, f2, f3, p0, p1, p2, p3, n):
+    for i in range(n):
+        row[i] += f0 * p0[i] + f1 * p1[i] + f2 * p2[i] + f3 * p3[i]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def _own(row, at, theta, first, j, n, n_x, n_y, linear, x, h):
+    """The part of a row that does not go through earlier samples; ``at`` is where the member's parameters stand."""
+    readout = first + n * (n_x + 1) + j * n
+    for k in range(n):
+        slope = theta[readout + k] * (1.0 - h[k] * h[k])
+        for i in range(n_x):
+            row[at + k * n_x + i] = slope * x[i]
+        row[at + n * n_x + k] = slope
+        row[at + n * (n_x + 1) + j * n + k] = h[k]
+    constants = at + n * (n_x + 1 + n_y)
+    row[constants + j] = 1.0
+    if linear:
+        for i in range(n_x):
+            row[constants + n_y + j * n_x + i] = x[i]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def _factors(c, theta, first, j, n, n_x, n_y, linear, h):
+    """Derivative of an output with respect to each regressor."""
+    readout = first + n * (n_x + 1) + j * n
+    weights = first + n * (n_x + 1 + n_y) + n_y + j * n_x
+    for i in range(n_x):
+        c[i] = theta[weights + i] if linear else 0.0
+    for k in range(n):
+        slope = theta[readout + k] * (1.0 - h[k] * h[k])
+        for i in range(n_x):
+            c[i] += slope * theta[first + k * n_x + i]
+
+
+@njit(cache=True, nogil=True)
+def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, source, carry, J):
+    """Rows ``first`` to ``first + n_rows`` of the Jacobians of all outputs, in their scaled numbers.
+
+    The record is walked in blocks; ``J`` holds ``carry`` rows of the block before, which the caller moves to its head.
+
+    Args:
+        p: The members.
+        depth: As in the pass over the samples.
+        first: First sample of the block.
+        n_rows: Samples in the block.
+        z: As from the pass, shape ``(depth + n_samples, n_columns)``.
+        kept: As from the pass, shape ``(n_samples, n_neurons)``.
+        held: As from the pass, shape ``(n_samples, n_outputs)``.
+        own_first: Where each member's parameters stand in a row; -1 for a member that is not trained.
+        extent: Length of each output's row: after it there are zeros, which are not written.
+        source: Output behind each column of ``z``; -1 for an input of the whole.
+        carry: Rows kept from the block before: the longest lag of a column with a source.
+        J: Shape ``(n_outputs, carry + n_rows, n_parameters)``; rows from ``carry`` on are written.
+    """
+    members, width = len(p.neurons), 0
+    for m in range(members):
+        width = max(width, p.regressor_first[m + 1] - p.regressor_first[m])
+    x, c = np.empty(width), np.empty(width)
+    for r in range(n_rows):
+        t = first + r
+        at_neuron = 0
+        for m in range(members):
+            n = p.neurons[m]
+            first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
+            first_y, n_y = p.output_first[m], p.output_first[m + 1] - p.output_first[m]
+            h = kept[t, at_neuron : at_neuron + n]
+            at_neuron += n
+            for i in range(n_x):
+                x[i] = z[depth + t - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
+            linear = p.theta_first[m + 1] - p.theta_first[m] > n * (n_x + 1 + n_y) + n_y
+            for j in range(n_y):
+                o = first_y + j
+                row = J[o, carry + r]
+                row[: extent[o]] = 0.0
+                code = held[t, o]
+                if code != FREE:
+                    if code in (LOW_CHANNEL, HIGH_CHANNEL):
+                        channel = p.limit_channel[o, 0 if code == LOW_CHANNEL else 1]
+                        for s in range(o):
+                            if p.output_channel[s] == channel:
+                                ratio = p.column_scale[p.output_column[s]] / p.column_scale[p.output_column[o]]
+                                _add(row, ratio, J[s, carry + r], extent[s])
+                    continue
+                if own_first[m] >= 0:
+                    _own(row, own_first[m], p.theta, p.theta_first[m], j, n, n_x, n_y, linear, x, h)
+                if extent[o] == 0:
+                    continue
+                _factors(c, p.theta, p.theta_first[m], j, n, n_x, n_y, linear, h)
+                i = 0
+                while i < n_x:
+                    column = p.regressor_column[first_x + i]
+                    s, end = source[column], i + 1
+                    while end < n_x and p.regressor_column[first_x + end] == column:
+                        end += 1
+                    # Samples before the first do not depend on the parameters.
+                    while end > i and t < p.regressor_lag[first_x + end - 1]:
+                        end -= 1
+                    stop = end
+                    if s >= 0 and extent[s] > 0:
+                        ratio = p.column_scale[p.output_column[s]] / p.column_scale[column]
+                        here = carry + r
+                        while end - i >= 4:
+                            lag = p.regressor_lag[first_x + i : first_x + i + 4]
+                            _add_four(
+                                row, ratio * c[i], ratio * c[i + 1], ratio * c[i + 2], ratio * c[i + 3],
+                                J[s, here - lag[0]], J[s, here - lag[1]], J[s, here - lag[2]], J[s, here - lag[3]],
+                                extent[s],
+                            )  # fmt: skip
+                            i += 4
+                        while i < end:
+                            _add(row, ratio * c[i], J[s, here - p.regressor_lag[first_x + i]], extent[s])
+                            i += 1
+                    i = stop
+                    while i < n_x and p.regressor_column[first_x + i] == column:
+                        i += 1

@@ -1,0 +1,120 @@
+"""Sensitivities through a cascade against finite differences, whatever its wiring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from sysid.errors import ChannelError, ConfigError
+from sysid.estimation.cascade_provider import BLOCK, CascadeProvider
+from sysid.models import Cascade, Limit
+from sysid.testing import finite_difference_jacobian
+from sysid.traces import Channel, Trace
+from tests.models.cascades import CASCADES, command, linear, network, service
+from tests.models.test_cascade import lag
+
+
+def trace(cascade: Cascade, n: int = 60, seed: int = 0, *, usable=None) -> Trace:
+    """A record with the cascade's inputs, and noise for its outputs."""
+    names = cascade.wiring.channels
+    noise = np.random.default_rng(seed).uniform(0.0, 90.0, (n, len(cascade.outputs)))
+    return Trace(
+        name=f"record {seed}",
+        sample_time=0.1,
+        channels=tuple(Channel(name=name, unit="psi") for name in names),
+        values=np.column_stack([command(n, len(cascade.inputs), seed), noise]),
+        usable=usable,
+    )
+
+
+def provider(cascade: Cascade, n: int = 60, **fields) -> CascadeProvider:
+    errors = {name: 0.5 + i for i, name in enumerate(cascade.outputs)}
+    return CascadeProvider(**{"cascade": cascade, "traces": (trace(cascade, n), trace(cascade, n // 2, 1)), "errors": errors} | fields)  # fmt: skip  # noqa: E501
+
+
+def check(one: CascadeProvider, atol: float = 2e-6) -> None:
+    theta = one.theta
+    assert_allclose(one.jacobian(theta), finite_difference_jacobian(one.residuals, theta), rtol=1e-5, atol=atol)
+
+
+@pytest.mark.parametrize("cascade", CASCADES.values(), ids=CASCADES)
+def test_sensitivities_equal_finite_differences(cascade):
+    check(provider(cascade))
+
+
+@pytest.mark.parametrize("trained", [("BP",), ("AR",), ("BC",), ("BP", "BC")], ids="+".join)
+def test_some_members_alone_are_trained(trained):
+    one = provider(service(), trained=trained)
+    assert len(one.theta) == sum(service().member(name).n_parameters for name in trained)
+    check(one)
+
+
+def test_a_target_upstream_of_what_is_trained_does_not_move():
+    one = provider(service(), trained=("AR",), errors={"BP": 1.0, "BC": 2.0})
+    J = one.jacobian(one.theta)
+    assert not J[:60].any()
+    assert J[60:120].any()
+    check(one)
+
+
+def test_an_output_held_by_a_channel_moves_with_it():
+    cascade = replace(service(), limits={"AR": Limit(high="BP"), "BC": Limit(low="AR")})
+    held = cascade.simulate_trace(trace(cascade)).activity
+    assert held["AR"].high > 0
+    assert held["BC"].low > 0
+    check(provider(cascade))
+
+
+def test_blocks_join_without_a_seam():
+    one = provider(service(), n=2 * BLOCK + 57)
+    theta, direction = one.theta, np.random.default_rng(4).standard_normal(len(one.theta))
+    width = 1e-6
+    expected = (one.residuals(theta + width * direction) - one.residuals(theta - width * direction)) / (2 * width)
+    assert_allclose(one.jacobian(theta) @ direction, expected, rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize("stride", [1, 3, 7])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_normal_equations_equal_the_dense_ones(stride, workers):
+    cascade = service()
+    usable = np.random.default_rng(5).random(BLOCK + 90) > 0.2
+    traces = (trace(cascade, BLOCK + 90, usable=usable), trace(cascade, 50, 1))
+    one = provider(cascade, traces=traces, errors={"BC": 2.0, "BP": 0.5}, stride=stride, workers=workers)
+    weights = np.concatenate([np.tile(t.usable_samples[::stride], 2) for t in traces]).astype(float)
+    at, J, e = one.linearise(one.theta), one.jacobian(one.theta), one.residuals(one.theta)
+    assert one.n_samples == weights.sum()
+    assert_allclose(at.loss, 0.5 * np.sum(weights * e**2), rtol=1e-12)
+    assert_allclose(at.loss, one.loss(one.theta), rtol=1e-12)
+    assert_allclose(at.gradient, J.T @ (weights * e), rtol=1e-9, atol=1e-9)
+    assert_allclose(at.gauss_newton, J.T @ (weights[:, None] * J), rtol=1e-9, atol=1e-9)
+
+
+def test_parameters_go_in_and_come_out():
+    cascade = CASCADES["a linear member"]
+    one = provider(cascade)
+    inputs = command()
+    assert_array_equal(one.at(one.theta).simulate(inputs).values, cascade.simulate(inputs).values)
+    moved = one.theta + 0.01
+    assert_array_equal(provider(one.at(moved)).theta, moved)
+
+
+def test_a_model_with_a_state_of_its_own_may_come_before_what_is_trained():
+    cascade = Cascade(models=(lag("STP -> BP"), network("BP -> AR", seed=2), linear("BP+AR -> BC")))
+    one = provider(cascade, trained=("AR", "BC"))
+    check(one)
+    with pytest.raises(ConfigError, match="cannot be trained with the others"):
+        provider(cascade)
+
+
+@pytest.mark.parametrize("fields", [{"errors": {"XX": 1.0}}, {"errors": {}}, {"trained": ("XX",)}], ids=str)
+def test_names_that_are_no_outputs_are_refused(fields):
+    with pytest.raises(ChannelError, match="missing channel"):
+        provider(service(), **fields)
+
+
+def test_a_loss_that_is_not_a_number_is_infinite():
+    one = provider(service())
+    assert one.loss(np.full(len(one.theta), np.nan)) == np.inf
