@@ -254,6 +254,33 @@ class VectorNARXModel:
         """The regressors over inputs and outputs."""
         return self.network.lags(len(self.mapping.inputs), len(self.mapping.outputs))
 
+    def predict(
+        self, signals: Dict[str, NDArray[np.float64]], rest: Dict[str, float]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Prediction one step ahead from measured outputs.
+
+        Args:
+            signals: Every input and output, in its unit, shape ``(n_samples,)`` each.
+            rest: Their values before the first sample.
+
+        Returns:
+            Every output, shape ``(n_samples,)``.
+        """
+        scaling, depth, n_out = self.scaling, self.lags.depth, len(self.mapping.outputs)
+        names = (*self.mapping.inputs, *self.mapping.outputs)
+        z = np.column_stack([np.concatenate([np.full(depth, rest[name]), signals[name]]) for name in names])
+        z = (z - np.array(scaling.input_offset + scaling.output_offset)) / np.array(
+            scaling.input_scale + scaling.output_scale
+        )
+        n, pairs = len(z) - depth, zip(self.lags.input_channel, self.lags.input_lag, strict=True)
+        x = np.column_stack([z[depth - lag : depth - lag + n, column] for column, lag in pairs])
+        k, r = self.network.neurons, x.shape[1]
+        W, b, V, c, w = np.split(self.theta, np.cumsum([k * r, k, n_out * k, n_out]))
+        y = np.tanh(x @ W.reshape(k, r).T + b) @ V.reshape(n_out, k).T + c
+        y = np.clip(y + x @ w.reshape(n_out, r).T if len(w) else y, -self.clamp, self.clamp)
+        y = y * np.array(scaling.output_scale) + np.array(scaling.output_offset)
+        return {name: y[:, j] for j, name in enumerate(self.mapping.outputs)}
+
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""
         scaling = self.scaling

@@ -1,22 +1,33 @@
 """Models and traces in, figures of merit out."""
 
 from sysid.validation.evaluate import CaseResult, Evaluation, evaluate, evaluate_case
+from sysid.validation.evaluate_cascade import CascadeEvaluation, evaluate_cascade
 from sysid.validation.intervals import CaseIntervals, Coverage, OutputInterval, predict_interval
 from sysid.validation.linearity import Linearity, judge_linearity
 from sysid.validation.metrics import Figures, figures
 from sysid.validation.residuals import ResidualAnalysis, analyse_residuals
+from sysid.validation.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
+from sysid.validation.stability import Stability, check_stability
 
 __all__ = [
+    "AbstractSequences",
+    "CascadeEvaluation",
     "CaseIntervals",
     "CaseResult",
     "Coverage",
     "Evaluation",
+    "Excursions",
     "Figures",
+    "InputSequence",
     "Linearity",
     "OutputInterval",
     "ResidualAnalysis",
+    "Stability",
+    "TraceSequences",
     "analyse_residuals",
+    "check_stability",
     "evaluate",
+    "evaluate_cascade",
     "evaluate_case",
     "figures",
     "judge_linearity",
