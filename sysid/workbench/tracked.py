@@ -67,10 +67,10 @@ def description(ready: FitReady, run: RunStarted, links: Mapping[str, str]) -> s
     Returns:
         Markdown.
     """
-    lines = [f"**{ready.config.name}** of the pipeline `{run.config.name}`. {ready.fit.status.value}", ""]
-    lines += [f"* {note}" for note in ready.fit.notes]
-    if links:
-        lines += ["", " · ".join(f"[{words}]({address})" for words, address in links.items())]
+    # MLflow shows the first few lines and hides the rest behind a click: what leads elsewhere stands first.
+    leads = [f"[{words}]({address})" for words, address in links.items()]
+    lines = [" · ".join([f"**{ready.config.name}** of the pipeline `{run.config.name}`", *leads]), ""]
+    lines += [ready.fit.status.value, "", *(f"* {note}" for note in ready.fit.notes)]
     return "\n".join([*lines, "", f"Made by `{run.command}`."])
 
 
@@ -116,6 +116,8 @@ def metrics(ready: FitReady) -> dict[str, float]:
     if fit.evidence is not None:
         found["log_evidence"] = fit.evidence.log_evidence
         found["effective_parameters"] = fit.evidence.total_effective_parameters
+    if fit.stability is not None:
+        found["unstable_sequences"] = fit.stability["unbounded"] + fit.stability["unsettled"]
     for name, case in cases.items():
         case_name = key(name)
         found[f"free_run_mse/{case_name}"] = case.free_run.mse
