@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
 from sysid.export.layout import DelayLine, LinearState, StateLayout, layout_of, recursion_of
-from sysid.models import AbstractForm, AbstractModel, History, Recursion
+from sysid.models import AbstractForm, AbstractModel, History, Recursion, Wiring
 
 Range = tuple[float, float]
 """Least and greatest value, in the channel's unit."""
@@ -131,8 +130,8 @@ class Surrogate:
         """Models wired by the names of their channels.
 
         Args:
-            models: In the order in which they run: a model reads an earlier one's output under its name, and
-                whatever no earlier model computes is an input of the whole.
+            models: In any order that :class:`~sysid.models.Wiring` can put right: a model reads another's output under
+                its name, and whatever no model computes is an input of the whole.
             ranges: The values that inputs are declared for, by channel.
             starts: The values of inputs that nobody sets, by channel; the middle of their range by default, 0
                 without one.
@@ -141,16 +140,13 @@ class Surrogate:
             The surrogate.
 
         Raises:
-            ConfigError: If there is no model, an output is computed twice or only after it is read, or sample times
-                or units differ.
+            ConfigError: If there is no model, an output is computed twice, the models read each other in a circle, or
+                sample times or units differ.
         """
-        _check_wiring(models)
-        units: dict[str, str] = {}
-        computed = [model.mapping.output for model in models]
-        for model in models:
-            units |= dict(zip(model.mapping.inputs, model.input_units, strict=True))
-        inputs = [name for name in units if name not in computed]
-        columns = {name: i for i, name in enumerate([*inputs, *computed])}
+        wiring = Wiring.of(models)
+        models = [models[i] for i in wiring.order]
+        units, inputs = wiring.units, wiring.inputs
+        columns = {name: i for i, name in enumerate(wiring.channels)}
         stages, first = [], 0
         for model in models:
             stages.append(
@@ -269,29 +265,6 @@ class Surrogate:
             "lines": [line.to_dict() for line in self.lines],
         }
         return text | ({"state_spaces": [{"first": at, **state.to_dict()} for at, state in spaces]} if spaces else {})
-
-
-def _check_wiring(models: Sequence[AbstractModel]) -> None:
-    computed = [model.mapping.output for model in models]
-    faults = [f"{name} is computed twice" for name in sorted(set(computed)) if computed.count(name) > 1]
-    faults += [] if models else ["there is no model"]
-    units: dict[str, str] = {}
-    for i, model in enumerate(models):
-        faults += [f"{name} is read before it is computed" for name in model.mapping.inputs if name in computed[i:]]
-        for name, unit in zip(
-            (*model.mapping.inputs, model.mapping.output), (*model.input_units, model.output_unit), strict=True
-        ):
-            if units.setdefault(name, unit) != unit:
-                faults.append(f"{name} is in {units[name]} and in {unit}")
-    if len({model.sample_time for model in models}) > 1:
-        faults.append("the sample times differ")
-    if faults:
-        raise ConfigError(
-            "the models cannot be wired",
-            expected="models in the order in which they run, with one sample time, and one unit for each channel",
-            got="; ".join(dict.fromkeys(faults)),
-            remedy="order the models so that each reads only inputs and earlier outputs",
-        )
 
 
 def _identifiers(names: Sequence[str] | Dict[str, int]) -> dict[str, str]:
