@@ -47,6 +47,13 @@ def braking(pressure: float) -> float:
     return float(1.3 * MPH * (max(pressure, 0.0) / 6.0) ** exponent)
 
 
+INTERLOCK = 0.03
+"""Cylinder pressure in psi above which there is no traction (ours)."""
+
+TRACTION_JERK = 0.9 * JERK
+"""Jerk in m/s3 of the traction (ours): what is left of the source's limit is the brake's last release."""
+
+
 class TransitVehicle:
     """A vehicle that answers to the signal: cylinder pressure by a fitted model, shoes with their friction, traction.
 
@@ -84,9 +91,11 @@ class TransitVehicle:
             signal: P in mA.
         """
         self.pressure = float(self._bank.advance(np.full((1, 1, 1), commanded_pressure(signal)))[0, 0])
-        # Traction balances friction at the cruising signal (ours: linear in between); its controller limits the jerk.
-        wanted = COAST_RATE * (min(signal, FULL_TRACTION) - COAST) / (CRUISE - COAST) if signal > COAST else 0.0
-        most = JERK * self.sample_time
+        # Traction balances friction at the cruising signal (ours: linear in between). It waits until the cylinder is
+        # empty, so that the two do not change the acceleration together, and limits its own jerk.
+        free = signal > COAST and self.pressure < INTERLOCK
+        wanted = COAST_RATE * (min(signal, FULL_TRACTION) - COAST) / (CRUISE - COAST) if free else 0.0
+        most = TRACTION_JERK * self.sample_time
         self._pull += float(np.clip(wanted - self._pull, -most, most))
         effort = self._pull - COAST_RATE - self.friction * braking(self.pressure)
         before = self.speed
@@ -101,6 +110,7 @@ class ControlSettings:
     Args:
         proportional: Of the speed regulator in 1/s.
         integral: In 1/s2.
+        correction_jerk: Fastest change of the regulator's part in m/s3; its onset is a jerk of its own.
         learning: Share of the relative mean error that goes into the modifier at each stop.
         largest_modifier: Bound of the modifier.
         overspeed: Speed in m/s above the command at which the full service brake is applied outside a ramp.
@@ -108,6 +118,7 @@ class ControlSettings:
 
     proportional: float = 0.5
     integral: float = 0.15
+    correction_jerk: float = 0.25 * JERK
     learning: float = 0.8
     largest_modifier: float = 1.0
     overspeed: float = 2.0 * MPH
@@ -138,7 +149,7 @@ class DecelerationController:
         self.request = 0.0
         self._command: float | None = None
         self._profile: JerkProfile | None = None
-        self._clock, self._integral, self._error = 0.0, 0.0, 0.0
+        self._clock, self._integral, self._error, self._correction = 0.0, 0.0, 0.0, 0.0
 
     @property
     def ramp_active(self) -> bool:
@@ -164,7 +175,7 @@ class DecelerationController:
         """
         if self._command is not None and command < self._command and speed > command + 1e-6:
             self._profile = JerkProfile(start=speed, stop=command)
-            self._clock, self._integral, self._error = 0.0, 0.0, 0.0
+            self._clock, self._integral, self._error, self._correction = 0.0, 0.0, 0.0, 0.0
         self._command = command
         if self._profile is None:
             return self._cruise(command, speed, tachometer, pendulum)
@@ -176,25 +187,33 @@ class DecelerationController:
         self._clock += self._dt
         if self._clock >= self._profile.duration:
             self._finish(self._profile)
-        return self.characteristic.signal(self.request * (1.0 + self.modifier))
+        return self.characteristic.signal(self._modified(self.request))
+
+    def _modified(self, request: float) -> float:
+        """The request with the modifier on what the brake adds to the friction of coasting."""
+        coasting = self.characteristic.decelerations[0]
+        return request + self.modifier * max(0.0, request - coasting)
 
     def _requested(self, profile: JerkProfile, speed: float, grade: float) -> float:
         """Deceleration of the brake, on the level: the profile's, the regulator's part, and what the grade takes."""
-        wanted = profile.deceleration(self._clock) + grade
         leaving = self._clock > profile.duration - profile.corner
-        if not self.open_loop:
+        if (
+            not self.open_loop and not leaving
+        ):  # The reverse forcing function: the regulator's part is held on the way out.
+            s = self.settings
             excess = speed - profile.speed(self._clock)
-            if not leaving:  # The reverse forcing function: the regulator's part is held on the way out.
-                self._integral += self.settings.integral * excess * self._dt
-            wanted += self._integral + self.settings.proportional * excess
-        return max(0.0, wanted)
+            self._integral += s.integral * excess * self._dt
+            most = s.correction_jerk * self._dt
+            wanted = self._integral + s.proportional * excess
+            self._correction += float(np.clip(wanted - self._correction, -most, most))
+        return max(0.0, profile.deceleration(self._clock) + grade + self._correction)
 
     def _finish(self, profile: JerkProfile) -> None:
         mean = self._error / profile.duration
         self.mean_errors.append(mean)
         if self.learns:
             s = self.settings
-            change = s.learning * mean / profile.reached
+            change = s.learning * mean / max(profile.reached - self.characteristic.decelerations[0], 0.1 * RATE)
             self.modifier = float(np.clip(self.modifier + change, -s.largest_modifier, s.largest_modifier))
         self._profile = None
         self._integral = 0.0

@@ -160,7 +160,9 @@ def test_a_chain_is_its_models_one_after_the_other() -> None:
 def test_surrogate_valves_are_their_model_on_the_reference_s_pressures() -> None:
     command = Command.from_rows([[0, 90], [2, 70], [20, 70]])
     model = network(3, "BP+AR")
-    output = ValveSurrogateBrake(stages=[Stage(models=(model,))], consist=TRAIN).advance(command.sampled(sample_time=0.1))
+    output = ValveSurrogateBrake(stages=[Stage(models=(model,))], consist=TRAIN).advance(
+        command.sampled(sample_time=0.1)
+    )
     probes = tuple(Probe(quantity=quantity, node=5) for quantity in ("pipe", "auxiliary"))
     inputs = (simulate(command, consist=TRAIN, probes=probes).pressures - 101_325.0) / PSI_IN_PA
     alone = model.simulate(inputs, History.at_rest(inputs=[90.0, 90.0], output=0.0))

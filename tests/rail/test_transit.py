@@ -190,15 +190,24 @@ def test_the_mean_deceleration_error_goes_to_zero_within_five_stops(
 
 
 @pytest.mark.parametrize("friction", FRICTIONS.values(), ids=FRICTIONS.keys())
-def test_after_learning_the_jerk_of_the_open_loop_is_within_its_limit(
-    surrogate: AbstractModel, characteristic: Characteristic, friction: float
+@pytest.mark.parametrize("grade", [0.0, 0.01, -0.01], ids=["level", "up", "down"])
+def test_after_learning_the_jerk_of_the_whole_stop_is_within_its_limit(
+    surrogate: AbstractModel, characteristic: Characteristic, friction: float, grade: float
 ) -> None:
-    _, traces = stops(surrogate, characteristic, friction)
+    """From a second before the command to the end of the handing back to cruising; over half a second."""
+    _, traces = stops(surrogate, characteristic, friction, grade)
+    begin = round(CRUISE_TIME / STEP)
+    assert largest_jerk(traces[-1]["A"][begin - 20 :], STEP) <= JERK
+
+
+def test_before_it_has_learnt_the_open_loop_passes_the_friction_on(
+    surrogate: AbstractModel, characteristic: Characteristic
+) -> None:
+    """Nothing that does not look at the vehicle can keep the limit with shoes that take more than they should."""
+    _, traces = stops(surrogate, characteristic, 1.3, count=1)
     begin = round(CRUISE_TIME / STEP)
     window = slice(begin, begin + round(OPEN_LOOP / STEP))
-    assert largest_jerk(traces[-1]["A"][window], STEP) <= JERK * 1.01
-    # The rest of the stop has the regulator and the handing back to cruising in it.
-    assert largest_jerk(traces[-1]["A"][begin - 20 :], STEP) <= JERK * 1.2
+    assert JERK * 1.05 < largest_jerk(traces[0]["A"][window], STEP) <= JERK * 1.3
 
 
 def test_without_learning_the_error_stays(surrogate: AbstractModel, characteristic: Characteristic) -> None:
