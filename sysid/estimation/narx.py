@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import starts
 from sysid.estimation.arx import first_output
+from sysid.estimation.attempts import Attempt
 from sysid.estimation.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.checkpoint import Checkpoint
 from sysid.estimation.growing import grown
@@ -37,6 +38,7 @@ def fit_narx(
     initial: FitResult | None = None,
     resume: Checkpoint | None = None,
     on_checkpoint: Callable[[Checkpoint], None] = lambda _: None,
+    vet: Callable[[starts.Network], bool] | None = None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> FitResult:
     """Fit a NARX network by Levenberg-Marquardt with Bayesian regularisation.
@@ -55,10 +57,11 @@ def fit_narx(
             its lags, or of a linear model over them.
         resume: Where the fit of a single start was put aside; it goes on as if it had not been.
         on_checkpoint: Given the checkpoint from which the chosen start can go on.
+        vet: Whether a model's free run is stable; the best stable one of the ten best candidates is then chosen.
         on_progress: Called after every iteration, from the threads that train.
 
     Returns:
-        The best start's model, with the spread over starts in its notes.
+        The best start's model, with the spread over starts in its attempts.
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
@@ -86,7 +89,8 @@ def fit_narx(
         resume=resume,
     )
     candidates = starts.run(race)
-    chosen = min(candidates, key=lambda candidate: starts.rank(candidate, training.choose_by))
+    choice = starts.choose(candidates, training.choose_by, vet)
+    chosen = choice.chosen
     on_checkpoint(Checkpoint.of(chosen.solution.state))
     records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     records += [(t.columns(mapping.inputs), None) for t in selection]
@@ -94,7 +98,7 @@ def fit_narx(
     posterior = laplace(chosen.solution.state, chosen.model, to_plain, experiments, 1 + len(training.offsets))
     if posterior is not None:
         posterior = calibrate(posterior, chosen.model, experiments_of(selection, mapping, start, rest))
-    fit = raced_result(chosen, candidates, training, status, time.perf_counter() - began)
+    fit = raced_result(choice, candidates, training, status, time.perf_counter() - began)
     return replace(fit, posterior=posterior)
 
 
@@ -201,7 +205,7 @@ def _leaves_its_bounds(model: starts.Network, inputs: NDArray[np.float64], histo
 
 
 def raced_result(
-    chosen: starts.Candidate,
+    choice: starts.Choice,
     candidates: Sequence[starts.Candidate],
     training: Training,
     status: Status,
@@ -210,8 +214,8 @@ def raced_result(
     """What a race found.
 
     Args:
-        chosen: The candidate chosen.
-        candidates: All of them, for the notes.
+        choice: The candidate chosen.
+        candidates: All of them, for the attempts.
         training: How they were trained.
         status: How it ended.
         seconds: Wall time.
@@ -219,6 +223,7 @@ def raced_result(
     Returns:
         The result.
     """
+    chosen = choice.chosen
     curve = chosen.solution.curve
     scale = chosen.model.scaling.output_scale**2
     return FitResult(
@@ -234,23 +239,38 @@ def raced_result(
         train_time_s=seconds,
         seed=chosen.seed,
         evidence=chosen.solution.evidence,
-        notes=_notes(chosen, candidates, training),
+        attempts=_attempts(choice, candidates),
+        notes=_notes(choice, candidates, training),
     )
 
 
-def _notes(chosen: starts.Candidate, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
-    scale = chosen.model.scaling.output_scale**2
+def _attempts(choice: starts.Choice, candidates: Sequence[starts.Candidate]) -> tuple[Attempt, ...]:
+    scale = choice.chosen.model.scaling.output_scale**2
+    found = [
+        Attempt(
+            start=candidate.number + 1,
+            seed=candidate.seed,
+            iterations=candidate.solution.state.iteration,
+            elapsed_s=candidate.solution.curve[-1].elapsed_s,
+            estimation_mse=candidate.solution.curve[-1].mse * scale,
+            selection_mse=candidate.score,
+            log_evidence=candidate.log_evidence,
+            effective_parameters=candidate.solution.curve[-1].effective_parameters,
+            stable=stable,
+            chosen=candidate is choice.chosen,
+        )
+        for candidate, stable in zip(candidates, choice.stable, strict=True)
+    ]
+    return tuple(sorted(found, key=lambda attempt: (attempt.start, attempt.iterations)))
+
+
+def _notes(choice: starts.Choice, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
     notes = []
     if training.starts > 1:
-        by_selection = training.choose_by == "selection" and np.isfinite(chosen.score)
+        by_selection = training.choose_by == "selection" and np.isfinite(choice.chosen.score)
         how = "the least error on the selection traces (geometric mean)" if by_selection else "the largest evidence"
         notes.append(f"Chosen by {how} among {training.starts} starts looked at {len(candidates)} times.")
-    for candidate in sorted(candidates, key=lambda c: (c.number, c.solution.state.iteration)):
-        origin = "the initial fit" if candidate.seed is None else f"seed {candidate.seed}"
-        notes.append(
-            f"{'Chosen: start' if candidate is chosen else 'Start'} from {origin} after "
-            f"{candidate.solution.state.iteration} iterations ({candidate.solution.curve[-1].elapsed_s:.1f} s): "
-            f"estimation mse {candidate.solution.curve[-1].mse * scale:.4g}, selection mse {candidate.score:.4g}, "
-            f"log evidence {candidate.log_evidence:.6g}."
-        )
+    refused = sum(stable is False for stable in choice.stable)
+    if refused and any(choice.stable):
+        notes.append(f"{refused} that ranked higher were passed over: their free run is not stable.")
     return tuple(notes)

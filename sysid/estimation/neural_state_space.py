@@ -30,6 +30,7 @@ def fit_neural_state_space(
     start: Start | None = None,
     rest_output: float | None = None,
     selection: Sequence[Trace] = (),
+    vet: Callable[[starts.Network], bool] | None = None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> FitResult:
     """Fit a neural state space by Levenberg-Marquardt with Bayesian regularisation, always in free run.
@@ -45,10 +46,11 @@ def fit_neural_state_space(
         start: What stands before each trace; at rest by default.
         rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
         selection: Traces that choose between starts; without them the evidence chooses.
+        vet: Whether a model's free run is stable; the best stable one of the ten best candidates is then chosen.
         on_progress: Called after every iteration, from the threads that train.
 
     Returns:
-        The best start's model, with the spread over starts in its notes.
+        The best start's model, with the spread over starts in its attempts.
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
@@ -80,11 +82,11 @@ def fit_neural_state_space(
         on_progress=on_progress,
     )
     candidates = starts.run(race)
-    chosen = min(candidates, key=lambda candidate: starts.rank(candidate, training.choose_by))
+    choice = starts.choose(candidates, training.choose_by, vet)
     records = [(e.inputs, e.history) for e in experiments]
     records += [(e.inputs, e.history) for e in experiments_of(selection, mapping, start, rest)]
-    status = raced_status(chosen, candidates, records, interrupted=race.stop.is_set())
-    return raced_result(chosen, candidates, training, status, time.perf_counter() - began)
+    status = raced_status(choice.chosen, candidates, records, interrupted=race.stop.is_set())
+    return raced_result(choice, candidates, training, status, time.perf_counter() - began)
 
 
 def _template(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.attempts import Attempt
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import AbstractModel, model_from_dict
 
@@ -28,12 +29,17 @@ class Status(enum.Enum):
     STALLED = "No step improves the loss any more although its gradient is not zero; try another start."
     NOT_IMPROVED = "The fit did not improve on where it started; try another start, or more damping."
     INTERRUPTED = "Interrupted; this is the best model up to then."
-    UNSTABLE = "The free run leaves its bounds on at least one record; choose another start or fewer lags."
+    UNSTABLE = "The free run leaves its bounds, or settles where it should not; choose another start or fewer lags."
 
     @property
     def usable(self) -> bool:
-        """Whether the model may be compared with others."""
+        """Whether the model may be used as it is."""
         return self not in {Status.NOT_IMPROVED, Status.UNSTABLE}
+
+    @property
+    def comparable(self) -> bool:
+        """Whether its figures may be set beside those of others: an unstable model has them, where it was run."""
+        return self is not Status.NOT_IMPROVED
 
 
 class Loop(enum.Enum):
@@ -84,7 +90,10 @@ class FitResult:
         evidence: From Bayesian regularisation, where it was used.
         uncertainty: Of the parameters, where the estimator knows it.
         posterior: Of a network's parameters, where there is one; stored beside the JSON values, as arrays.
-        notes: Sentences worth knowing: choices made, restarts compared, stability.
+        attempts: Every start at every look, where several were raced.
+        stability: What a check of the free run over random sequences found, as JSON values; ``None`` where there was
+            none (see :mod:`sysid.validation.stability`).
+        notes: Sentences worth knowing: choices made, stability.
     """
 
     model: AbstractModel
@@ -96,6 +105,8 @@ class FitResult:
     evidence: Evidence | None = None
     uncertainty: Uncertainty | None = None
     posterior: Posterior | None = None
+    attempts: tuple[Attempt, ...] = ()
+    stability: Dict[str, Any] | None = None
     notes: tuple[str, ...] = field(default=())
 
     def to_dict(self) -> dict[str, Any]:
@@ -119,6 +130,8 @@ class FitResult:
                 "correlation_time": evidence.correlation_time,
             },
             "uncertainty": None if self.uncertainty is None else self.uncertainty.to_dict(),
+            "attempts": [attempt.to_dict() for attempt in self.attempts],
+            "stability": None if self.stability is None else dict(self.stability),
             "notes": list(self.notes),
         }
 
@@ -141,5 +154,7 @@ class FitResult:
             seed=fields["seed"],
             evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
             uncertainty=None if fields.get("uncertainty") is None else Uncertainty.from_dict(fields["uncertainty"]),
+            attempts=tuple(Attempt.from_dict(attempt) for attempt in fields.get("attempts", ())),
+            stability=fields.get("stability"),
             notes=tuple(fields["notes"]),
         )

@@ -35,6 +35,7 @@ from sysid.export.manifest import (
     sha256,
 )
 from sysid.export.parity import check_parity, parity_cases, random_cases
+from sysid.export.stability import WORST, check_free_run, state_stability
 from sysid.export.surrogate import Surrogate
 from sysid.export.verification import write_verification
 from sysid.models import AbstractModel, Start
@@ -97,6 +98,9 @@ def export_bundle(
 ) -> Bundle:
     """Write a fitted model as a bundle, after each file has reproduced the model on every case and 100 random runs.
 
+    The model's free run is checked over 1,000 random sequences too; a bundle whose free run is unstable is written, and
+    its status says so.
+
     The folder appears, or is replaced, only when the new bundle is complete. The same fit, traces and metrics
     give the same bytes.
 
@@ -125,6 +129,7 @@ def export_bundle(
     model = fit.model
     surrogate = Surrogate.of(model, declared_ranges(model, traces), first_inputs(model, traces))
     cases, sequences = parity_cases(model, traces, start), random_cases(surrogate)
+    stability = check_free_run(model, traces)
     allowed = {"float64": tolerance, "float32": max(tolerance, tolerance_float32)}
     with _published(Path(folder)) as draft:
         written = [file for writer in writers for file in writer.write(surrogate, draft)]
@@ -134,10 +139,14 @@ def export_bundle(
         ]
         purposes = {name: f"needed by {file.name}" for file in written for name in file.companions}
         purposes |= write_verification(surrogate, written, (cases[0], sequences[0]), draft, allowed)
+        if stability is not None:
+            (draft / WORST).write_text(stability.worst_csv(), encoding="utf-8", newline="\n")
+            purposes[WORST] = "the random sequence on which the free run did worst"
         (draft / SCHEMA).write_text(schema_text(), encoding="utf-8", newline="\n")
         purposes[SCHEMA] = f"JSON schema of {MANIFEST}"
         manifest = describe(fit, traces, start, metrics, provenance or {})
         manifest["amplification"] = amplification(cases, sequences)
+        state_stability(manifest, stability)
         manifest["files"] = [file_entry(file, parity, draft) for file, parity in zip(written, checked, strict=True)]
         manifest["attachments"] = attachments(purposes, draft)
         (draft / CARD).write_text(model_card(manifest), encoding="utf-8", newline="\n")

@@ -108,8 +108,43 @@ class EvidenceRecord(_Record):
     """What Bayesian regularisation found."""
 
     log_evidence: Number
+    correlation_time: Number = Field(default=math.nan, description="Samples after which a residual is news.")
+    alphas: dict[str, Number] = Field(default={}, description="Precision of the prior, per group of weights.")
     effective_parameters: dict[str, Number] = Field(default={}, description="Per group of weights.")
     parameters: dict[str, Number] = Field(default={}, description="Per group of weights.")
+
+
+class AttemptRecord(_Record):
+    """One start as it stood when it was looked at."""
+
+    start: int = Field(description="Which start, from 1 on.")
+    seed: int | None = None
+    iterations: int
+    elapsed_s: Number
+    estimation_mse: Number = Field(description="On the estimation records, in the output's unit squared.")
+    selection_mse: Number = Field(description="Geometric mean over the selection traces.")
+    log_evidence: Number
+    effective_parameters: Number
+    stable: bool | None = Field(default=None, description="What the check of its free run said, where it was asked.")
+    chosen: bool = False
+
+
+class StabilityRecord(_Record):
+    """What a check of the free run over random sequences found."""
+
+    stable: bool
+    text: str = Field(description="The finding as a sentence.")
+    source: str = Field(description="Where the sequences come from.")
+    seed: int
+    sequences: int
+    unbounded: int = Field(description="How many left the bounds.")
+    judged: int = Field(description="How many had a plateau to settle on.")
+    unsettled: int = Field(description="How many of those settled elsewhere.")
+    tolerance: Number = Field(
+        description="How far from its plateau a run may settle, as a share of the output's range."
+    )
+    largest_plateau_error: Number = Field(description="As a share of the output's range.")
+    worst: str = Field(description="Name of the worst sequence.")
 
 
 class FitRecord(_Record):
@@ -127,6 +162,8 @@ class FitRecord(_Record):
     status: str = Field(description="Name of the status, such as CONVERGED.")
     notes: list[str] = []
     evidence: EvidenceRecord | None = None
+    attempts: list[AttemptRecord] = Field(default=[], description="Every start at every look.")
+    stability: StabilityRecord | None = Field(default=None, description="Of the free run over random sequences.")
     n_parameters: int | None = None
     selection_mse: Number = Field(default=math.nan, description="Free-run mse on the traces that chose between fits.")
     cases: dict[str, CaseRecord]
@@ -277,7 +314,7 @@ def read_results(folder: Path) -> Results:
     path = Path(folder) / RESULTS_FILE
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
+    except (FileNotFoundError, NotADirectoryError) as error:
         raise ConfigError(
             "the folder holds no results",
             where=folder,

@@ -23,6 +23,7 @@ from sysid.workbench.fields import (
     as_field_error,
 )
 from sysid.workbench.naming import slug
+from sysid.workbench.stability import StabilityConfig
 from sysid.yaml_files import FieldError, check, parse_yaml, read_yaml
 
 
@@ -126,6 +127,7 @@ class PipelineConfig(BaseModel):
         fits: What is fitted, in order.
         export: What leaves the workbench; ``null`` for nothing.
         report: What the report shows.
+        stability: Over which sequences a network's free run has to stay bounded and to settle.
     """
 
     model_config = STRICT
@@ -142,6 +144,7 @@ class PipelineConfig(BaseModel):
     fits: Annotated[tuple[FitConfig, ...], BeforeValidator(_as_list)] = Field(min_length=1)
     export: ExportConfig | None = ExportConfig()
     report: ReportConfig = ReportConfig()
+    stability: StabilityConfig = StabilityConfig()
 
     @field_validator("fits")
     @classmethod

@@ -53,7 +53,7 @@ def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:
     Returns:
         The verdict as JSON values; ``None`` unless there are linear models and networks that may be compared.
     """
-    usable = [ready for ready in fits if ready.fit.status.usable]
+    usable = [ready for ready in fits if ready.fit.status.comparable]
     linear, networks = (
         {ready.config.name: ready.evaluation for ready in usable if isinstance(ready.fit.model.structure, kinds)}
         for kinds in ((ARX, TransferFunction), NARX)

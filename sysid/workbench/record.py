@@ -142,6 +142,8 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]]) -> dict[st
         "initial": ready.config.initial,
         "notes": list(fit.notes),
         "evidence": stored["evidence"],
+        "attempts": stored["attempts"],
+        "stability": stored["stability"],
         "n_parameters": model.n_parameters,
         "selection_mse": ready.selection_mse,
         "cases": {name: case.to_dict() for name, case in ready.evaluation.cases.items()},

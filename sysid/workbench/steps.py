@@ -29,6 +29,7 @@ from sysid.models import ARX, NARX, TransferFunction
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation import Evaluation, evaluate, evaluate_case
 from sysid.workbench.config import FitConfig, PipelineConfig
+from sysid.workbench.stability import StabilityCheck
 from sysid.workbench.store import code_digest, digest
 
 if TYPE_CHECKING:
@@ -42,10 +43,12 @@ class Data:
     Args:
         traces: The data set: every case that is scored.
         selection: Traces that choose between fits and nothing else.
+        sequences: Traces over which a free run has to stay stable, where a data set of them is declared.
     """
 
     traces: TraceSet
     selection: tuple[Trace, ...]
+    sequences: tuple[Trace, ...] = ()
 
     @property
     def estimation(self) -> tuple[Trace, ...]:
@@ -83,7 +86,12 @@ def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str],
     if config.selection is not None:
         chosen = _load(config.selection, beside, progress)
         selection = (*selection, *_selection_traces(chosen, traces, names))
-    return Data(traces=traces, selection=selection)
+    sequences: tuple[Trace, ...] = ()
+    if config.stability.sequences is not None:
+        declared = _load(config.stability.sequences, beside, progress)
+        declared.traces[0].columns(names)
+        sequences = tuple(declared)
+    return Data(traces=traces, selection=selection, sequences=sequences)
 
 
 def _load(name: str, beside: Path, progress: Callable[[str], None]) -> TraceSet:
@@ -158,6 +166,9 @@ def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | N
         "traces": [trace.digest for trace in data.estimation],
         # Least squares has nothing to choose, so that other selection traces do not concern it.
         "selection": None if is_arx else [trace.digest for trace in data.selection],
+        "stability": {**config.stability.model_dump(), "sequences": [trace.digest for trace in data.sequences]}
+        if network
+        else None,
         "code": code_digest("estimation", "models", "kernels"),
     }
     return digest(_plain(terms | _common(config)))
@@ -209,16 +220,19 @@ def fit_traces(
             data.estimation, config.mapping, structure, training, selection=data.selection, **common
         )
     if isinstance(structure, NARX):
-        return fit_narx(
+        check = StabilityCheck.of(config.stability, config.mapping, data.estimation, data.sequences)
+        found = fit_narx(
             data.estimation,
             config.mapping,
             structure,
             fit.training_options(config.seed),
             selection=data.selection,
             initial=initial,
+            vet=check.passes,
             on_progress=on_progress,
             **common,
         )
+        return check.applied(found)
     raise ConfigError(f"no estimator for the structure {structure.kind}", where=f"fit {fit.name}")
 
 
@@ -301,7 +315,8 @@ def choose(fits: Mapping[str, tuple[FitResult, Scores]], asked: str) -> Choice:
     """
     if asked != "best":
         return Choice(name=asked, chosen_by="Named in the pipeline.")
-    usable = {name: pair for name, pair in fits.items() if pair[0].status.usable} or dict(fits)
+    # An unstable fit is compared by its figures like the others, and says what it is in its status.
+    usable = {name: pair for name, pair in fits.items() if pair[0].status.comparable} or dict(fits)
     by_selection = {name: pair[1].selection_mse for name, pair in usable.items()}
     if not any(math.isnan(mse) for mse in by_selection.values()):
         sentence = "Least mean squared error of the free run on the selection traces."

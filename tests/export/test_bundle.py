@@ -22,7 +22,7 @@ FILES = ["sequence.onnx", "sequence.torchscript.pt", "step.onnx", "step.torchscr
 
 
 ALWAYS = ["MODEL_CARD.md", "model.json", "model.schema.json"]
-RECORDS = ["verify/record1.csv", "verify/record2.csv", "verify/record3.csv"]
+RECORDS = ["verify/record1.csv", "verify/record2.csv", "verify/record3.csv", "verify/worst.csv"]
 
 
 def content(folder):

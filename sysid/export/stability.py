@@ -1,0 +1,45 @@
+"""What a bundle says of its model's free run over random sequences, with the worst of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sysid.errors import TraceError
+from sysid.estimation.result import Status
+from sysid.export.verification import FOLDER
+from sysid.models import AbstractModel
+from sysid.traces import Role, TraceSet
+from sysid.validation.sequences import Excursions
+from sysid.validation.stability import SEQUENCES, Stability, check_stability
+
+WORST = f"{FOLDER}/worst.csv"
+"""The worst sequence in a bundle."""
+
+
+def check_free_run(model: AbstractModel, traces: TraceSet) -> Stability | None:
+    """Run a model over excursions of its estimation traces.
+
+    Args:
+        model: The model.
+        traces: The cases.
+
+    Returns:
+        What was found; ``None`` where no estimation trace is long enough to make sequences from.
+    """
+    try:
+        sequences = Excursions.of(traces.with_role(Role.ESTIMATION), model.mapping.inputs, (model.mapping.output,))
+    except TraceError:
+        return None
+    return check_stability(model, sequences, count=SEQUENCES)
+
+
+def state_stability(manifest: dict[str, Any], stability: Stability | None) -> None:
+    """Put the finding into a manifest, and into the fit's status where the free run is unstable.
+
+    Args:
+        manifest: Content of ``model.json``, with the fit.
+        stability: The finding, if there is one.
+    """
+    manifest["stability"] = None if stability is None else stability.to_dict()
+    if stability is not None and not stability.stable:
+        manifest["fit"] |= {"status": Status.UNSTABLE.name, "status_text": Status.UNSTABLE.value}

@@ -1,0 +1,349 @@
+r"""Input sequences that no record contains, for finding out whether a free run stays what it should be.
+
+Inputs of a mapping are rarely independent: they are states of one system, and a sequence that sets each at random asks
+about a system that cannot exist. There are two honest sources.
+
+**Excursions of the records** (:class:`Excursions`): passages of the records, in random order, each begun where the
+record comes close to where the passage before ended, in level and in direction, of the inputs and of the outputs; the
+matched-block bootstrap of Carlstein, Do, Hall, Hesterberg and Künsch 1998 ("Matched-block bootstrap for dependent
+data", Bernoulli 4). What is left of a jump is led over the beginning of the next passage, and each passage runs
+somewhat faster or slower than it was recorded. At the end the sequence follows a record to a plateau, a place where
+inputs and outputs have stood still for long, and is held there as long: the output has to settle where it settled in
+the record. Only plateaus at which a record also began are taken, where there are such: a system may hold an output that
+depends on how its inputs got where they are, but whatever came before, it comes back to its rest.
+
+**Traces** (:class:`TraceSequences`) of a generator's random commands: the inputs that the system really has, and with
+them the outputs it really has, so that every plateau on the way is judged.
+
+Limits: an excursion asks more than the system does: it passes joints, speeds and pairs of inputs that the system itself
+would not. Its targets before the end are not what the system would have put out. Without a plateau at rest any plateau
+is taken, and records without any can show that a run stays bounded, not where it settles.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from sysid.errors import TraceError
+from sysid.models import History
+from sysid.traces import Trace
+
+STILL = 0.01
+"""Share of a channel's range within which it stands still."""
+
+AT_REST = 0.05
+"""Share of a channel's range within which it is where a record began."""
+
+CANDIDATES = 128
+"""Places that are looked at for the next passage; the closest is taken. More of them make smaller jumps and fewer
+different sequences."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InputSequence:
+    """One sequence of inputs, and what is known of the outputs that belong to it.
+
+    Args:
+        name: Of the sequence.
+        inputs: In their units, shape ``(n_samples, n_inputs)``.
+        targets: Outputs in their units, shape ``(n_samples, n_outputs)``.
+        judged: Samples at which the outputs have settled at the target, shape ``(n_samples,)``.
+    """
+
+    name: str
+    inputs: NDArray[np.float64]
+    targets: NDArray[np.float64]
+    judged: NDArray[np.bool_]
+
+    @property
+    def history(self) -> History:
+        """Before the first sample, for a model of the first output: everything stands where it begins."""
+        return History.at_rest(inputs=self.inputs[0], output=float(self.targets[0, 0]))
+
+
+class AbstractSequences(ABC):
+    """A source of input sequences.
+
+    Concrete sources are frozen dataclasses with at least these fields.
+    """
+
+    inputs: tuple[str, ...]
+    """Names of the input channels."""
+    outputs: tuple[str, ...]
+    """Names of the output channels."""
+    sample_time: float
+    """Seconds between samples."""
+
+    @property
+    @abstractmethod
+    def source(self) -> str:
+        """Where the sequences come from, as a sentence."""
+
+    @property
+    @abstractmethod
+    def output_range(self) -> NDArray[np.float64]:
+        """Least and greatest value of each output in the records, shape ``(2, n_outputs)``."""
+
+    @abstractmethod
+    def draw(self, count: int, seed: int) -> Iterator[InputSequence]:
+        """The sequences, one after the other.
+
+        Args:
+            count: How many at most.
+            seed: Of the random numbers.
+
+        Yields:
+            Each sequence.
+        """
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Excursions(AbstractSequences):
+    """Passages of records, joined where they match.
+
+    Args:
+        inputs: Names of the input channels.
+        outputs: Names of the output channels.
+        sample_time: Seconds between samples.
+        records: Inputs and outputs side by side, each of shape ``(n_samples, n_inputs + n_outputs)``.
+        samples: Length of a sequence before it is led to its plateau.
+        passage: Shortest and longest passage, in samples.
+        hold: Samples for which a record has to stand still on a plateau, and for which it is held at the end.
+        warp: How many times faster or slower than recorded a passage may run.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    sample_time: float
+    records: tuple[NDArray[np.float64], ...]
+    samples: int
+    passage: tuple[int, int]
+    hold: int
+    warp: float = 1.25
+    _features: NDArray[np.float64] = field(init=False, repr=False)
+    _rows: NDArray[np.float64] = field(init=False, repr=False)
+    _left: NDArray[np.int64] = field(init=False, repr=False)
+    _firsts: NDArray[np.int64] = field(init=False, repr=False)
+    _to_plateau: NDArray[np.int64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        rows = np.concatenate(self.records)
+        span = np.ptp(rows, axis=0)
+        scale = np.where(span > 0.0, span, 1.0)
+        slopes, left, still = [], [], []
+        begins = np.stack([record[0] for record in self.records])
+        for record in self.records:
+            n, step = len(record), max(1, self.passage[0] // 10)
+            ahead = np.minimum(np.arange(n) + step, n - 1)
+            slopes.append((record[ahead] - record) / scale)
+            left.append(np.arange(n, 0, -1))
+            still.append(_plateaus(record / scale, self.hold))
+        rest = [s & _near(record, begins, scale) for s, record in zip(still, self.records, strict=True)]
+        reach = [_next(flags) for flags in (rest if any(flags.any() for flags in rest) else still)]
+        firsts = np.cumsum([0, *(len(record) for record in self.records[:-1])])
+        moves = np.concatenate(slopes)
+        largest = np.abs(moves).max(axis=0)
+        features = np.hstack([rows / scale, 0.5 * moves / np.where(largest > 0.0, largest, 1.0)])
+        object.__setattr__(self, "_rows", rows)
+        object.__setattr__(self, "_features", features)
+        object.__setattr__(self, "_left", np.concatenate(left))
+        object.__setattr__(
+            self,
+            "_to_plateau",
+            np.concatenate([np.where(r >= 0, r + f, -1) for r, f in zip(reach, firsts, strict=True)]),
+        )
+        object.__setattr__(self, "_firsts", firsts)
+
+    @classmethod
+    def of(cls, traces: Sequence[Trace], inputs: Sequence[str], outputs: Sequence[str]) -> Excursions:
+        """The excursions of some traces, with lengths that go with theirs.
+
+        Args:
+            traces: At least one.
+            inputs: Names of the input channels.
+            outputs: Names of the output channels.
+
+        Returns:
+            The source: sequences of a quarter of the longest trace and at most 5,000 samples, in passages of a
+            hundredth to an eighth of it.
+
+        Raises:
+            ChannelError: If a trace lacks a channel.
+            TraceError: If no trace has 20 usable samples in a row.
+        """
+        names = [*inputs, *outputs]
+        records = tuple(part for trace in traces for part in _usable_parts(trace, names))
+        if not records:
+            raise TraceError("no trace is long enough for excursions", expected="20 usable samples in a row")
+        longest = max(len(record) for record in records)
+        return cls(
+            inputs=tuple(inputs),
+            outputs=tuple(outputs),
+            sample_time=traces[0].sample_time,
+            records=records,
+            samples=min(max(longest // 4, 20), 5000),
+            passage=(max(longest // 100, 2), max(longest // 8, 4)),
+            hold=max(longest // 20, 20),
+        )
+
+    @property
+    def source(self) -> str:
+        """Where the sequences come from, as a sentence."""
+        plateaus = "held on a recorded plateau in the end" if self.has_plateaus else "without a plateau to end on"
+        return (
+            f"Passages of {self.passage[0] * self.sample_time:g} to {self.passage[1] * self.sample_time:g} s of the "
+            f"estimation traces, joined where they match, up to {self.warp:g} times faster or slower, {plateaus}."
+        )
+
+    @property
+    def has_plateaus(self) -> bool:
+        """Whether the records stand still anywhere."""
+        return bool((self._to_plateau >= 0).any())
+
+    @property
+    def output_range(self) -> NDArray[np.float64]:
+        """Least and greatest value of each output in the records, shape ``(2, n_outputs)``."""
+        outputs = self._rows[:, len(self.inputs) :]
+        return np.stack([outputs.min(axis=0), outputs.max(axis=0)])
+
+    def draw(self, count: int, seed: int) -> Iterator[InputSequence]:
+        """The sequences; each depends on the seed and its own number alone."""
+        low, high = self._rows.min(axis=0), self._rows.max(axis=0)
+        m = len(self.inputs)
+        for number in range(count):
+            rows, held = self._sequence(np.random.default_rng([seed, number]))
+            rows = np.clip(rows, low, high)
+            judged = np.zeros(len(rows), dtype=bool)
+            if held:
+                judged[len(rows) - max(1, held // 10) :] = True
+            yield InputSequence(name=f"sequence {number + 1}", inputs=rows[:, :m], targets=rows[:, m:], judged=judged)
+
+    def _sequence(self, rng: np.random.Generator) -> tuple[NDArray[np.float64], int]:
+        """Rows of inputs and outputs, and how many of them at the end are held."""
+        at = int(rng.choice(self._firsts))
+        parts: list[NDArray[np.float64]] = []
+        total = 0
+        while total < self.samples:
+            if parts:
+                at = self._match(rng, at, self._left > self.passage[0])
+            faster = self.warp ** rng.uniform(-1.0, 1.0)
+            span = min(int(rng.integers(*self.passage)) * faster, int(self._left[at]) - 1)
+            part = self._passage(at, span, max(2, round(span / faster)))
+            parts.append(_led_over(parts[-1][-1], part, self.passage[0]) if parts else part)
+            at += int(span)
+            total += len(part)
+        if not self.has_plateaus:
+            return np.concatenate(parts), 0
+        at = self._match(rng, at, self._to_plateau >= 0)
+        rest = int(self._to_plateau[at])
+        # At least so long a way that the plateau is reached from the record, and not by the leading over.
+        way = self._rows[at : rest + 1]
+        if len(way) < 2 * self.passage[0]:
+            way = np.concatenate([way, np.repeat(way[-1:], 2 * self.passage[0] - len(way), axis=0)])
+        parts += [
+            _led_over(parts[-1][-1], way, self.passage[0]),
+            np.repeat(self._rows[rest : rest + 1], self.hold, axis=0),
+        ]
+        return np.concatenate(parts), self.hold
+
+    def _match(self, rng: np.random.Generator, end: int, allowed: NDArray[np.bool_]) -> int:
+        """A place like the one where a passage ended, but not that one."""
+        places = np.flatnonzero(allowed)
+        drawn = places[rng.integers(0, len(places), CANDIDATES)]
+        away = np.sum((self._features[drawn] - self._features[min(end, len(self._features) - 1)]) ** 2, axis=1)
+        near = np.abs(drawn - end) < self.passage[0]
+        return int(drawn[np.argmin(away + 1e3 * near)])
+
+    def _passage(self, at: int, span: float, count: int) -> NDArray[np.float64]:
+        """Rows from ``at`` over ``span`` samples, read at ``count`` even places."""
+        where = at + np.linspace(0.0, span, count)
+        below = np.minimum(where.astype(np.int64), len(self._rows) - 2)
+        share = (where - below)[:, None]
+        return np.asarray((1.0 - share) * self._rows[below] + share * self._rows[below + 1])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TraceSequences(AbstractSequences):
+    """Traces as they are: a generator's random commands, or records of the real thing.
+
+    Args:
+        inputs: Names of the input channels.
+        outputs: Names of the output channels.
+        sample_time: Seconds between samples.
+        traces: The traces, in order; the first ``count`` are drawn, whatever the seed.
+        source_text: Where they come from, as a sentence.
+        still: Samples for which an output has to stand still before it is judged.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    sample_time: float
+    traces: Sequence[Trace]
+    source_text: str
+    still: int
+
+    @property
+    def source(self) -> str:
+        """Where the sequences come from, as a sentence."""
+        return self.source_text
+
+    @property
+    def output_range(self) -> NDArray[np.float64]:
+        """Least and greatest value of each output in the traces, shape ``(2, n_outputs)``."""
+        columns = [trace.columns(self.outputs) for trace in self.traces]
+        low, high = np.min([c.min(axis=0) for c in columns], axis=0), np.max([c.max(axis=0) for c in columns], axis=0)
+        return np.stack([low, high])
+
+    def draw(self, count: int, seed: int) -> Iterator[InputSequence]:
+        """The traces; each is judged where its outputs have stood still."""
+        del seed  # nothing is random here
+        span = np.ptp(self.output_range, axis=0)
+        scale = np.where(span > 0.0, span, 1.0)
+        for trace in self.traces[:count]:
+            targets = trace.columns(self.outputs)
+            judged = _plateaus(targets / scale, self.still) & trace.usable_samples
+            yield InputSequence(name=trace.name, inputs=trace.columns(self.inputs), targets=targets, judged=judged)
+
+
+def _usable_parts(trace: Trace, names: Sequence[str]) -> list[NDArray[np.float64]]:
+    """Stretches without gaps, long enough to take passages from."""
+    columns, usable = trace.columns(names), trace.usable_samples
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(np.int8), [0]])))
+    return [columns[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 20]
+
+
+def _plateaus(scaled: NDArray[np.float64], window: int) -> NDArray[np.bool_]:
+    """Samples before which every column has stood still for a window."""
+    # The filter at t looks from t - size // 2 on; the window that ends at s is that of the filter a lead before s.
+    size = min(window, len(scaled) - 1) + 1
+    lead = size - 1 - size // 2
+    spread = maximum_filter1d(scaled, size, axis=0) - minimum_filter1d(scaled, size, axis=0)
+    still = np.zeros(len(scaled), dtype=bool)
+    still[window:] = np.all(spread <= STILL, axis=1)[window - lead : len(scaled) - lead]
+    return still
+
+
+def _near(record: NDArray[np.float64], places: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Samples at which every column is near one of some places."""
+    near = [np.all(np.abs(record - place) <= AT_REST * scale, axis=1) for place in places]
+    return np.asarray(np.any(near, axis=0))
+
+
+def _next(flags: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """For each sample the position of the next one that is flagged, itself included; -1 where there is none."""
+    n = len(flags)
+    following = np.where(flags, np.arange(n), n)
+    nearest = np.minimum.accumulate(following[::-1])[::-1]
+    return np.asarray(np.where(nearest < n, nearest, -1))
+
+
+def _led_over(last: NDArray[np.float64], part: NDArray[np.float64], over: int) -> NDArray[np.float64]:
+    """A passage that begins where the one before ended, and is itself again after some samples."""
+    share = np.clip(1.0 - np.arange(len(part)) / over, 0.0, 1.0)[:, None]
+    return np.asarray(part + share * (last - part[0]))

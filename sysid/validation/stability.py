@@ -1,0 +1,188 @@
+"""Whether a free run stays bounded and settles where it should, over many sequences that no record contains."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import TraceError
+from sysid.models import AbstractModel
+from sysid.validation.sequences import AbstractSequences, InputSequence
+
+SEQUENCES = 1000
+SEED = 20
+REACH = 1.0
+"""How far beyond the range that its output has in the records a run may go, in widths of that range, and still count as
+bounded: networks are held there (``sysid.models.narx.CLAMP``), and a run that is held has lost its way."""
+
+TOLERANCE = 0.1
+"""How far from its plateau a run may settle, as a share of the output's range in the records."""
+
+Run = Callable[[InputSequence], NDArray[np.float64]]
+"""The free run over a sequence: outputs of shape ``(n_samples,)`` or ``(n_samples, n_outputs)``."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stability:
+    """What a check found.
+
+    Args:
+        source: Where the sequences come from, as a sentence.
+        seed: Of the sequences.
+        sequences: How many were run.
+        unbounded: How many left the bounds.
+        judged: How many had a plateau to settle on.
+        unsettled: How many of those stayed bounded and settled elsewhere, or not at all.
+        tolerance: How far from its plateau a run may settle, as a share of the output's range.
+        largest_plateau_error: Over all judged samples of the bounded sequences, as a share of the output's range; NaN
+            without any.
+        worst: The worst sequence: the first that left its bounds, or the one that settled furthest away.
+        worst_outputs: The run over it, shape ``(n_samples, n_outputs)``.
+        columns: Names of the sequences' inputs and outputs.
+        sample_time: Seconds between samples.
+    """
+
+    source: str
+    seed: int
+    sequences: int
+    unbounded: int
+    judged: int
+    unsettled: int
+    tolerance: float
+    largest_plateau_error: float
+    worst: InputSequence
+    worst_outputs: NDArray[np.float64]
+    columns: tuple[tuple[str, ...], tuple[str, ...]]
+    sample_time: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether every run stayed bounded and settled where it should."""
+        return self.unbounded == 0 and self.unsettled == 0
+
+    @property
+    def sentence(self) -> str:
+        """What was found, for people."""
+        runs = f"{self.sequences} random sequences"
+        if self.unbounded:
+            return f"Unstable: the free run leaves its bounds on {self.unbounded} of {runs} ({self.worst.name} first)."
+        settled = f"at most {100.0 * self.largest_plateau_error:.2g} % of the output's range from its plateau"
+        if self.unsettled:
+            return f"Unstable: the free run settles elsewhere on {self.unsettled} of {runs}, {settled}."
+        if not self.judged:
+            return f"The free run stays bounded on {runs}; none has a plateau to settle on."
+        return f"The free run stays bounded on {runs} and settles {settled}."
+
+    def to_dict(self) -> dict[str, Any]:
+        """The findings as JSON values, without the worst sequence's signals."""
+        return {
+            "stable": self.stable,
+            "text": self.sentence,
+            "source": self.source,
+            "seed": self.seed,
+            "sequences": self.sequences,
+            "unbounded": self.unbounded,
+            "judged": self.judged,
+            "unsettled": self.unsettled,
+            "tolerance": self.tolerance,
+            "largest_plateau_error": None if math.isnan(self.largest_plateau_error) else self.largest_plateau_error,
+            "worst": self.worst.name,
+        }
+
+    def worst_csv(self) -> str:
+        """The worst sequence as CSV: time, inputs, targets, the free run, and where it was judged."""
+        inputs, outputs = self.columns
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        targets, runs = ([f"{name} {what}" for name in outputs] for what in ("target", "free run"))
+        writer.writerow(["time [s]", *inputs, *targets, *runs, "judged"])
+        values = np.hstack([self.worst.inputs, self.worst.targets, self.worst_outputs])
+        for i, (row, judged) in enumerate(zip(values.tolist(), self.worst.judged.tolist(), strict=True)):
+            writer.writerow([repr(round(i * self.sample_time, 9)), *(f"{value:.9g}" for value in row), int(judged)])
+        return text.getvalue()
+
+
+def check_stability(
+    model: AbstractModel | Run,
+    sequences: AbstractSequences,
+    *,
+    count: int = SEQUENCES,
+    seed: int = SEED,
+    tolerance: float = TOLERANCE,
+) -> Stability:
+    """Run a model over random sequences and see whether it stays bounded and settles where it should.
+
+    Args:
+        model: A model of the sequences' first and only output, or a function that runs anything over a sequence.
+        sequences: Where the sequences come from.
+        count: How many.
+        seed: Of the random numbers; the same seed gives the same sequences.
+        tolerance: How far from its plateau a run may settle, as a share of the output's range in the records.
+
+    Returns:
+        What was found.
+
+    Raises:
+        TraceError: If there are no sequences.
+
+    Example:
+        >>> from sysid.models import ARX, ARXModel, Mapping
+        >>> from sysid.traces import Channel, Trace
+        >>> from sysid.validation.sequences import Excursions
+        >>> u = np.repeat([0.0, 1.0, 0.0], 60)
+        >>> model = ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.2, 0.8]), intercept=0.0,
+        ...     mapping=Mapping.parse("u -> y"), sample_time=1.0, input_units=("V",), output_unit="V", rest_output=0.0)
+        >>> channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+        >>> values = np.column_stack([u, model.simulate(u[:, None])])
+        >>> trace = Trace(name="record", sample_time=1.0, channels=channels, values=values)
+        >>> check_stability(model, Excursions.of([trace], ["u"], ["y"]), count=20).stable
+        True
+    """
+    run = _run_of(model) if isinstance(model, AbstractModel) else model
+    low, high = sequences.output_range
+    width = np.where(high > low, high - low, 1.0)
+    unbounded = judged = unsettled = drawn = 0
+    largest = np.nan
+    worst: tuple[tuple[bool, float], InputSequence, NDArray[np.float64]] | None = None
+    for sequence in sequences.draw(count, seed):
+        drawn += 1
+        outputs = run(sequence).reshape(len(sequence.inputs), -1)
+        beyond = np.maximum(low - outputs, outputs - high) / width
+        lost = not bool(np.all(beyond < REACH * (1.0 - 1e-9)))  # NaN counts as lost
+        error = 0.0
+        if lost:
+            unbounded += 1
+        elif sequence.judged.any():
+            error = float(np.max(np.abs(outputs - sequence.targets)[sequence.judged] / width))
+            unsettled += error > tolerance
+            largest = float(np.fmax(largest, error))
+        judged += bool(sequence.judged.any())
+        if worst is None or (lost, error) > worst[0]:
+            worst = (lost, error), sequence, outputs
+    if worst is None:
+        raise TraceError("there are no sequences to run", expected="at least one", got=f"count = {count}")
+    return Stability(
+        source=sequences.source,
+        seed=seed,
+        sequences=drawn,
+        unbounded=unbounded,
+        judged=judged,
+        unsettled=unsettled,
+        tolerance=tolerance,
+        largest_plateau_error=largest,
+        worst=worst[1],
+        worst_outputs=worst[2],
+        columns=(sequences.inputs, sequences.outputs),
+        sample_time=sequences.sample_time,
+    )
+
+
+def _run_of(model: AbstractModel) -> Run:
+    return lambda sequence: model.simulate(sequence.inputs, sequence.history)

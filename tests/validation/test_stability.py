@@ -1,0 +1,170 @@
+"""Random sequences and what they find: runs that stay, runs that leave, and runs that settle where they should not."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from sysid.errors import TraceError
+from sysid.models import ARX, ARXModel, Mapping
+from sysid.traces import Channel, Trace
+from sysid.validation import Excursions, TraceSequences, check_stability
+
+CHANNELS = tuple(Channel(name=name, unit="V") for name in ("a", "b", "y"))
+
+
+def model(pole: float = 0.9) -> ARXModel:
+    gain = abs(1.0 - pole)
+    return ARXModel(
+        orders=ARX(na=1, nb=(1, 1), nk=(0, 0)), coefficients=np.array([gain, gain, pole]), intercept=0.0,
+        mapping=Mapping.parse("a+b -> y"), sample_time=0.5, input_units=("V", "V"), output_unit="V", rest_output=0.0,
+    )  # fmt: skip
+
+
+def record(seed: int = 0, n: int = 2000, usable: np.ndarray | None = None) -> Trace:
+    """Levels and rests; the second input follows the first, so that the two are never independent."""
+    rng = np.random.default_rng(seed)
+    a = np.repeat(rng.choice([0.0, 0.0, 0.5, 1.0], n // 200), 200)
+    a[:200] = 0.0
+    b = np.zeros(n)
+    for t in range(1, n):
+        b[t] = 0.95 * b[t - 1] + 0.05 * a[t]
+    inputs = np.column_stack([a, b])
+    values = np.column_stack([inputs, model().simulate(inputs)])
+    return Trace(name=f"record {seed}", sample_time=0.5, channels=CHANNELS, values=values, usable=usable)
+
+
+def excursions(*records: Trace) -> Excursions:
+    return Excursions.of(records or (record(),), ["a", "b"], ["y"])
+
+
+def test_a_stable_model_passes_and_settles_on_the_plateau():
+    found = check_stability(model(), excursions(), count=60)
+    assert found.stable
+    assert (found.sequences, found.judged, found.unbounded) == (60, 60, 0)
+    assert found.largest_plateau_error < 1e-3
+
+
+def test_a_run_that_grows_without_bound_is_found():
+    found = check_stability(model(1.02), excursions(), count=20)
+    assert (found.stable, found.unbounded) == (False, 20)
+    assert "leaves its bounds on 20 of 20" in found.sentence
+
+
+def test_a_run_that_is_not_a_number_has_left_its_bounds():
+    found = check_stability(lambda s: np.full(len(s.inputs), np.nan), excursions(), count=3)
+    assert found.unbounded == 3
+
+
+def test_a_second_equilibrium_at_rest_is_found():
+    """A run that sticks once it has been high, as a network with a false equilibrium does."""
+
+    def sticks(sequence):
+        y = model().simulate(sequence.inputs)
+        return np.where(np.maximum.accumulate(y) > 0.9, np.maximum(y, 0.3), y)
+
+    found = check_stability(sticks, excursions(), count=60)
+    assert not found.stable
+    assert found.unbounded == 0
+    assert 0 < found.unsettled < 60
+    width = np.ptp(record()["y"])
+    assert found.largest_plateau_error == pytest.approx(0.3 / width, abs=0.02)
+    assert_allclose(found.worst_outputs[-1], 0.3, atol=1e-9)
+
+
+def test_the_worst_sequence_is_kept_to_the_digits_that_repeat_it():
+    found = check_stability(model(0.97), excursions(), count=10)
+    rows = list(csv.reader(io.StringIO(found.worst_csv())))
+    assert rows[0] == ["time [s]", "a", "b", "y target", "y free run", "judged"]
+    values = np.array(rows[1:], dtype=np.float64)
+    assert values[1, 0] == 0.5
+    assert_allclose(model(0.97).simulate(values[:, 1:3], found.worst.history), values[:, 4], atol=1e-7)
+
+
+def test_the_seed_decides_and_a_sequence_does_not_depend_on_how_many_are_drawn():
+    few, many = list(excursions().draw(3, 5)), list(excursions().draw(6, 5))
+    assert all(np.array_equal(a.inputs, b.inputs) for a, b in zip(few, many, strict=False))
+    assert not np.array_equal(few[0].inputs, next(iter(excursions().draw(1, 6))).inputs)
+
+
+def test_sequences_stay_within_the_range_of_the_records_and_are_all_different():
+    low, high = record().values.min(axis=0), record().values.max(axis=0)
+    drawn = list(excursions().draw(30, 1))
+    for sequence in drawn:
+        rows = np.hstack([sequence.inputs, sequence.targets])
+        assert (rows >= low).all() and (rows <= high).all()
+    assert len({sequence.inputs.tobytes() for sequence in drawn}) == 30
+
+
+def test_inputs_that_belong_together_stay_together():
+    """The second input is the first one's moving average: at random and each for itself they would be far apart."""
+    record_rows = record().values[:, :2]
+    for sequence in excursions().draw(10, 2):
+        nearest = [np.abs(record_rows - row).max(axis=1).min() for row in sequence.inputs[::25]]
+        assert np.quantile(nearest, 0.9) < 0.1
+
+
+def test_joints_are_led_over():
+    """Where two passages meet, the slow input moves no faster than in the record by more than a little."""
+    fastest = np.abs(np.diff(record()["b"])).max()
+    for sequence in excursions().draw(10, 3):
+        assert np.abs(np.diff(sequence.inputs[:, 1])).max() < 2.0 * fastest
+
+
+def test_a_sequence_ends_where_a_record_began_and_stands_there():
+    for sequence in excursions().draw(10, 4):
+        held = sequence.inputs[sequence.judged]
+        assert len(held) > 1
+        assert np.ptp(held, axis=0).max() == 0.0
+        assert_allclose(held[0], 0.0, atol=0.05)
+        assert sequence.judged[-1]
+
+
+def test_records_that_never_stand_still_show_that_a_run_stays_bounded():
+    rng = np.random.default_rng(0)
+    inputs = rng.uniform(-1.0, 1.0, (500, 2))
+    values = np.column_stack([inputs, model().simulate(inputs)])
+    trace = Trace(name="noise", sample_time=0.5, channels=CHANNELS, values=values)
+    found = check_stability(model(), excursions(trace), count=20)
+    assert (found.stable, found.judged) == (True, 0)
+    assert "none has a plateau" in found.sentence
+    assert found.to_dict()["largest_plateau_error"] is None
+
+
+def test_passages_do_not_cross_what_is_masked():
+    usable = np.ones(2000, dtype=bool)
+    usable[700:750] = False
+    source = excursions(record(usable=usable))
+    assert [len(r) for r in source.records] == [700, 1250]
+
+
+def test_several_records_all_serve():
+    source = excursions(record(0), record(1))
+    assert all(sequence.judged.any() for sequence in source.draw(5, 0))
+    assert_allclose(source.output_range[1], max(record(0)["y"].max(), record(1)["y"].max()))
+
+
+def test_records_that_are_too_short_are_refused():
+    with pytest.raises(TraceError, match="no trace is long enough"):
+        excursions(record(n=200).__class__(name="s", sample_time=0.5, channels=CHANNELS, values=np.zeros((10, 3))))
+
+
+def test_traces_of_a_generator_are_judged_wherever_they_stand_still():
+    traces = [record(seed) for seed in range(5)]
+    source = TraceSequences(
+        inputs=("a", "b"), outputs=("y",), sample_time=0.5, traces=traces, source_text="Five records.", still=60
+    )
+    found = check_stability(model(), source, count=4)
+    assert (found.sequences, found.judged, found.source) == (4, 4, "Five records.")
+    assert found.largest_plateau_error < 1e-9
+    wrong = check_stability(lambda s: model().simulate(s.inputs) * 0.8, source)
+    assert wrong.unsettled == 5
+    judged = next(iter(source.draw(1, 0))).judged
+    y = traces[0]["y"]
+    plain = [
+        t >= 60 and np.ptp(traces[0].values[t - 60 : t + 1, 2]) <= 0.01 * np.ptp(source.output_range)
+        for t in range(len(y))
+    ]
+    np.testing.assert_array_equal(judged, plain)
