@@ -12,7 +12,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import BrakedTrain, Probe
 from sysid.airbrake.variant import PHYSICAL, Variant
 from sysid.errors import ConfigError
-from sysid.models import AbstractModel, Recursion
+from sysid.models import AbstractModel, Recursion, Wiring
 from sysid.rail import kernel_bank
 from sysid.rail.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
 from sysid.rail.equalising import equalising_from_handle
@@ -127,44 +127,45 @@ class ModelBank:
 class SurrogateBrake(AbstractBrake):
     """A chain of fitted stages for every valve of a train: ``STP -> BP``, ``BP -> AR``, ``BP+AR -> BC`` or shorter.
 
-    An input is the command (``STP``), the tail vent (``TV``), the speed (``V``) or the output of an earlier stage. The
-    last stage gives ``BC``, in psi gauge, as the data sets have it. Where a stage gives ``BP``, the first and the last
+    An input is the command (``STP``), the tail vent (``TV``), the speed (``V``) or the output of another stage. One
+    stage gives ``BC``, in psi gauge, as the data sets have it. Where a stage gives ``BP``, the first and the last
     valve's are the pipe at the head and at the tail, and the equalising reservoir follows the handle as in the
     reference, so that a two-way end-of-train device can read them.
 
     Args:
-        stages: In order.
+        stages: In any order; their wiring finds the one in which they run.
         consist: The train: which vehicles hang on which valve.
         rest: Value of every channel at rest, in its unit; those of stages are the rest values of their models.
 
     Raises:
-        ConfigError: If a channel comes from nowhere or the chain does not end in ``BC``.
+        ConfigError: If the stages cannot be wired, a channel comes from nowhere or none gives ``BC``.
     """
 
     def __init__(self, *, stages: Sequence[Stage], consist: Consist, rest: Mapping[str, float] | None = None) -> None:
         known: dict[str, float] = {COMMAND: consist.running_pressure, TAIL_VENT: 0.0, SPEED: 1.0, **(rest or {})}
-        self._banks: list[ModelBank] = []
-        for stage in stages:
-            model = stage.models[0]
-            missing = [name for name in model.mapping.inputs if name not in known]
-            if missing:
-                raise ConfigError(
-                    f"nothing provides {', '.join(missing)}",
-                    where=f"stage {model.mapping}",
-                    expected=f"inputs among {', '.join(known)}",
-                    got=", ".join(model.mapping.inputs),
-                    remedy="put the stage that provides it first",
-                )
-            rest_inputs = [known[name] for name in model.mapping.inputs]
-            self._banks.append(ModelBank(stage=stage, cars=consist.pairs, rest_inputs=rest_inputs))
-            known[model.mapping.output] = model.rest_output
-        if not stages or stages[-1].models[0].mapping.output != CYLINDER:
+        models = [stage.models[0] for stage in stages]
+        if CYLINDER not in [model.mapping.output for model in models]:
             raise ConfigError(
                 "the chain does not end in the brake cylinder",
                 where="stages",
-                expected=f"a last stage with the output {CYLINDER}",
-                got=[str(stage.models[0].mapping) for stage in stages],
+                expected=f"a stage with the output {CYLINDER}",
+                got=[str(model.mapping) for model in models],
             )
+        wiring = Wiring.of(models)
+        missing = [name for name in wiring.inputs if name not in known]
+        if missing:
+            raise ConfigError(
+                f"nothing provides {', '.join(missing)}",
+                where=f"stages {', '.join(str(model.mapping) for model in models)}",
+                expected=f"inputs among {', '.join(known)}, or outputs of other stages",
+                got=", ".join(wiring.inputs),
+                remedy="add the stage that provides it",
+            )
+        self._banks: list[ModelBank] = []
+        for i in wiring.order:
+            rest_inputs = [known[name] for name in models[i].mapping.inputs]
+            self._banks.append(ModelBank(stage=stages[i], cars=consist.pairs, rest_inputs=rest_inputs))
+            known[models[i].mapping.output] = models[i].rest_output
         self.sample_time, self.vehicles, self.consist = stages[0].models[0].sample_time, consist.vehicles, consist
         self._columns = valve_of_vehicle(consist)
         self._equalising = consist.running_pressure
