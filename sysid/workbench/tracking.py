@@ -200,9 +200,10 @@ class Tracker:
             self._log_values(run_id, ready)
             self._log_data(run_id)
             for name, picture in tracked.pictures(ready):
-                # Twice: the charts show pictures by key, and the page that compares runs shows files of one name.
+                # Twice: the charts show pictures by key, and the page that compares runs those files that all of
+                # them have in their topmost folder.
                 self.client.log_image(run_id, picture, key=name, step=0)
-                self.client.log_image(run_id, picture, artifact_file=f"{name}.png")
+                self.client.log_image(run_id, picture, artifact_file=f"{name.replace('/', ' - ')}.png")
             _show(self.client, experiment, [tracked.key(name) for name in ready.evaluation.cases])
             status = "FINISHED"
         finally:
