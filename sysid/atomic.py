@@ -30,11 +30,15 @@ def replacing(path: Path) -> Iterator[Path]:
         ['a.txt']
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    draft = Path(name)
+    draft = _draft(path)
     try:
         yield draft
+    except OSError as error:
+        # A write that fails names no file, or the draft, which nobody knows.
+        if error.filename in {None, str(draft)}:
+            error.filename = str(path)
+        raise
+    else:
         # mkstemp keeps others out; the finished file has the permissions that any other would have.
         mask = os.umask(0)
         os.umask(mask)
@@ -42,3 +46,13 @@ def replacing(path: Path) -> Iterator[Path]:
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def _draft(path: Path) -> Path:
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        error.filename = str(path)
+        raise
+    os.close(handle)
+    return Path(name)

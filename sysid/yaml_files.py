@@ -112,12 +112,13 @@ def parse_yaml(text: str, *, where: object) -> dict[str, Any]:
     except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         place = f"{where}, line {mark.line + 1}, column {mark.column + 1}" if mark else where
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
         raise ConfigError(
             "the file is not valid YAML",
             where=place,
             expected="YAML: 'key: value' lines, indented by spaces",
-            got=getattr(error, "problem", None) or str(error).splitlines()[0],
-            remedy="correct the line that is named",
+            got="a tab" if "'\\t'" in problem else problem,
+            remedy="indent by spaces" if "'\\t'" in problem else "correct the line that is named",
         ) from error
     if not isinstance(data, dict):
         raise ConfigError(
@@ -125,7 +126,7 @@ def parse_yaml(text: str, *, where: object) -> dict[str, Any]:
             where=where,
             expected="'key: value' lines at the top level",
             got="an empty file" if data is None else f"a {type(data).__name__}",
-            remedy="start from an example, such as one of the built-in data sets",
+            remedy="start from an example: sysid init DIR writes a data set and a pipeline with comments",
         )
     return data
 
@@ -160,6 +161,7 @@ def _config_error(error: ValidationError, model: type[BaseModel], where: object)
     expected: object
     got: object
     remedy = "correct the value"
+    place = f"{where}{_line_of(where, loc)}"
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, loc[:-1])
         near = difflib.get_close_matches(str(loc[-1]), known, n=1)
@@ -174,10 +176,33 @@ def _config_error(error: ValidationError, model: type[BaseModel], where: object)
         if isinstance(cause, FieldError):
             what, expected, got, remedy = cause.what, cause.expected, cause.got, cause.remedy
     else:
-        what, expected, got = "a value cannot be used", first["msg"], _short(first["input"])
+        wanted = first["msg"].removeprefix("Input should be ").split(", unable to parse")[0]
+        what, expected, got = f"{path_text(loc)} cannot be used as it is", wanted, _short(first["input"])
     if others:
         remedy += f" (also at fault: {', '.join(sorted({path_text(item['loc']) for item in others}))})"
-    return ConfigError(what, where=f"{where}, field {path_text(loc)}", expected=expected, got=got, remedy=remedy)
+    return ConfigError(what, where=f"{place}, field {path_text(loc)}", expected=expected, got=got, remedy=remedy)
+
+
+def _line_of(where: object, loc: Sequence[str | int]) -> str:
+    """``", line 7"`` for the deepest part of a location that is written in the file, if it was a file."""
+    if not isinstance(where, Path):
+        return ""
+    try:
+        node = yaml.compose(where.read_text(encoding="utf-8-sig"), Loader=_Loader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        # It was read a moment ago; if it cannot be now, the field alone has to do.
+        return ""
+    line = None
+    for part in loc:
+        if isinstance(node, yaml.MappingNode):
+            found = next(((key, value) for key, value in node.value if key.value == str(part)), None)
+            if found is None:
+                break
+            line, node = found[0].start_mark.line, found[1]
+        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            node = node.value[part]
+            line = node.start_mark.line
+    return "" if line is None else f", line {line + 1}"
 
 
 class FieldError(ValueError):

@@ -191,7 +191,8 @@ def _in_unit(
             where=where,
             expected="a unit in the file or in the description",
             got="none",
-            remedy=f"write files: {{units: {{{channel.name}: {channel.unit}}}}} if it is {channel.unit}",
+            remedy=f"if it is {channel.unit}, write '{column.name} [{channel.unit}]' as its header, "
+            f"or files: {{units: {{{channel.name}: {channel.unit}}}}} in a dataset.yaml",
         )
     reference = given.reference or _for_channel(files.references, channel.name) or column.reference
     if channel.reference is not Reference.NONE and reference is None:
@@ -200,7 +201,8 @@ def _in_unit(
             where=where,
             expected="gauge or absolute",
             got="neither",
-            remedy=f"write files: {{references: {{{channel.name}: gauge}}}} or absolute",
+            remedy=f"write '{column.name} [{unit} gauge]' (or absolute) as its header, "
+            f"or files: {{references: {{{channel.name}: gauge}}}} in a dataset.yaml",
         )
     if channel.reference is Reference.NONE and isinstance(files.references, Reference):
         reference = column.reference  # one reference for all pressures is not meant for the others

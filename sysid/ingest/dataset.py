@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from sysid.content import content_folders, unique_folders
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, SysidError
 from sysid.ingest.assemble import Wanted, assemble, round_channels
 from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
 from sysid.ingest.description import DatasetDescription, read_description
@@ -44,6 +44,14 @@ def find_dataset(name_or_path: str | Path, *, search: Sequence[Path] | None = No
         candidate = folder / path / DESCRIPTION_FILE
         if candidate.is_file():
             return candidate
+    if path.is_dir():
+        raise ConfigError(
+            f"a folder without a {DESCRIPTION_FILE} is no data set",
+            where=path,
+            expected=f"a data set's name, its folder, or its {DESCRIPTION_FILE}",
+            got=", ".join(sorted(file.name for file in path.iterdir())[:8]) or "an empty folder",
+            remedy="name one of the files in it: sysid ingest FILE proposes a description",
+        )
     known = sorted({file.parent.name for folder in folders for file in folder.glob(f"*/{DESCRIPTION_FILE}")})
     near = difflib.get_close_matches(str(name_or_path), known, n=1)
     raise ConfigError(
@@ -167,7 +175,6 @@ def _generated(description: DatasetDescription, case: str, generator: Generator,
 def _read(description: DatasetDescription, case: str, folder: Path) -> Trace:
     source, wish = description.source, description.cases[case]
     files = source.files or FileOptions()
-    table = read_table(folder / (wish.file or ""), files=files, repairs=source.repairs)
     wanted = Wanted(
         name=case,
         channels=description.trace_channels,
@@ -176,7 +183,12 @@ def _read(description: DatasetDescription, case: str, folder: Path) -> Trace:
         start=wish.start,
         stop=wish.stop,
     )
-    return assemble(table, wanted, files=files, grid=source.grid, repairs=source.repairs)
+    try:
+        table = read_table(folder / (wish.file or ""), files=files, repairs=source.repairs)
+        return assemble(table, wanted, files=files, grid=source.grid, repairs=source.repairs)
+    except SysidError as error:
+        error.add_note(f"reading case {case} of {folder / DESCRIPTION_FILE}")
+        raise
 
 
 def _source(description: DatasetDescription) -> str:

@@ -61,4 +61,11 @@ class Mapping:
                 got=text,
                 remedy="write -> between inputs and output",
             )
+        if "+" in right:
+            raise ConfigError(
+                "a mapping has one output",
+                expected="input channels, an arrow and one output channel, as in BP+AR -> BC",
+                got=text,
+                remedy="write one pipeline, or one mapping, for each output",
+            )
         return cls(inputs=tuple(name.strip() for name in left.split("+")), output=right.strip())

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+
+from sysid.errors import SysidError
 
 app = typer.Typer(
     name="sysid",
@@ -36,12 +38,10 @@ def run_cli(arguments: list[str]) -> int:
     Returns:
         The exit code.
     """
-    from sysid.errors import SysidError
-
     # Wherever it stands, as people add it to the end of the command that failed.
     debug = "--debug" in arguments
     try:
-        code = app([word for word in arguments if word != "--debug"], standalone_mode=False)
+        code = app([word for word in arguments if word != "--debug"], prog_name="sysid", standalone_mode=False)
         return code if isinstance(code, int) else 0
     except KeyboardInterrupt:
         _say("stopped; the same command goes on where this one was")
@@ -50,25 +50,55 @@ def run_cli(arguments: list[str]) -> int:
         # The reader of our output went away (sysid ... | head).
         return 0
     except SysidError as error:
-        if debug:
-            _trace()
-        _say(f"error: {error}")
-        return error.exit_code
+        return _refuse(error, debug=debug)
     except Exception as error:  # noqa: BLE001 - the last line of defence: whatever it is, it is named and ends with a code
-        return _unexpected(error)
+        return _unexpected(error, arguments, debug=debug)
 
 
-def _unexpected(error: Exception) -> int:
-    """A usage error, in the command line's own words, or a bug of ours, with its trace."""
-    show = getattr(error, "show", None)
-    if callable(show):
-        show()
-        return int(getattr(error, "exit_code", 2))
+def _refuse(error: SysidError, *, debug: bool) -> int:
+    """What has to change, in words; notes say what was being done."""
+    if debug:
+        _trace()
+    notes = [f"\n  while:    {note}" for note in getattr(error, "__notes__", ())]
+    _say(f"error: {error}{''.join(notes)}")
+    return error.exit_code
+
+
+def _unexpected(error: Exception, arguments: list[str], *, debug: bool) -> int:
+    """A usage error, a refusal of the operating system, or a bug of ours, which alone shows its trace unasked."""
+    from sysid.workbench.faults import refusal
+
+    if callable(getattr(error, "show", None)):
+        return _usage(error, arguments, debug=debug)
     if type(error).__name__ == "Abort":
         return 130
+    known = refusal(error)
+    if known is not None:
+        return _refuse(known, debug=debug)
     _trace()
     _say(f"error: this is a fault in sysid ({type(error).__name__}); please report it with the lines above")
     return 1
+
+
+def _usage(error: Any, arguments: list[str], *, debug: bool) -> int:
+    """A command line that cannot be understood, in the same form as every other error."""
+    import shlex
+
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "sysid"
+    if debug:
+        _trace()
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()
+        return int(error.exit_code)
+    usage = SysidError(
+        error.format_message().rstrip("."),
+        expected=context.get_usage().removeprefix("Usage: ") if context is not None else None,
+        got=shlex.join(["sysid", *arguments]),
+        remedy=f"see {command} --help",
+    )
+    _say(f"error: {usage}")
+    return int(getattr(error, "exit_code", 2))
 
 
 def _trace() -> None:
@@ -198,7 +228,9 @@ def report(
 
 @app.command(epilog="Example: sysid ui")
 def ui(
-    port: Annotated[int, typer.Option(help="Port on this machine; the next free one if it is taken.")] = 5000,
+    port: Annotated[
+        int, typer.Option(min=1, max=65535, help="Port on this machine; the next free one if it is taken.")
+    ] = 5000,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
 ) -> None:
     """Compare fits in the browser (MLflow). Ctrl-C ends it."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, SysidError
 from sysid.estimation import FitProgress, FitResult, Training
 from sysid.reporting.published import read_published
 from sysid.reporting.results import Results, parse_results, read_results, write_results
@@ -179,7 +179,11 @@ class _Run:
             result = given.make()
         else:
             progress = _Progress(step=step, training=fit.training_options(config.seed), tell=self._tell)
-            result = steps.fit_traces(fit, config, data, initial.ready.fit if initial else None, progress.report)
+            try:
+                result = steps.fit_traces(fit, config, data, initial.ready.fit if initial else None, progress.report)
+            except SysidError as error:
+                error.add_note(f"{step[0].lower()}{step[1:]}, {config.mapping}")
+                raise
         final = is_final(result) and (initial is None or initial.final)
         if not fit_stored:
             files = write_fit(folder, result)

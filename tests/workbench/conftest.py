@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -91,3 +92,43 @@ def empty_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     database = tmp_path_factory.mktemp("store") / "mlflow.db"
     connect(f"sqlite:///{database}")
     return database
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace whose pipeline has been run and its best network exported, to be copied."""
+    from sysid.workbench.config import read_pipeline
+    from sysid.workbench.pipeline import run_pipeline
+
+    folder = tmp_path_factory.mktemp("finished")
+    fill(folder)
+    file = folder / "pipelines" / "first.yaml"
+    file.write_text(PIPELINE.replace("export: null", "export: {fit: closed loop, formats: [onnx]}"), encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sysid.reporting.report.write_report", stub_report)
+        run_pipeline(read_pipeline(file), folder / "runs" / "first", command="sysid run first")
+    return folder
+
+
+def stub_report(folder: Path) -> Path:
+    """The report costs seconds, and most of what is tested here is not about it."""
+    page = folder / "report" / "index.html"
+    page.parent.mkdir(exist_ok=True)
+    page.write_text("no report", encoding="utf-8")
+    return page
+
+
+@pytest.fixture
+def quick_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs write a stub for a report."""
+    monkeypatch.setattr("sysid.reporting.report.write_report", stub_report)
+
+
+@pytest.fixture
+def done(finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of that workspace, and the current folder."""
+    folder = tmp_path / "done"
+    shutil.copytree(finished, folder)
+    monkeypatch.chdir(folder)
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    return folder

@@ -33,7 +33,11 @@ def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Pat
     names = [one.name for one in config.fits]
     if fit not in names:
         raise ConfigError(
-            f"there is no fit named {fit}", where=read.path, expected=f"one of {', '.join(names)}", got=fit
+            f"there is no fit named {fit}",
+            where=read.path,
+            expected=f"one of {', '.join(names)}",
+            got=fit,
+            remedy="name one of them with --fit",
         )
     chosen = config.fits[names.index(fit)]
     data = steps.load_data(config, beside=read.path.parent, progress=lambda _: None)

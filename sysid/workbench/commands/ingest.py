@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 
 from rich.markup import escape
 from rich.table import Table
 
 from sysid.errors import ConfigError
-from sysid.ingest import FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
+from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
 from sysid.traces import TraceSet
 from sysid.units import Reference
 from sysid.workbench.commands.run import console
@@ -29,6 +30,8 @@ def ingest_command(source: str, *, propose: Path | None) -> None:
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:
         _show_file(inspect_file(path), propose)
         return
+    if propose is not None and not _is_name(path):
+        raise _no_such(path)
     if propose is not None:
         raise ConfigError(
             "only a file can have a data set proposed",
@@ -36,7 +39,31 @@ def ingest_command(source: str, *, propose: Path | None) -> None:
             expected="a file with traces",
             remedy="name the file, or leave --propose out",
         )
+    if not path.exists() and not _is_name(path):
+        raise _no_such(path)
     _show_dataset(load_dataset(source), find_dataset(source))
+
+
+def _is_name(path: Path) -> bool:
+    """Whether a word can be the name of a data set: nothing in it says that it is a path."""
+    return len(path.parts) == 1 and path.suffix.lower() not in {
+        ".yaml",
+        ".yml",
+        *(suffix for reader in READERS for suffix in reader.suffixes),
+    }
+
+
+def _no_such(path: Path) -> ConfigError:
+    folder = path.parent
+    there = sorted(file.name for file in folder.iterdir() if file.is_file()) if folder.is_dir() else []
+    near = difflib.get_close_matches(path.name, there, n=1)
+    return ConfigError(
+        "there is no such file",
+        where=path,
+        expected="a file with traces, the name of a data set, or its dataset.yaml",
+        got="nothing at this path" if folder.is_dir() else f"no folder {folder} either",
+        remedy=f"did you mean {folder / near[0]}?" if near else "check the path",
+    )
 
 
 def _show_file(found: FileFinding, propose: Path | None) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sysid.errors import ConfigError
 from sysid.export.reading import read_bundle
 from sysid.ingest import read_trace, write_trace
 from sysid.models import History
@@ -27,6 +28,14 @@ def simulate_command(bundle: Path, inputs: Path, out: Path, *, initial: float | 
         BundleError: If the bundle is damaged or incomplete.
         UserError: If the inputs cannot be read, or the output not written.
     """
+    if initial is not None and not np.isfinite(initial):
+        raise ConfigError(
+            "the output cannot begin there",
+            where="option --initial",
+            expected="a finite number, in the output's unit",
+            got=f"--initial {initial}",
+            remedy="give the output's value before the first sample, or leave --initial out",
+        )
     read = read_bundle(bundle)
     model = read.model
     described = {entry["name"]: entry for entry in [*read.metadata["inputs"], read.metadata["output"]]}
