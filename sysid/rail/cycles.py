@@ -205,8 +205,37 @@ def drive_cycle(
         The run; its ``handle`` is the cycle.
     """
     settings = settings or HabitSettings(running=consist.running_pressure)
-    moving = MovingTrain(train=train, track=rolling_line(seed), speed=settings.target)
     driver = CycleBrakingDriver(settings=settings, seed=seed)
+    return _driven(train, consist, driver, seed=seed, duration=duration, speed=settings.target)
+
+
+def line_cycle(
+    train: Train,
+    consist: Consist,
+    *,
+    seed: int,
+    duration: float = 900.0,
+    settings: HabitSettings | None = None,
+) -> Run:
+    """Drive a train over a hilly line by the track card: notches first, the air brake where they are not enough.
+
+    Args:
+        train: The vehicles.
+        consist: Their air brake.
+        seed: Of line and driver.
+        duration: In s.
+        settings: Habits.
+
+    Returns:
+        The run; its ``handle`` is the cycle.
+    """
+    settings = settings or HabitSettings(running=consist.running_pressure)
+    driver = NotchAndBrakeDriver(train=train, track=rolling_line(seed), settings=settings, seed=seed)
+    return _driven(train, consist, driver, seed=seed, duration=duration, speed=settings.target)
+
+
+def _driven(train: Train, consist: Consist, driver: AbstractDriver, *, seed: int, duration: float, speed: float) -> Run:
+    moving = MovingTrain(train=train, track=rolling_line(seed), speed=speed)
     return drive(moving, ReferenceBrake(consist=consist), driver, Limits(duration=duration, until_still=False, block=1))
 
 

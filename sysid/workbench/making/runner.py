@@ -14,7 +14,7 @@ from sysid.workbench.events import Event, StepDone, StepProgress, StepStarted, W
 from sysid.workbench.kept_steps import do_steps
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.making.config import MakingConfig
-from sysid.workbench.making.maker import Maker, find_maker
+from sysid.workbench.making.maker import find_maker
 from sysid.workbench.store import RunFolder, write_bytes, write_json
 from sysid.yaml_files import check, read_yaml
 
@@ -49,10 +49,9 @@ def run_making(request: RunRequest) -> int:
 
     try:
         with store.locked():
-            maker = find_maker(config.kind, where=request.path)
             write_bytes(store.path / "pipeline.yaml", request.path.read_bytes())
             write_json(store.path / "environment.json", environment())
-            file = _make(config, maker, request, store, tell, shlex.join(words))
+            file = _make(config, request, store=store, tell=tell, command=shlex.join(words))
             traces = _load(file, tell)
     finally:
         screen.close()
@@ -63,9 +62,8 @@ def run_making(request: RunRequest) -> int:
     return 0
 
 
-def _make(
-    config: MakingConfig, maker: Maker, request: RunRequest, store: RunFolder, tell: Watcher, command: str
-) -> Path:
+def _make(config: MakingConfig, request: RunRequest, *, store: RunFolder, tell: Watcher, command: str) -> Path:
+    maker = find_maker(config.kind, where=request.path)
     options = check(maker.options, config.options, where=f"{request.path}, options")
     results = do_steps(
         maker.steps(options), title="Playing", version=maker.version, store=store, fresh=request.fresh, tell=tell
