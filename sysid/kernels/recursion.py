@@ -43,7 +43,8 @@ _SHIFT = math.exp(-_CENTRE)
 _TAYLOR = tuple((-1.0) ** n / math.factorial(n) for n in range(13))
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+# With Python's rule for division by zero the loop would have a way out, and would not be vectorised.
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def tanh_in_place(a):
     r"""Replace each entry by its hyperbolic tangent, in a form that the compiler vectorises.
 
