@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models import Cascade, Ends, History, Limit, Member, Recursion, VectorNARXModel
+from sysid.models import Cascade, Ends, History, Limit, Member, NeuralForm, Recursion, VectorNARXModel
 
 
 def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float64]) -> float:
@@ -115,6 +115,35 @@ def _member_step(model: Member, past: dict[str, list[float]]) -> list[float]:
     y = V.reshape(m, n) @ h + c + (w.reshape(m, r) @ x if len(w) else 0.0)
     y = np.clip(y, -model.clamp, model.clamp)
     return [float(v * s + o) for v, s, o in zip(y, scaling.output_scale, scaling.output_offset, strict=True)]
+
+
+def run_neural(form: NeuralForm, inputs: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Free run of a neural state space, one Python step at a time.
+
+    Args:
+        form: The model.
+        inputs: Scaled inputs, shape ``(n_samples, n_inputs)``.
+        x: State before the first sample, shape ``(n_states,)``.
+
+    Returns:
+        Scaled output of shape ``(n_samples,)``.
+    """
+    s, theta = form.sizes, form.theta
+    M, W = theta[s.linear].reshape(s.states, s.row), theta[s.hidden].reshape(s.neurons, s.row)
+    V = theta[s.readout].reshape(s.states, s.neurons)
+    L, Wy = theta[s.output_linear], theta[s.output_hidden].reshape(s.output_neurons, s.row)
+    v = theta[s.output_readout]
+
+    def activation(a: NDArray[np.float64]) -> NDArray[np.float64]:
+        return a**3 if form.cubic else np.tanh(a)
+
+    y = []
+    for u in inputs:
+        z = np.concatenate([x, u, [1.0]])
+        output = L @ z + v @ activation(Wy @ z)
+        y.append(float(np.clip(abs(output) if form.rectified else output, form.low, form.high)))
+        x = np.clip(M @ z + V @ activation(W @ z), -form.bound, form.bound)
+    return np.array(y)
 
 
 def finite_difference_jacobian(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
+from threadpoolctl import threadpool_limits
 
 from sysid.estimation.initialise import AbstractLayout
 from sysid.estimation.levenberg_marquardt import LevenbergMarquardt
@@ -128,7 +129,8 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
         low=whole.low, high=whole.high,
     )  # fmt: skip
     linear = NeuralProvider(template=template, experiments=provider.experiments)
-    fits = [_fitted(linear, _realised(linear, order)) for order in ARX_ORDERS]
+    with threadpool_limits(1, "blas"):  # more threads than one cost more than they give at these sizes
+        fits = [_fitted(linear, _realised(linear, order)) for order in ARX_ORDERS]
     theta = _unit_states(linear, min(fits, key=linear.loss))
     base = np.zeros(provider.n_parameters)
     for to, of in ((whole.sizes.linear, s.linear), (whole.sizes.output_linear, s.output), (whole.sizes.start, s.start)):
@@ -184,7 +186,8 @@ def _realise(
     for t in range(len(responses)):
         fresh = inputs[:, t] if t < inputs.shape[1] else np.zeros(s.inputs)
         responses[t] = fresh + sum(past[i] * responses[t - 1 - i] for i in range(min(len(past), t)))
-    hankel = np.block([[responses[1 + i + j] for j in range(HORIZON)] for i in range(HORIZON)])
+    places = 1 + np.arange(HORIZON)[:, None] + np.arange(HORIZON)
+    hankel = responses[places].reshape(HORIZON, -1)
     left, values, right = linalg.svd(hankel, full_matrices=False)
     root = np.sqrt(np.maximum(values[: s.states], 1e-12 * values[0]))
     observable = left[:, : s.states] * root

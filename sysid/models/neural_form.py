@@ -209,9 +209,11 @@ class NeuralForm(AbstractForm):
         Returns:
             Shape ``(n_states,)``.
         """
-        # What is expected may lie far outside where the records were; from there the output may not show the way back.
+        # What is expected may lie far outside where the records were, and a rectified output has two states for each
+        # value: descents begin all around.
         expected = np.clip(x, -1.0, 1.0)
-        found = [self._descended(scaled, output, begin, expected) for begin in (expected, np.zeros(len(x)))]
+        around = [expected, np.zeros(len(x)), *np.eye(len(x)), *-np.eye(len(x))]
+        found = [self._descended(scaled, output, begin, expected) for begin in around]
         return min(found, key=lambda x: self._misfit(scaled, output, x, expected))
 
     def _descended(
