@@ -58,6 +58,8 @@ class Experiment:
         n = start.n_measured
         usable = trace.usable_samples[n:]
         weights = None if usable.all() else usable.astype(np.float64)
+        if trace.weights is not None:
+            weights = usable * trace.weights[n:]
         return cls(inputs=inputs[n:], output=output[n:], history=history, weights=weights)
 
     @property
@@ -122,12 +124,12 @@ class AbstractProvider(ABC):
 class _Record:
     """An experiment in scaled numbers.
 
-    ``y`` is the output with its history: measured where the loop is open, zeros to be filled where it is closed. It is
-    copied before a kernel writes, because starts that train side by side share the provider.
+    ``measured`` is the output with its history. Where a kernel writes outputs it writes into a copy, because starts that
+    train side by side share the provider.
     """
 
     u: NDArray[np.float64]
-    y: NDArray[np.float64]
+    measured: NDArray[np.float64]
     target: NDArray[np.float64]
     root_weights: NDArray[np.float64] | None
 
@@ -144,17 +146,20 @@ class _Pass:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecursionProvider(AbstractProvider):
-    """Residuals of a :class:`Recursion`, in open loop (one step ahead) or closed loop (free run).
+    """Residuals of a :class:`Recursion`, in open loop (one step ahead), closed loop (free run) or in between.
 
     Args:
         template: Lags, neurons, scaling and bounds; its parameters are ignored.
         experiments: The records; each starts from its own history.
         closed: Free run if true, one step ahead otherwise.
+        horizon: Samples after which a free run begins anew from measured output; ``None`` for the whole record. Every
+            sample is then predicted between 1 and ``horizon`` steps ahead.
     """
 
     template: Recursion
     experiments: tuple[Experiment, ...]
     closed: bool
+    horizon: int | None = None
     n_samples: int = field(init=False)
     _records: tuple[_Record, ...] = field(init=False, repr=False)
 
@@ -164,19 +169,24 @@ class RecursionProvider(AbstractProvider):
         object.__setattr__(self, "_records", tuple(self._record(e) for e in self.experiments))
 
     def _record(self, experiment: Experiment) -> _Record:
-        u, y = self.template.extended(experiment.inputs, experiment.history)
+        u, measured = self.template.extended(experiment.inputs, experiment.history)
         target = self.template.scaling.scale_output(experiment.output)
-        if not self.closed:
-            y[self.template.lags.depth :] = target
+        measured[self.template.lags.depth :] = target
         roots = None if experiment.weights is None else np.sqrt(experiment.weights)
-        return _Record(u, y, target, roots)
+        return _Record(u, measured, target, roots)
+
+    def _steps(self, record: _Record) -> int:
+        """The horizon as the kernel wants it."""
+        if not self.closed:
+            return 1
+        return len(record.target) if self.horizon is None else self.horizon
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
         total = 0.0
         for record in self._records:
-            if self.closed:
-                y = record.y.copy()
+            if self.closed and self.horizon is None:
+                y = record.measured.copy()  # of which the free run reads what it has written itself
                 kernel.free_run(record.u, y, *self._arguments(record, theta))
                 residual = y[self.template.lags.depth :] - record.target
             else:
@@ -256,21 +266,21 @@ class RecursionProvider(AbstractProvider):
             if first:
                 J[:carry] = J[BLOCK : BLOCK + carry]
             kernel.sensitivities(
-                record.u, passed.y, lags.depth, first, rows, *self._tables(), theta,
-                self.template.neurons, self.closed, passed.h, passed.c, carry, J,
+                record.u, passed.y, record.measured, lags.depth, first, rows, *self._tables(), theta,
+                self.template.neurons, self._steps(record), passed.h, passed.c, carry, J,
             )  # fmt: skip
             yield first, J[carry : carry + rows]
 
     def _pass(self, record: _Record, theta: NDArray[np.float64]) -> _Pass:
         n = len(record.target)
         passed = _Pass(
-            y=record.y.copy(),
+            y=record.measured.copy(),
             out=np.empty(n),
             h=np.empty((n, self.template.neurons)),
             c=np.empty((n, len(self.template.lags.output) + 1)),
         )
-        arguments = self._arguments(record, theta)
-        kernel.activations(record.u, passed.y, *arguments, self.closed, passed.out, passed.h, passed.c)
+        arguments = (*self._arguments(record, theta), self._steps(record))
+        kernel.activations(record.u, passed.y, record.measured, *arguments, passed.out, passed.h, passed.c)
         return passed
 
     def _tables(self) -> tuple[NDArray[np.int64], ...]:

@@ -15,7 +15,9 @@ the parameters :math:`\theta` gives, with :math:`s_{t,k} = v_k (1 - h_{t,k}^2)`,
     \qquad c_{t,l} = w_l + \sum_k s_{t,k} W_{k,l}
 
 a linear recursion over the rows of the Jacobian (real-time recurrent learning, Williams and Zipser 1989):
-exact, forward, one pass. With a single output it costs ``n_parameters * (1 + n_output_lags)`` multiply-adds
+exact, forward, one pass. In between stands the free run over windows of ``horizon`` samples, each of which begins from
+measured output: lagged outputs from before the window are measured, and do not depend on the parameters. A horizon of 1
+is the prediction one step ahead, one as long as the record the free run. With a single output it costs ``n_parameters * (1 + n_output_lags)`` multiply-adds
 a sample, which is why it beats backpropagation through time for networks of this size: it yields the whole
 Jacobian that Gauss-Newton methods need. A clipped sample has a zero row.
 
@@ -143,13 +145,29 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
 def activations(
-    u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, low, high, closed, out, h, c
+    u,
+    y,
+    measured,
+    depth,
+    n_steps,
+    input_channel,
+    input_lag,
+    output_lag,
+    theta,
+    n_neurons,
+    low,
+    high,
+    horizon,
+    out,
+    h,
+    c,
 ):
     """One pass that keeps what the sensitivities need.
 
     Args:
         u: As in :func:`free_run`.
-        y: As in :func:`free_run`; written in a free run (``closed``), read as measured otherwise.
+        y: As in :func:`free_run`; ``y[depth:]`` is written.
+        measured: Scaled measured output with history, shape ``(depth + n_steps,)``; read where a window's past is.
         depth: As in :func:`free_run`.
         n_steps: As in :func:`free_run`.
         input_channel: As in :func:`free_run`.
@@ -159,7 +177,8 @@ def activations(
         n_neurons: As in :func:`free_run`.
         low: As in :func:`free_run`.
         high: As in :func:`free_run`.
-        closed: Whether the output feeds back.
+        horizon: Samples after which the run begins anew from measured output: 1 for one step ahead, ``n_steps`` or more
+            for a free run over the whole record.
         out: Predicted output, shape ``(n_steps,)``, written.
         h: Activations, shape ``(n_steps, n_neurons)``, written.
         c: Derivative with respect to each lagged output, shape ``(n_steps, n_output_regressors + 1)``, written;
@@ -177,10 +196,12 @@ def activations(
     x = np.empty(n_x)
     slopes = np.empty(n_neurons)
     for t in range(n_steps):
+        window = depth + (t // horizon) * horizon
         for i in range(n_in):
             x[i] = u[depth + t - input_lag[i], input_channel[i]]
         for i in range(n_out):
-            x[n_in + i] = y[depth + t - output_lag[i]]
+            past = depth + t - output_lag[i]
+            x[n_in + i] = y[past] if past >= window else measured[past]
         total = constant
         for i in range(n_out):
             c[t, i] = w[n_in + i] if linear else 0.0
@@ -204,13 +225,27 @@ def activations(
         bounded = min(max(total, low), high) if not math.isnan(total) else total
         c[t, n_out] = 1.0 if bounded == total else 0.0
         out[t] = bounded
-        if closed:
-            y[depth + t] = bounded
+        y[depth + t] = bounded
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
 def sensitivities(
-    u, y, depth, first, n_rows, input_channel, input_lag, output_lag, theta, n_neurons, closed, h, c, carry, J
+    u,
+    y,
+    measured,
+    depth,
+    first,
+    n_rows,
+    input_channel,
+    input_lag,
+    output_lag,
+    theta,
+    n_neurons,
+    horizon,
+    h,
+    c,
+    carry,
+    J,
 ):
     """Rows ``first`` to ``first + n_rows`` of the Jacobian of the output with respect to the parameters.
 
@@ -219,7 +254,8 @@ def sensitivities(
 
     Args:
         u: As in :func:`free_run`.
-        y: As in :func:`free_run`, filled.
+        y: As from :func:`activations`.
+        measured: As in :func:`activations`.
         depth: As in :func:`free_run`.
         first: First step of the block.
         n_rows: Steps in the block.
@@ -228,7 +264,7 @@ def sensitivities(
         output_lag: As in :func:`free_run`.
         theta: As in :func:`free_run`.
         n_neurons: As in :func:`free_run`.
-        closed: Whether the output feeds back; otherwise the rows do not depend on each other.
+        horizon: As in :func:`activations`; with 1 the rows do not depend on each other.
         h: As from :func:`activations`.
         c: As from :func:`activations`.
         carry: Rows kept from the block before: the longest output lag.
@@ -244,6 +280,7 @@ def sensitivities(
     x = np.empty(n_x)
     for r in range(n_rows):
         t = first + r
+        window = (t // horizon) * horizon
         row = J[carry + r]
         if c[t, n_out] == 0.0:
             row[:] = 0.0
@@ -251,7 +288,8 @@ def sensitivities(
         for i in range(n_in):
             x[i] = u[depth + t - input_lag[i], input_channel[i]]
         for i in range(n_out):
-            x[n_in + i] = y[depth + t - output_lag[i]]
+            past = t - output_lag[i]
+            x[n_in + i] = y[depth + past] if past >= window else measured[depth + past]
         for k in range(n_neurons):
             z = h[t, k]
             slope = v[k] * (1.0 - z * z)
@@ -264,13 +302,12 @@ def sensitivities(
         if linear:
             for i in range(n_x):
                 row[constant_at + 1 + i] = x[i]
-        if closed:
-            for i in range(n_out):
-                if t >= output_lag[i]:  # samples before the first step do not depend on the parameters
-                    factor = c[t, i]
-                    past = J[carry + r - output_lag[i]]
-                    for p in range(n_p):
-                        row[p] += factor * past[p]
+        for i in range(n_out):
+            if t - output_lag[i] >= window:  # samples from before the window do not depend on the parameters
+                factor = c[t, i]
+                earlier = J[carry + r - output_lag[i]]
+                for p in range(n_p):
+                    row[p] += factor * earlier[p]
 
 
 @njit(cache=True, nogil=True)

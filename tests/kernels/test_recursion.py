@@ -9,10 +9,12 @@ from numpy.testing import assert_allclose
 from sysid.estimation.provider import BLOCK, Experiment, RecursionProvider
 from sysid.kernels.recursion import tanh_in_place
 from sysid.models import NARX, History, Recursion, Scaling, parameter_count
-from sysid.testing import finite_difference_jacobian
+from sysid.testing import finite_difference_jacobian, simulate
 
 
-def a_provider(network: NARX, *, closed: bool, n: int = 40, seed: int = 0, weights=None) -> RecursionProvider:
+def a_provider(
+    network: NARX, *, closed: bool, n: int = 40, seed: int = 0, weights=None, horizon: int | None = None
+) -> RecursionProvider:
     rng = np.random.default_rng(seed)
     lags = network.lags(2)
     template = Recursion(
@@ -32,7 +34,7 @@ def a_provider(network: NARX, *, closed: bool, n: int = 40, seed: int = 0, weigh
         )
         for length in (n, n // 2)
     ]
-    return RecursionProvider(template=template, experiments=experiments, closed=closed)
+    return RecursionProvider(template=template, experiments=experiments, closed=closed, horizon=horizon)
 
 
 def outputs(provider: RecursionProvider, theta: np.ndarray) -> np.ndarray:
@@ -79,6 +81,54 @@ def test_normal_equations_equal_the_dense_ones(closed, weights):
     assert_allclose(at.gradient, J.T @ (W * residual), rtol=1e-9, atol=1e-12)
     assert_allclose(at.gauss_newton, J.T @ (W[:, None] * J), rtol=1e-9, atol=1e-12)
     assert_allclose(provider.loss(theta), at.loss, rtol=1e-12)
+
+
+def windows(provider: RecursionProvider, theta: np.ndarray) -> np.ndarray:
+    """The slow twin of a horizon: each window is a record of its own that begins from what was measured."""
+    form, k = provider.at(theta), provider.horizon
+    runs = []
+    for e in provider.experiments:
+        past_u, past_y = np.concatenate([e.history.inputs, e.inputs]), np.concatenate([e.history.output, e.output])
+        n = len(e.history.output)
+        for first in range(0, len(e.output), k):
+            history = History(inputs=past_u[: n + first], output=past_y[: n + first])
+            runs.append(simulate(form, e.inputs[first : first + k], history))
+    return np.concatenate(runs)
+
+
+@pytest.mark.parametrize("horizon", [1, 5, 99])
+@pytest.mark.parametrize("network", STRUCTURES)
+def test_a_horizon_is_a_free_run_that_begins_anew(network, horizon):
+    provider = a_provider(network, closed=True, n=16, horizon=horizon)
+    theta = 0.3 * np.random.default_rng(3).standard_normal(len(provider.template.theta))
+    target = np.concatenate([e.output for e in provider.experiments])
+    assert provider.loss(theta) == pytest.approx(0.5 * np.sum((windows(provider, theta) - target) ** 2), rel=1e-10)
+    dense = finite_difference_jacobian(lambda p: windows(provider, p), theta)
+    assert_allclose(provider.jacobian(theta), dense, atol=1e-7)
+
+
+def test_a_horizon_of_one_is_the_open_loop_and_a_long_one_the_closed_loop():
+    network = NARX(input_delays=4, output_delays=4, neurons=5)
+    theta = 0.3 * np.random.default_rng(3).standard_normal(len(a_provider(network, closed=True).template.theta))
+    for horizon, closed in ((1, False), (1000, True)):
+        by_horizon = a_provider(network, closed=True, horizon=horizon).linearise(theta)
+        plain = a_provider(network, closed=closed).linearise(theta)
+        np.testing.assert_array_equal(by_horizon.gauss_newton, plain.gauss_newton)
+        assert by_horizon.loss == plain.loss
+
+
+def test_windows_join_across_blocks():
+    network = NARX(input_delays=2, output_delays=2, neurons=3)
+    provider = a_provider(network, closed=True, n=2 * BLOCK + 100, horizon=BLOCK - 5)
+    theta = 0.3 * np.random.default_rng(3).standard_normal(len(provider.template.theta))
+    first = provider.experiments[0]
+    late = slice(2 * (BLOCK - 5), 2 * (BLOCK - 5) + 30)  # a window that begins shortly before a block ends
+    history = History(inputs=first.inputs[: late.start], output=first.output[: late.start])
+
+    def run(p):
+        return provider.at(p).simulate(first.inputs[late], history)
+
+    assert_allclose(provider.jacobian(theta)[late], finite_difference_jacobian(run, theta), atol=1e-7)
 
 
 def test_blocks_join_without_a_seam():
