@@ -65,6 +65,8 @@ class Trace:
         usable: Shape ``(n_samples,)``, bool; ``False`` marks samples (gaps) that count in no loss and
             in no figure of merit. ``None`` means that all count.
         provenance: What was done to the samples on their way here, one sentence each.
+        weights: What each sample counts in the loss of a fit, from 0 on, shape ``(n_samples,)``; figures of merit do
+            not know them. ``None`` means that all count alike.
 
     Raises:
         TraceError: If shapes disagree, a value is not finite, or the sample time is not positive.
@@ -82,6 +84,7 @@ class Trace:
     start_time: float = 0.0
     usable: NDArray[np.bool_] | None = None
     provenance: tuple[str, ...] = ()
+    weights: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         values = np.array(self.values, dtype=np.float64, order="C")
@@ -94,6 +97,21 @@ class Trace:
             usable = np.array(self.usable, dtype=np.bool_)
             usable.setflags(write=False)
             object.__setattr__(self, "usable", usable)
+        if self.weights is not None:
+            object.__setattr__(self, "weights", self._checked_weights())
+
+    def _checked_weights(self) -> NDArray[np.float64]:
+        weights = np.array(self.weights, dtype=np.float64)
+        if weights.shape != (len(self.values),) or not np.isfinite(weights).all() or weights.min() < 0.0:
+            raise TraceError(
+                "the weights do not match the samples",
+                where=f"trace {self.name}",
+                expected=f"{len(self.values)} numbers from 0 on",
+                got=f"shape {weights.shape}, from {weights.min(initial=np.inf):g} to {weights.max(initial=-np.inf):g}",
+                remedy="give one weight per sample",
+            )
+        weights.setflags(write=False)
+        return weights
 
     def _check(self) -> None:
         if self.values.ndim != 2 or self.values.shape[1] != len(self.channels):
@@ -173,11 +191,13 @@ class Trace:
 
     @property
     def digest(self) -> str:
-        """SHA-256 over everything that a fit can see: time, channels, values and mask."""
+        """SHA-256 over everything that a fit can see: time, channels, values, mask and weights."""
         head = [self.start_time, self.sample_time, [[c.name, c.unit, c.reference.value] for c in self.channels]]
         sha = hashlib.sha256(json.dumps(head).encode())
         sha.update(self.values.tobytes())
         sha.update(np.packbits(self.usable_samples).tobytes())
+        if self.weights is not None:
+            sha.update(self.weights.tobytes())
         return sha.hexdigest()
 
     def index(self, channel: str) -> int:
