@@ -35,10 +35,12 @@ from sysid.workbench.events import (
     JudgementReady,
     ReportReady,
     RunStarted,
+    SweepReady,
 )
 from sysid.workbench.judgement.logged import log_judgement
 from sysid.workbench.naming import slug
 from sysid.workbench.registry import parsed, register
+from sysid.workbench.tracked_sweep import Entities, experiment_name, log_sweep
 
 KEY_TAG = "sysid.key"
 """Tag that holds the digest of everything a fit and its figures depend on."""
@@ -175,6 +177,8 @@ class Tracker:
                 self._log_report(event)
             case JudgementReady():
                 self._log_judgement(event)
+            case SweepReady():
+                self._log_sweep(event)
             case _:
                 pass
 
@@ -350,6 +354,20 @@ class Tracker:
             self.client = connect(self.uri)
         log_judgement(
             self.client, ready, key_tag=KEY_TAG, experiment=self._experiment(ready.kind), metric=Metric
+        )
+
+    def _log_sweep(self, ready: SweepReady) -> None:
+        from mlflow.entities import Metric, Param
+
+        if self.client is None:
+            self.client = connect(self.uri)
+        experiment = self._experiment(experiment_name(ready.record))
+        log_sweep(
+            self.client,
+            ready,
+            key_tag=KEY_TAG,
+            experiment=experiment,
+            entities=Entities(metric=Metric, param=Param),
         )
 
     def _log_report(self, ready: ReportReady) -> None:
