@@ -278,17 +278,27 @@ def weights_by_state(annotation: Annotation, weights: dict[State, float]) -> NDA
     return table[annotation.states]
 
 
-def annotator(trace: Trace) -> Trace:
-    """The trace with its states: what ``sysid ingest --annotate`` asks of a field of application.
+class BrakeStates:
+    """The annotator of brake traces: what ``sysid ingest --annotate`` and pipelines ask of a field of application."""
 
-    Args:
-        trace: With the channel ``BP`` and, for laps to be found at once, ``STP``.
+    channel = STATE_CHANNEL
+    labels = tuple(state.name.lower().replace("_", " ") for state in State)
 
-    Returns:
-        The trace with the channel ``STATE``.
+    def __call__(self, trace: Trace) -> Trace:
+        """The trace with its states.
 
-    Raises:
-        ChannelError: If there is no ``BP``.
-    """
-    handle = "STP" if "STP" in trace.channel_names else None
-    return annotated(trace, annotate(trace, handle=handle))
+        Args:
+            trace: With the channel ``BP`` and, for laps to be found at once, ``STP``.
+
+        Returns:
+            The trace with the channel ``STATE``.
+
+        Raises:
+            ChannelError: If there is no ``BP``.
+        """
+        handle = "STP" if "STP" in trace.channel_names else None
+        return annotated(trace, annotate(trace, handle=handle))
+
+
+annotator = BrakeStates()
+"""What the entry point ``brake-states`` names."""

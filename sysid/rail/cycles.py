@@ -16,11 +16,11 @@ from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
 from sysid.rail.ato import AtoSettings, CardDriver
 from sysid.rail.brake import ReferenceBrake
-from sysid.rail.card import STRAIGHT, CardCode, CardRow, TrackCard
+from sysid.rail.card import CardCode, CardRow, TrackCard
 from sysid.rail.constants import KMH
 from sysid.rail.drive import AbstractDriver, Controls, Limits, Observation, Run, drive
 from sysid.rail.motion import MovingTrain
-from sysid.rail.track import TrackProfile
+from sysid.rail.track import STRAIGHT, TrackProfile
 from sysid.rail.train import Train
 
 

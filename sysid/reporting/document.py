@@ -18,6 +18,7 @@ from sysid.reporting.parts import Part, Picture, Section, identifier, picture
 from sysid.reporting.published import PublishedTable
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.signals import CaseSignals, read_signals
+from sysid.reporting.state_table import state_section
 from sysid.reporting.sweep_section import sweep_sections
 from sysid.reporting.tables import (
     DIVERGED,
@@ -83,7 +84,8 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     if best is not None:
         sections.append(_best(best, signals[best.slug], moments, columns))
     sections += evidence_sections(folder, results)
-    sections += judgement_sections(read_judgements(folder))
+    states = state_section(results)
+    sections += ([] if states is None else [states]) + judgement_sections(read_judgements(folder))
     sections += sweep_sections(folder, published)
     sections += [_run_times(results, published), _tried(results)]
     exports = export_table(results)

@@ -70,6 +70,12 @@ class CoverageRecord(_Record):
     mean_half_width: Number = Field(description="In the output's unit.")
 
 
+class StateRecord(FiguresRecord):
+    """Figures of merit while a state lasts."""
+
+    share: Number = Field(description="Of the samples that count, 0 to 1.")
+
+
 class CaseRecord(_Record):
     """One fit on one case."""
 
@@ -81,6 +87,9 @@ class CaseRecord(_Record):
     simulated_s: Number = Field(description="Length of the case in seconds.")
     coverage: dict[str, CoverageRecord] | None = Field(
         default=None, description="Of the output's interval, free_run and one_step, where the fit has a posterior."
+    )
+    by_state: dict[str, StateRecord] | None = Field(
+        default=None, description="Free run by the name of a state, where an annotator says in which each sample is."
     )
     published: dict[str, PublishedRecord] | None = Field(
         default=None, description="By kind of figure: free_run, one_step (mse) or run_time."

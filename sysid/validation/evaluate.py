@@ -33,6 +33,8 @@ class CaseResult:
         simulated: Free run, shape ``(n_samples,)``.
         predicted: One step ahead, shape ``(n_samples,)``.
         intervals: Of the output, where the fit has a posterior.
+        by_state: By the name of a state: figures of the free run while it lasts, and its share of the samples that
+            count; ``None`` where nobody said in which state a sample is.
     """
 
     case: str
@@ -45,10 +47,12 @@ class CaseResult:
     simulated: NDArray[np.float64]
     predicted: NDArray[np.float64]
     intervals: CaseIntervals | None = None
+    by_state: Dict[str, tuple[Figures, float]] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Figures and run time as JSON values, without the signals."""
-        return {
+        states = {} if self.by_state is None else {"by_state": _states(self.by_state)}
+        return states | {
             "role": self.role.value,
             "free_run": self.free_run.to_dict(),
             "one_step": self.one_step.to_dict(),
@@ -56,6 +60,10 @@ class CaseResult:
             "n_samples": len(self.target),
             "simulated_s": float(self.time[-1] - self.time[0]),
         } | ({} if self.intervals is None else {"coverage": self.intervals.to_dict()})
+
+
+def _states(by_state: Dict[str, tuple[Figures, float]]) -> dict[str, Any]:
+    return {name: {**found.to_dict(), "share": share} for name, (found, share) in by_state.items()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,6 +13,7 @@ from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import ARX, NARX, Start, TransferFunction
+from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
     STRICT,
     FormatField,
@@ -128,6 +129,7 @@ class PipelineConfig(BaseModel):
         export: What leaves the workbench; ``null`` for nothing.
         report: What the report shows.
         stability: Over which sequences a network's free run has to stay bounded and to settle.
+        annotate: Who says in which state each sample is, for errors by state and weights.
     """
 
     model_config = STRICT
@@ -145,6 +147,7 @@ class PipelineConfig(BaseModel):
     export: ExportConfig | None = ExportConfig()
     report: ReportConfig = ReportConfig()
     stability: StabilityConfig = StabilityConfig()
+    annotate: AnnotateConfig | None = None
 
     @field_validator("fits")
     @classmethod

@@ -105,6 +105,9 @@ def read_scores(folder: Path) -> Scores:
             intervals=CaseIntervals.from_dict(fields["coverage"], *(arrays[f"{name}/{signal}"] for signal in INTERVAL))
             if "coverage" in fields
             else None,
+            by_state={state: (_figures(one), float(one["share"])) for state, one in fields["by_state"].items()}
+            if "by_state" in fields
+            else None,
             **{signal: np.asarray(arrays[f"{name}/{signal}"], dtype=np.float64) for signal in SIGNALS},
         )
         for name, fields in stored["cases"].items()

@@ -28,6 +28,7 @@ from sysid.estimation import (
 from sysid.models import ARX, NARX, TransferFunction
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation import Evaluation, evaluate, evaluate_case
+from sysid.workbench.annotation import annotated_set, by_state, find_annotator, weighted
 from sysid.workbench.config import FitConfig, PipelineConfig
 from sysid.workbench.stability import StabilityCheck
 from sysid.workbench.store import code_digest, digest
@@ -71,7 +72,7 @@ def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str],
         ConfigError: If no trace is for estimation, or a trace that chooses is also scored.
         ChannelError: If a channel of the mapping is missing.
     """
-    traces = _load(config.data, beside, progress)
+    traces = _annotated(_load(config.data, beside, progress), config)
     names = (*config.mapping.inputs, config.mapping.output)
     traces.traces[0].columns(names)
     if not traces.with_role(Role.ESTIMATION):
@@ -84,7 +85,7 @@ def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str],
         )
     selection = traces.with_role(Role.SELECTION)
     if config.selection is not None:
-        chosen = _load(config.selection, beside, progress)
+        chosen = _annotated(_load(config.selection, beside, progress), config)
         selection = (*selection, *_selection_traces(chosen, traces, names))
     sequences: tuple[Trace, ...] = ()
     if config.stability.sequences is not None:
@@ -92,6 +93,17 @@ def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str],
         declared.traces[0].columns(names)
         sequences = tuple(declared)
     return Data(traces=traces, selection=selection, sequences=sequences)
+
+
+def _annotated(traces: TraceSet, config: PipelineConfig) -> TraceSet:
+    """The traces with states and weights, where the pipeline asks for them."""
+    if config.annotate is None:
+        return traces
+    annotator = find_annotator(config.annotate.by, where="annotate, by")
+    known = annotated_set(traces, annotator)
+    return dataclasses.replace(
+        known, traces=tuple(weighted(trace, annotator, config.annotate.weights) for trace in known)
+    )
 
 
 def _load(name: str, beside: Path, progress: Callable[[str], None]) -> TraceSet:
@@ -284,8 +296,12 @@ def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
         The figures.
     """
     errors = [evaluate_case(fit.model, trace, Role.SELECTION, config.start, 1).free_run.mse for trace in data.selection]
+    evaluation = evaluate(fit.model, data.traces, config.start, posterior=fit.posterior)
+    if config.annotate is not None:
+        annotator = find_annotator(config.annotate.by, where="annotate, by")
+        evaluation = by_state(evaluation, data.traces, annotator, config.start)
     return Scores(
-        evaluation=evaluate(fit.model, data.traces, config.start, posterior=fit.posterior),
+        evaluation=evaluation,
         selection_mse=float(np.mean(errors)) if errors else math.nan,
     )
 

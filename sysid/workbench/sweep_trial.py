@@ -156,7 +156,12 @@ def _shortened(traces: TraceSet, share: float) -> TraceSet:
         if traces.roles[trace.name] is not Role.ESTIMATION:
             return trace
         n = max(2, round(share * len(trace)))
-        return replace(trace, values=trace.values[:n], usable=None if trace.usable is None else trace.usable[:n])
+        return replace(
+            trace,
+            values=trace.values[:n],
+            usable=None if trace.usable is None else trace.usable[:n],
+            weights=None if trace.weights is None else trace.weights[:n],
+        )
 
     return replace(traces, traces=tuple(cut(trace) for trace in traces))
 
