@@ -93,8 +93,15 @@ def simulate_cascade(cascade: Cascade, inputs: NDArray[np.float64]) -> dict[str,
 
 
 def _member_step(model: Member, past: dict[str, list[float]]) -> list[float]:
-    """Outputs of one member now; its inputs in ``past`` are known up to now, its outputs up to the sample before."""
+    """Outputs of one member now.
+
+    Its outputs in ``past`` are known up to the sample before, and so are inputs that are computed after it.
+    """
     ends = Ends.of(model)
+    n_known = len(past[ends.outputs[0]])
+    past = {
+        name: values + [np.nan] * (n_known + 1 - len(values)) for name, values in past.items() if name in ends.inputs
+    } | {name: past[name] for name in ends.outputs}
     if not isinstance(model, VectorNARXModel):
         form = model.recursion
         if not isinstance(form, Recursion):

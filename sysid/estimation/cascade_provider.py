@@ -315,6 +315,10 @@ def with_theta(member: Member, theta: NDArray[np.float64]) -> Member:
 
 def _to_run(cascade: Cascade, trained: Sequence[str] | None) -> tuple[list[Member], list[bool]]:
     """Members that change while the trained ones do, and which of them are trained."""
+    if any(cascade.wiring.feeds_back(Ends.of(model)) for model in cascade.models):
+        return list(cascade.models), [
+            trained is None or bool(set(Ends.of(model).outputs) & set(trained)) for model in cascade.models
+        ]
     changing: set[str] = set()
     run, flags = [], []
     for model in cascade.models:
@@ -363,12 +367,15 @@ def _tables(program: kernel.Program, trained: Sequence[bool], own: Sequence[slic
     own_first = np.full(len(trained), -1, dtype=np.int64)
     own_first[np.flatnonzero(trained)] = [place.start for place in own]
     extent = np.zeros(len(program.output_channel), dtype=np.int64)
-    # Members run in order and parameters stand in that order: a row ends with the last trained member so far.
+    # Members run in order and parameters stand in that order: a row ends with the last trained member so far, unless
+    # members read the past of later ones.
     ends = iter(own)
     reach = 0
     for m, yes in enumerate(trained):
         reach = next(ends).stop if yes else reach
         extent[program.output_first[m] : program.output_first[m + 1]] = reach
+    if program.column_late.any() and own:
+        extent[:] = own[-1].stop
     feeds = source[program.regressor_column] >= 0
     carry = int(program.regressor_lag[feeds].max(initial=0))
     return _Tables(own_first, extent, source, carry)

@@ -2,7 +2,8 @@ r"""A cascade of recursions in one compiled pass over the samples.
 
 Each member is :math:`y_t = \mathrm{clip}(w x_t + c + V\tanh(W x_t + b))` in its own scaled numbers, with one or several
 outputs (``sysid/kernels/recursion.py`` has the single one and its derivation). Members run in order within a sample:
-one that reads an upstream output with lag 0 reads the value of the same sample.
+one that reads an upstream output with lag 0 reads the value of the same sample. One may also read the past of what is
+computed after it: models that stand in a circle, as reservoirs that feed each other do.
 
 All members' columns stand side by side in one array ``z``: for each member its scaled inputs, then its scaled outputs,
 extended to the left by ``depth`` past samples. A regressor is a column of ``z`` and a lag, whatever it means; a
@@ -48,6 +49,8 @@ class Program(NamedTuple):
         column_channel: Column of ``values`` behind each column of ``z``.
         column_offset: In the channel's unit.
         column_scale: In the channel's unit.
+        column_late: Whether the channel is computed after the member that reads it, so that it is known one sample
+            later.
         output_first: Where each member's outputs begin among all; one more entry than members.
         output_column: Column of ``z`` of each output.
         output_channel: Column of ``values`` of each output.
@@ -66,6 +69,7 @@ class Program(NamedTuple):
     column_channel: NDArray[np.int64]
     column_offset: NDArray[np.float64]
     column_scale: NDArray[np.float64]
+    column_late: NDArray[np.bool_]
     output_first: NDArray[np.int64]
     output_column: NDArray[np.int64]
     output_channel: NDArray[np.int64]
@@ -74,13 +78,13 @@ class Program(NamedTuple):
     limit_channel: NDArray[np.int64]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def padded(n):
     """Neurons with their padding."""
     return (n + LANES - 1) // LANES * LANES
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _unpacked(p):
     """All members' hidden weights by column, biases and readouts, ``[member, row, neuron]``, padded with zeros."""
     members = len(p.neurons)
@@ -101,7 +105,7 @@ def _unpacked(p):
     return weights
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _neurons(weights, m, n_x, x, h):
     """Activations of one member; four columns at a time, or loading and storing the sums would take most of it."""
     n = len(h)
@@ -124,7 +128,7 @@ def _neurons(weights, m, n_x, x, h):
     tanh_in_place(h)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _bounded(y, low, high):
     """A scaled output within the network's bound, and whether that held it; NaN passes."""
     if y < low:
@@ -134,7 +138,7 @@ def _bounded(y, low, high):
     return y, FREE
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _limited(value, code, low, high, low_code, high_code):
     """A value within its limits, and what held it; the lower limit comes last, so that it wins where the two cross."""
     if value > high:
@@ -144,7 +148,7 @@ def _limited(value, code, low, high, low_code, high_code):
     return value, code
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def run(p, depth, rest, values, z, kept, held):
     """Run all members over all samples, writing the outputs into ``values``.
 
@@ -172,8 +176,10 @@ def run(p, depth, rest, values, z, kept, held):
             first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
             first_y, n_y = p.output_first[m], p.output_first[m + 1] - p.output_first[m]
             for column in range(p.column_first[m], p.column_first[m + 1] - n_y):
-                value = values[t, p.column_channel[column]]
-                z[now, column] = (value - p.column_offset[column]) / p.column_scale[column]
+                late = 1 if p.column_late[column] else 0
+                if late <= t:  # what came before sample 0 stands there already
+                    value = values[t - late, p.column_channel[column]]
+                    z[now - late, column] = (value - p.column_offset[column]) / p.column_scale[column]
             for i in range(n_x):
                 x[i] = z[now - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
             h = sums[:wide]

@@ -45,7 +45,7 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cascade:
-    """Models wired by the names of their channels: whatever one writes, the others read at the same sample.
+    """Models wired by the names of their channels: whatever one writes, the others read, at the same sample or later.
 
     Inputs of the whole are the channels that no member writes. Before the first sample the system is at rest: each
     output at its declared level, each input at its own first sample unless a level is declared. Nothing is taken from a
@@ -83,6 +83,7 @@ class Cascade:
     def __post_init__(self) -> None:
         wiring = Wiring.of(tuple(self.models))
         object.__setattr__(self, "models", tuple(self.models[i] for i in wiring.order))
+        _check_circles(self.models, wiring)
         object.__setattr__(self, "rest", dict(self.rest))
         object.__setattr__(self, "limits", dict(self.limits))
         _check_names("rest", self.rest, wiring.channels)
@@ -403,6 +404,18 @@ def simulate_family(
         for future in [pool.submit(work, i) for i in range(len(inputs))]:
             future.result()
     return first._wrapped(values, held)
+
+
+def _check_circles(models: Sequence[Member], wiring: Wiring) -> None:
+    """Members in a circle must run sample by sample, which a model with a state of its own does not."""
+    alone = [model for model in models if Part.of(model) is None]
+    if alone and any(wiring.feeds_back(Ends.of(model)) for model in models):
+        raise ConfigError(
+            "the models cannot be wired",
+            expected="models that read lagged samples (ARX, NARX) where some read each other in a circle",
+            got=", ".join(f"{model.mapping} {model.structure.label}" for model in alone),
+            remedy="fit it as ARX or NARX, or open the circle",
+        )
 
 
 def _check_names(where: str, names: Any, known: Sequence[str]) -> None:

@@ -116,6 +116,11 @@ def program_of(
     written = [name for end in ends for name in end.outputs]
     regressors = [part.lags.input_channel + first for part, first in zip(parts, columns, strict=False)]
     held = [_limit(limits.get(name, Limit()), column_of) for name in written]
+    done: set[str] = set()
+    late: list[bool] = []
+    for end in ends:
+        late += [name in written and name not in done for name in end.inputs] + [False] * len(end.outputs)
+        done |= set(end.outputs)
     return Program(
         theta=np.concatenate([part.theta for part in parts]),
         theta_first=_firsts([len(part.theta) for part in parts]),
@@ -127,6 +132,7 @@ def program_of(
         column_channel=np.array([column_of[name] for some in names for name in some], dtype=np.int64),
         column_offset=np.array([value for part in parts for value in part.offset]),
         column_scale=np.array([value for part in parts for value in part.scale]),
+        column_late=np.array(late),
         output_first=_firsts([len(end.outputs) for end in ends]),
         output_column=np.array(
             [first + len(end.inputs) + j for first, end in zip(columns, ends, strict=False) for j in _range(end)],

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel
+from sysid.models.recursion import Recursion
 from sysid.models.vector_narx import VectorNARXModel
 
 Member = AbstractModel | VectorNARXModel
@@ -24,6 +25,7 @@ class Ends:
         input_units: Unit of each input.
         output_units: Unit of each output.
         rest_outputs: Each output at rest, in its unit.
+        direct: The inputs that it reads at the sample of its output; of the others it reads past samples only.
     """
 
     inputs: tuple[str, ...]
@@ -31,6 +33,7 @@ class Ends:
     input_units: tuple[str, ...]
     output_units: tuple[str, ...]
     rest_outputs: tuple[float, ...]
+    direct: frozenset[str]
 
     @classmethod
     def of(cls, model: Member) -> Ends:
@@ -42,19 +45,28 @@ class Ends:
                 input_units=model.input_units,
                 output_units=model.output_units,
                 rest_outputs=model.rest_outputs,
+                direct=_direct(model.mapping.inputs, model.lags.inputs),
             )
+        form = model.recursion
         return cls(
             inputs=model.mapping.inputs,
             outputs=(model.mapping.output,),
             input_units=model.input_units,
             output_units=(model.output_unit,),
             rest_outputs=(model.rest_output,),
+            # What a state space reads now is not looked for: such a model takes no part in a circle.
+            direct=_direct(model.mapping.inputs, form.lags.inputs)
+            if isinstance(form, Recursion)
+            else frozenset(model.mapping.inputs),
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wiring:
     """Models wired by the names of their channels.
+
+    Models may read each other in a circle as long as the circle passes through the past somewhere: within a sample each
+    one must find what it reads at that sample computed.
 
     Args:
         inputs: Channels that no model writes: what goes into the whole, in the order in which they are first read.
@@ -91,8 +103,8 @@ class Wiring:
             The wiring.
 
         Raises:
-            ConfigError: If there is no model, a channel is computed twice, the models read each other in a circle,
-                or sample times or units differ.
+            ConfigError: If there is no model, a channel is computed twice, the models read each other in a circle
+                within one sample, or sample times or units differ.
         """
         ends = [Ends.of(model) for model in models]
         units, faults = _units(ends)
@@ -105,11 +117,11 @@ class Wiring:
         if faults:
             raise ConfigError(
                 "the models cannot be wired",
-                expected="models that do not read each other in a circle, each channel computed by one of them, "
-                "with one sample time, and one unit for each channel",
+                expected="models that do not read each other in a circle within one sample, each channel computed by "
+                "one of them, with one sample time, and one unit for each channel",
                 got="; ".join(dict.fromkeys(faults)),
-                remedy="give one model for each channel; channels that need each other within a sample are the outputs "
-                "of one model (VectorNARX)",
+                remedy="give one model for each channel; in a circle let one model read from lag 1 on (input_delays), "
+                "or fit the channels as the outputs of one model (VectorNARX)",
             )
         return cls(
             inputs=tuple(dict.fromkeys(n for i in order for n in ends[i].inputs if n not in computed)),
@@ -123,6 +135,22 @@ class Wiring:
         """Inputs, then outputs."""
         return (*self.inputs, *self.outputs)
 
+    def feeds_back(self, ends: Ends) -> bool:
+        """Whether a model reads what is computed after it, and so from the samples before.
+
+        Args:
+            ends: Its ends.
+
+        Returns:
+            True if it does.
+        """
+        before = self.outputs.index(ends.outputs[0])
+        return any(name in self.outputs[before:] and name not in ends.outputs for name in ends.inputs)
+
+
+def _direct(inputs: Sequence[str], lags: Sequence[Sequence[int]]) -> frozenset[str]:
+    return frozenset(name for name, some in zip(inputs, lags, strict=False) if 0 in some)
+
 
 def _units(ends: Sequence[Ends]) -> tuple[dict[str, str], list[str]]:
     units: dict[str, str] = {}
@@ -135,9 +163,9 @@ def _units(ends: Sequence[Ends]) -> tuple[dict[str, str], list[str]]:
 
 
 def _order(ends: Sequence[Ends], faults: list[str]) -> tuple[int, ...]:
-    """First the first model, in the order given, whose inputs are all known; then again, until none is left."""
+    """First the first model, in the order given, whose inputs of now are all known; then again, until none is left."""
     owner = {name: i for i, end in enumerate(ends) for name in end.outputs}
-    reads = [{owner[name] for name in end.inputs if name in owner} for end in ends]
+    reads = [{owner[name] for name in end.direct if name in owner} for end in ends]
     order: list[int] = []
     while len(order) < len(ends):
         ready = [i for i in range(len(ends)) if i not in order and reads[i] <= set(order)]

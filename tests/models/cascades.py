@@ -117,6 +117,13 @@ CASCADES = {
         models=(block("STP+F -> BP+AR", seed=3, output_delays=[[1, 2], [1, 3, 4]]), network("BP+AR -> BC", seed=4))
     ),
     "several outputs without a linear part": Cascade(models=(block("STP -> BP+BC", seed=3, feedthrough=False),)),
+    "a circle through the past": Cascade(
+        models=(
+            network("STP+AR+BC -> BP", seed=1, inputs=(1, 3)), network("BP -> AR", seed=2),
+            network("BP+AR -> BC", seed=3, spread=0.2),
+        ),
+        limits={"AR": Limit(high="BP"), "BC": Limit(low=0.0)},
+    ),
     "no neurons": Cascade(models=(network("STP -> BP", neurons=0, spread=0.15), linear("STP+BP -> BC"))),
 }  # fmt: skip
 

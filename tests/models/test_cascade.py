@@ -190,6 +190,18 @@ def lag(text: str) -> TransferFunctionModel:
     )
 
 
+def test_a_circle_through_the_past_runs_in_the_order_of_what_is_read_now():
+    cascade = CASCADES["a circle through the past"]
+    assert cascade.inputs == ("STP",)
+    assert cascade.outputs == ("BP", "AR", "BC")
+
+
+def test_a_model_with_a_state_of_its_own_beside_a_circle_is_refused():
+    circle = CASCADES["a circle through the past"].models
+    with pytest.raises(ConfigError, match="read lagged samples"):
+        Cascade(models=(*circle, lag("BP -> ER")))
+
+
 def test_a_model_with_a_state_of_its_own_is_wired_like_any_other():
     models = (network("BP+AR -> BC", seed=5), lag("BP -> AR"), network("STP -> BP", seed=1))
     u = command()
