@@ -133,13 +133,17 @@ def run(
     fresh: Annotated[bool, typer.Option("--fresh", help="Do everything again, whatever is stored.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/<pipeline> by default.")] = None,
     no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be done, and how long.")] = False,
 ) -> None:
     """Run a pipeline: load traces, fit, score, export, report. A run that was killed goes on where it was.
 
     Ctrl-C ends the fit that is running, keeps its best model so far and goes on; twice stops.
     """
-    from sysid.workbench.commands.run import run_command
+    from sysid.workbench.commands.run import plan_command, run_command
 
+    if dry_run:
+        plan_command(pipeline, fresh=fresh, out=out)
+        return
     raise typer.Exit(run_command(pipeline, fresh=fresh, out=out, tracking=not no_tracking))
 
 
@@ -169,8 +173,17 @@ def ingest(
     propose: Annotated[
         Path | None, typer.Option(help="Write the proposed dataset.yaml here, to be checked by you.")
     ] = None,
+    annotate: Annotated[
+        str | None, typer.Option(help="Name of an annotator that says in which state each sample is.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="With --annotate: folder for the annotated data set.")] = None,
 ) -> None:
     """Look into a file of traces and propose a data set for it, or load a data set and sum it up."""
+    if annotate is not None:
+        from sysid.workbench.commands.annotate import annotate_command
+
+        annotate_command(source, annotator=annotate, out=out)
+        return
     from sysid.workbench.commands.ingest import ingest_command
 
     ingest_command(source, propose=propose)
