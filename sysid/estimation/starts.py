@@ -23,6 +23,7 @@ from sysid.estimation.checkpoint import Checkpoint
 from sysid.estimation.initialise import AbstractLayout
 from sysid.estimation.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.provider import AbstractProvider
+from sysid.estimation.regularisation import Prior
 from sysid.estimation.result import Loop, Status
 from sysid.estimation.termination import Termination
 from sysid.estimation.training import FitProgress, Training
@@ -59,6 +60,7 @@ class Race:
         initial: Plain parameters of the first start; ``None`` for a random one.
         on_progress: Called after every iteration, from the threads that train.
         resume: Where the first start was put aside; ``None`` to begin it.
+        curriculum: Providers over shorter horizons, which a random start is trained on first, in this order.
     """
 
     training: Training
@@ -71,6 +73,7 @@ class Race:
     initial: NDArray[np.float64] | None
     on_progress: Callable[[FitProgress], None]
     resume: Checkpoint | None = None
+    curriculum: Sequence[AbstractProvider] = ()
     stop: threading.Event = field(default_factory=threading.Event)
     iterations: dict[int, int] = field(default_factory=dict)
     """Iterations done by each start, for the progress bar."""
@@ -225,6 +228,24 @@ def _rungs(training: Training) -> tuple[float, ...]:
     return RUNGS if training.starts > 1 else RUNGS[-1:]
 
 
+def planned_iterations(training: Training) -> float:
+    """Iterations of the whole race, all starts together, if none of them converges early.
+
+    Args:
+        training: How to train.
+
+    Returns:
+        Their number.
+
+    Example:
+        >>> planned_iterations(Training(max_iterations=100))
+        100.0
+        >>> round(planned_iterations(Training(max_iterations=100, starts=8)))
+        176
+    """
+    return training.max_iterations * _work(training.starts, _rungs(training))
+
+
 def _work(starts: int, rungs: Sequence[float]) -> float:
     """Iterations of the whole race, in units of one start's."""
     work, before, n = 0.0, 0.0, starts
@@ -243,19 +264,28 @@ def _advance(race: Race, number: int, before: Candidate | None, share: float, se
         solution = engine.resume(race.provider, race.resume.state(race.provider, prior))
     elif before is None:
         seed, theta, centre = _begin(race, number)
-        # The noise is taken to be as large as the start's error: a prior weighed against residuals of size 1 would hold
-        # an open-loop fit, whose residuals are a thousand times smaller, at its start.
-        beta = 0.5 * race.provider.n_samples / max(race.provider.loss(theta), np.finfo(np.float64).tiny)
-        # A precision given from outside is relative to that of the residuals, and stays.
-        alpha = INITIAL_ALPHA if training.regularisation is None else training.regularisation * beta
-        prior = race.layout.prior(centre, alpha=alpha, beta=beta)
-        solution = engine.minimise(race.provider, theta, prior)
+        for provider in race.curriculum:
+            first = replace(engine, termination=Termination(max_iterations=training.curriculum_iterations))
+            first = replace(first, on_iteration=lambda _: None)
+            theta = first.minimise(provider, theta, _first_prior(race, provider, theta, centre)).theta
+        solution = engine.minimise(race.provider, theta, _first_prior(race, race.provider, theta, centre))
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
         seed, solution = before.seed, engine.resume(race.provider, before.solution.state)
     else:
         return before
     model = race.model(solution.theta)
     return Candidate(number=number, seed=seed, solution=solution, model=model, score=_score(race, model))
+
+
+def _first_prior(
+    race: Race, provider: AbstractProvider, theta: NDArray[np.float64], centre: NDArray[np.float64]
+) -> Prior:
+    # The noise is taken to be as large as the start's error: a prior weighed against residuals of size 1 would hold
+    # an open-loop fit, whose residuals are a thousand times smaller, at its start.
+    beta = 0.5 * provider.n_samples / max(provider.loss(theta), np.finfo(np.float64).tiny)
+    # A precision given from outside is relative to that of the residuals, and stays.
+    given = race.training.regularisation
+    return race.layout.prior(centre, alpha=INITIAL_ALPHA if given is None else given * beta, beta=beta)
 
 
 def _begin(race: Race, number: int) -> tuple[int | None, NDArray[np.float64], NDArray[np.float64]]:

@@ -226,11 +226,12 @@ class _Run:
         stored = self._done("export", key)
         if not stored:
             provenance = {"pipeline": config.name, "fit": best.ready.config.name, "command": self.command}
+            began = time.perf_counter()
             bundle = steps.export(best.ready.fit, best.scores, data, config, folder=folder, provenance=provenance)
             exports = [export_record(entry, folder.name, best.ready.fit.model.output_unit) for entry in bundle.files]
             if best.final:
                 files = [file for file in sorted(folder.rglob("*")) if file.is_file()]
-                self.store.mark_done("export", key, files, exports=exports)
+                self.store.mark_done("export", key, files, exports=exports, seconds=time.perf_counter() - began)
         else:
             exports = self.store.facts("export")["exports"]
         worst = max((float(entry["largest_difference"]) for entry in exports), default=0.0)
@@ -243,12 +244,13 @@ class _Run:
         from sysid.reporting import report
 
         step, page = "Writing the report", self.store.path / "report" / "index.html"
-        key = digest({"results": results.model_dump(mode="json"), "code": code_digest("reporting")})
+        key = report_key(results)
         self._tell(events.StepStarted(step=step))
         stored = self._done("report", key)
         if not stored:
+            began = time.perf_counter()
             page = report.write_report(self.store.path)
-            self.store.mark_done("report", key, [page])
+            self.store.mark_done("report", key, [page], seconds=time.perf_counter() - began)
         self._tell(events.StepDone(step=step, stored=stored, detail=str(page)))
         self._tell(events.ReportReady(page=page, results=self.store.results, of=best.ready))
 
@@ -283,6 +285,19 @@ class _Run:
         except ConfigError:
             # None yet, or damaged: either way they are written anew.
             return None
+
+
+def report_key(results: Results) -> str:
+    """Digest of everything that a report depends on.
+
+    Args:
+        results: The contents of ``results.json``.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    # As text: an infinity that was never written differs, as a number, from the nothing that is read back.
+    return digest({"results": results.model_dump_json(), "code": code_digest("reporting")})
 
 
 def _undated(results: Results) -> str:

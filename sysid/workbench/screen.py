@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
@@ -12,6 +14,9 @@ from rich.table import Table
 
 from sysid.reporting.results import FitRecord, Results
 from sysid.workbench.events import Event, RunStarted, StepDone, StepProgress, StepStarted, Warned
+
+if TYPE_CHECKING:
+    from sysid.workbench.dry_run import PlannedStep
 
 
 class Screen:
@@ -108,6 +113,47 @@ class LogFile:
         if self._path is not None:
             with self._path.open("a", encoding="utf-8") as log:
                 log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')}  {text}\n")
+
+
+def duration(seconds: float) -> str:
+    """A time as one says it.
+
+    Args:
+        seconds: The time.
+
+    Returns:
+        For example ``"2 min 05 s"``.
+
+    Example:
+        >>> duration(125.0), duration(0.2), duration(3.4), duration(4000.0)
+        ('2 min 05 s', 'under 1 s', '3 s', '1 h 07 min')
+    """
+    if seconds < 1.0:
+        return "under 1 s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {round(whole % 3600 / 60):02d} min"
+
+
+def table_of_steps(planned: Sequence[PlannedStep]) -> Table:
+    """The steps that a run would take.
+
+    Args:
+        planned: From :func:`sysid.workbench.dry_run.plan`.
+
+    Returns:
+        The table.
+    """
+    table = Table(header_style="bold")
+    table.add_column("step")
+    table.add_column("time", justify="right")
+    table.add_column("how that is known")
+    for one in planned:
+        table.add_row(escape(one.step), "-" if one.stored else duration(one.seconds), escape(one.basis))
+    return table
 
 
 def table_of_fits(results: Results) -> Table:

@@ -7,11 +7,12 @@ from pathlib import Path
 
 from rich.console import Console
 
+from sysid.errors import ConfigError
 from sysid.workbench.config import find_pipeline, read_pipeline
 from sysid.workbench.events import Warned, Watcher
-from sysid.workbench.kinds import RunRequest, kind_of, kinds
+from sysid.workbench.kinds import DEFAULT, RunRequest, kind_of, kinds
 from sysid.workbench.pipeline import run_pipeline
-from sysid.workbench.screen import LogFile, Screen, table_of_fits
+from sysid.workbench.screen import LogFile, Screen, duration, table_of_fits, table_of_steps
 from sysid.workbench.tracking import Tracker
 
 PIPED_WIDTH = 160
@@ -46,6 +47,36 @@ def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool)
     path = find_pipeline(pipeline)
     request = RunRequest(path=path, typed=pipeline, fresh=fresh, out=out, tracking=tracking)
     return kinds()[kind_of(path)].load_runner()(request)
+
+
+def plan_command(pipeline: str, *, fresh: bool, out: Path | None) -> None:
+    """Say what a run would do and how long it would take, without doing it.
+
+    Args:
+        pipeline: Its name or file.
+        fresh: Whether everything would be done again.
+        out: The run folder.
+
+    Raises:
+        UserError: If the pipeline, its data or its options cannot be used.
+    """
+    from sysid.workbench.dry_run import plan
+
+    path = find_pipeline(pipeline)
+    kind = kind_of(path)
+    if kind != DEFAULT:
+        raise ConfigError(
+            f"there is no dry run for pipelines of kind {kind}",
+            where=path,
+            expected=f"a pipeline of kind {DEFAULT}",
+            got=kind,
+            remedy="run it: what is done is stored, and Ctrl-C at any time loses nothing that is finished",
+        )
+    read = read_pipeline(path)
+    planned = plan(read, out or Path("runs") / read.config.name, fresh=fresh)
+    target = console()
+    target.print(table_of_steps(planned))
+    target.print(f"Together at most {duration(sum(one.seconds for one in planned))}. Nothing was run.")
 
 
 def run_fits(request: RunRequest) -> int:
