@@ -87,6 +87,7 @@ def fit_narx(
         initial=_initial_parameters(initial, template, layout, to_plain, training.seed),
         on_progress=on_progress,
         resume=resume,
+        curriculum=[RebasedProvider(inner=replace(inner, horizon=k), to_plain=to_plain) for k in training.curriculum],
     )
     candidates = starts.run(race)
     choice = starts.choose(candidates, training.choose_by, vet)

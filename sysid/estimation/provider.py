@@ -124,8 +124,8 @@ class AbstractProvider(ABC):
 class _Record:
     """An experiment in scaled numbers.
 
-    ``measured`` is the output with its history. Where a kernel writes outputs it writes into a copy, because starts that
-    train side by side share the provider.
+    ``measured`` is the output with its history. Kernels write outputs into a copy: starts that train side by side
+    share the provider.
     """
 
     u: NDArray[np.float64]

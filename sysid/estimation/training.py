@@ -33,6 +33,9 @@ class Training:
             sensor may be off.
         regularisation: ``None`` lets the evidence weigh the weights' sizes against the residuals, group by group. A
             number is that weight, the same for all and never changed: 0 is plain Levenberg-Marquardt (``trainlm``).
+        curriculum: Horizons in samples over which a closed-loop start is trained before the whole record, such as
+            ``[1, 20, 200]``: after each horizon the free run begins anew from measured output.
+        curriculum_iterations: Iterations of each horizon; they come before those of ``max_iterations``.
     """
 
     loop: Loop = Loop.CLOSED
@@ -47,6 +50,8 @@ class Training:
     basis: str = "levels and rates"
     offsets: tuple[Mapping[str, float], ...] = ()
     regularisation: float | None = None
+    curriculum: tuple[int, ...] = ()
+    curriculum_iterations: int = 20
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loop", Loop(self.loop))
@@ -60,7 +65,16 @@ class Training:
                     got=repr(getattr(self, name)),
                     remedy=f"write for example {name}: {choices[0]}",
                 )
-        for name in ("max_iterations", "patience", "starts", "workers"):
+        object.__setattr__(self, "curriculum", tuple(self.curriculum))
+        if self.curriculum and (self.loop is Loop.OPEN or min(self.curriculum) < 1):
+            raise ConfigError(
+                "not a curriculum",
+                where="curriculum",
+                expected="horizons of 1 sample or more, for a closed loop",
+                got=f"{list(self.curriculum)} for the {self.loop.value} loop",
+                remedy="write for example curriculum: [1, 20, 200] beside loop: closed",
+            )
+        for name in ("max_iterations", "patience", "starts", "workers", "curriculum_iterations"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
         if self.regularisation is not None and not 0.0 <= self.regularisation < float("inf"):

@@ -15,11 +15,13 @@ the parameters :math:`\theta` gives, with :math:`s_{t,k} = v_k (1 - h_{t,k}^2)`,
     \qquad c_{t,l} = w_l + \sum_k s_{t,k} W_{k,l}
 
 a linear recursion over the rows of the Jacobian (real-time recurrent learning, Williams and Zipser 1989):
-exact, forward, one pass. In between stands the free run over windows of ``horizon`` samples, each of which begins from
-measured output: lagged outputs from before the window are measured, and do not depend on the parameters. A horizon of 1
-is the prediction one step ahead, one as long as the record the free run. With a single output it costs ``n_parameters * (1 + n_output_lags)`` multiply-adds
-a sample, which is why it beats backpropagation through time for networks of this size: it yields the whole
-Jacobian that Gauss-Newton methods need. A clipped sample has a zero row.
+exact, forward, one pass. With a single output it costs ``n_parameters * (1 + n_output_lags)`` multiply-adds a sample,
+which is why it beats backpropagation through time for networks of this size: it yields the whole Jacobian that
+Gauss-Newton methods need. A clipped sample has a zero row.
+
+Between the free run and the prediction one step ahead stands the run over windows of ``horizon`` samples, each of which
+begins from measured output: lagged outputs from before the window are measured, and do not depend on the parameters. A
+horizon of 1 is one step ahead, one as long as the record the free run.
 
 Parameters are one flat vector ``[W (n_neurons, n_regressors) | b | v | c | w]``. The linear part ``w`` stands
 last so that a network without it is a shorter vector; no neurons at all leaves ``[c | w]``, an ARX model with
