@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sysid.reporting import figures
+from sysid.reporting.amplitude import amplitude_section
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.judgement import judgement_sections, read_judgements
 from sysid.reporting.moments import Moment, worst_moments
@@ -26,7 +27,6 @@ from sysid.reporting.tables import (
     Table,
     accuracy_table,
     case_columns,
-    coverage_table,
     data_table,
     export_table,
     figure_cell,
@@ -35,6 +35,7 @@ from sysid.reporting.tables import (
     run_time_table,
     scored_cases,
 )
+from sysid.reporting.training_view import training_parts, trust_sections
 from sysid.reporting.verdict import Verdict, verdict
 
 if TYPE_CHECKING:
@@ -77,13 +78,14 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         judged = scored_cases(best) or best.cases
         moments = worst_moments({name: signals[best.slug][name] for name in judged}, 5)
     sections = [_accuracy(results, published)]
-    intervals = coverage_table(results)
-    if intervals is not None:
-        sections.append(Section(anchor="intervals", title="How sure the networks are", parts=(intervals,)))
     columns = _columns(results)
     if best is not None:
         sections.append(_best(best, signals[best.slug], moments, columns))
-    sections += evidence_sections(folder, results)
+        by_level = amplitude_section(
+            best, {name: signals[best.slug][name] for name in scored_cases(best) or best.cases}
+        )
+        sections += [] if by_level is None else [by_level]
+    sections += [*trust_sections(results), *evidence_sections(folder, results)]
     states = state_section(results)
     sections += ([] if states is None else [states]) + judgement_sections(read_judgements(folder))
     sections += sweep_sections(folder, published)
@@ -228,6 +230,10 @@ def _tried(results: Results) -> Section:
         parts.append(
             picture(figures.learning_figure(curves, unit=unit), "Learning curves", caption, f"learning-{index}")
         )
+    parts += training_parts(results)
+    if len([fit for fit in results.fits if fit.n_parameters is not None]) > 2:
+        caption = "Size against accuracy on the traces that choose; lower left is better. Ringed: the chosen fit."
+        parts.append(picture(figures.size_figure(results), "Size against accuracy", caption, "size"))
     notes = [(fit.name, " ".join(fit.notes)) for fit in results.fits if fit.notes]
     if notes:
         rows = tuple((Cell(text=name, header=True), Cell(text=text)) for name, text in notes)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.reporting.moments import Moment
 from sysid.reporting.numbers import number
-from sysid.reporting.results import LearningCurve
+from sysid.reporting.results import CaseRecord, LearningCurve, Results
 from sysid.reporting.signals import CaseSignals
 from sysid.reporting.style import DASHES, PALETTE, PUBLISHED, TARGET, new_figure, series_style, styled
 from sysid.reporting.thinning import distinct_points, thin
@@ -272,3 +272,38 @@ def run_time_figure(seconds: Dict[str, float], *, quantity: str) -> Figure:
         axes.grid(visible=False, axis="y")
         axes.set_xlabel(quantity)
         return figure
+
+
+def size_figure(results: Results) -> Figure:
+    """Every fit by its parameters and its free-run error on the traces that choose, or that score where none choose.
+
+    Args:
+        results: The results.
+
+    Returns:
+        The figure, with a logarithmic axis for the error.
+    """
+    with styled():
+        figure = new_figure(7.6, 3.4)
+        axes = figure.subplots()
+        chosen = None if results.best is None else results.best.name
+        for index, fit in enumerate(results.fits):
+            error = fit.selection_mse if np.isfinite(fit.selection_mse) else _mean_mse(fit.cases)
+            if fit.n_parameters is None or not (np.isfinite(error) and error > 0.0):
+                continue
+            style = {**series_style(index), "linestyle": "none"}
+            axes.plot([fit.n_parameters], [error], **style, markersize=6, label=f"{fit.name}, {fit.label}")
+            if fit.name == chosen:
+                axes.plot([fit.n_parameters], [error], "o", fillstyle="none", color=TARGET, markersize=13)
+            effective = 0.0 if fit.evidence is None else sum(fit.evidence.effective_parameters.values())
+            if 0.0 < effective < fit.n_parameters:
+                axes.plot([effective, fit.n_parameters], [error, error], color=style["color"], linewidth=1.0)
+        axes.set_yscale("log")
+        axes.set_xlabel("parameters (the line reaches to the effective ones)")
+        axes.set_ylabel(f"free-run mse [{results.fits[0].unit}²]")
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return figure
+
+
+def _mean_mse(cases: Dict[str, CaseRecord]) -> float:
+    return float(np.mean([case.free_run.mse for case in cases.values()]))
