@@ -109,7 +109,7 @@ def amplitude_section(fit: FitRecord, signals: Dict[str, CaseSignals]) -> Sectio
     )
     title = f"{fit.name}: error by level of {output}"
     drawing = picture(
-        amplitude_figure(found, label=output, unit=unit), title, "Bars: rms; marks: largest.", "amplitude"
+        amplitude_figure(found, label=output, unit=unit), title, "Errors of the free run by level of the target, logarithmic.", "amplitude"
     )
     parts: tuple[Part, ...] = (table, drawing)
     return Section(anchor="amplitude", title="Error by amplitude", parts=parts)
@@ -134,9 +134,11 @@ def amplitude_figure(found: list[Band], *, label: str, unit: str) -> Figure:
         figure = new_figure(7.6, 2.9)
         axes = figure.subplots()
         middle = np.array([0.5 * (band.low + band.high) for band in found])
-        width = 0.8 * (found[0].high - found[0].low)
-        axes.bar(middle, np.nan_to_num([band.rms for band in found]), width=width, color=PALETTE[0], label="rms error")
-        axes.plot(middle, [band.largest for band in found], "D", color=PALETTE[1], markersize=5, label="largest error")
+        for values, mark, color, name in (
+            ([band.largest for band in found], "D", PALETTE[1], "largest error"),
+            ([band.rms for band in found], "s", PALETTE[0], "rms error"),
+        ):
+            axes.plot(middle, values, mark, color=color, markersize=6, label=name)
         if any(band.largest > 0.0 for band in found):
             axes.set_yscale("log")
         axes.set_xlabel(f"target {label} [{unit}]")

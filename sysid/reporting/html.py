@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 
 import sysid
@@ -22,6 +22,27 @@ def render_html(document: Document) -> str:
     Returns:
         HTML 5 in one piece.
     """
+    start = document.results.start
+    return page_template("report.html.j2").render(
+        document=document,
+        results=document.results,
+        verdict=document.verdict,
+        environment=facts(document.results.environment),
+        start={} if start is None else start,
+        created=readable(document.results.created),
+        version=sysid.__version__,
+    )
+
+
+def page_template(name: str) -> Template:
+    """A template with the filters and tests that our pages use.
+
+    Args:
+        name: Its file.
+
+    Returns:
+        The template.
+    """
     environment = Environment(
         loader=PackageLoader("sysid.reporting"),
         autoescape=select_autoescape(["j2"], default=True),
@@ -34,20 +55,22 @@ def render_html(document: Document) -> str:
     environment.tests["table"] = lambda part: isinstance(part, Table)
     # Our own drawings; every text inside them was escaped where they were made.
     environment.filters["drawing"] = lambda part: Markup(part.svg)  # noqa: S704
-    start = document.results.start
-    return environment.get_template("report.html.j2").render(
-        document=document,
-        results=document.results,
-        verdict=document.verdict,
-        environment=facts(document.results.environment),
-        start={} if start is None else start,
-        created=_readable(document.results.created),
-        version=sysid.__version__,
-    )
+    return environment.get_template(name)
 
 
-def _readable(created: str) -> str:
-    """A time stamp as people write it; as it stands where it is not ISO 8601."""
+def readable(created: str) -> str:
+    """A time stamp as people write it; as it stands where it is not ISO 8601.
+
+    Args:
+        created: ISO 8601.
+
+    Returns:
+        Text.
+
+    Example:
+        >>> readable("2026-11-21T02:59:04+0000")
+        '21 November 2026, 02:59 UTC'
+    """
     try:
         moment = datetime.fromisoformat(created)
     except ValueError:
