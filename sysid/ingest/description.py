@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -30,7 +30,7 @@ class ChannelDescription(Options):
     """
 
     name: Annotated[str, Field(min_length=1)]
-    unit: Annotated[str, BeforeValidator(_unit_text)]
+    unit: Annotated[str, BeforeValidator(_unit_text, json_schema_input_type=str | Literal[1])]
     reference: Reference | None = None
     description: str = ""
     decimals: Annotated[int, Field(ge=-12, le=15)] | None = None

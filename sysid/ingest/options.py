@@ -103,8 +103,10 @@ class FileOptions(Options):
     """
 
     reader: str | None = None
-    time: Annotated[TimeOptions, BeforeValidator(_time_short)] = TimeOptions()
-    columns: dict[str, Annotated[ColumnOptions, BeforeValidator(_column_short)]] = {}
+    time: Annotated[TimeOptions, BeforeValidator(_time_short, json_schema_input_type=str | TimeOptions)] = TimeOptions()
+    columns: dict[
+        str, Annotated[ColumnOptions, BeforeValidator(_column_short, json_schema_input_type=str | ColumnOptions)]
+    ] = {}
     units: str | dict[str, str] = {}
     references: Reference | dict[str, Reference] = {}
     separator: Literal[",", ";", "\t"] | None = None

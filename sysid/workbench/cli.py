@@ -252,6 +252,16 @@ def ui(
     raise typer.Exit(ui_command(port, browser=not no_browser))
 
 
+@app.command(epilog="Example: sysid schema .")
+def schema(
+    folder: Annotated[Path, typer.Argument(help="A workspace.")] = Path(),
+) -> None:
+    """Write the JSON schemas of pipelines and data sets into a workspace: editors complete and check by them."""
+    from sysid.workbench.commands.schema import schema_command
+
+    schema_command(folder)
+
+
 @app.command(epilog="Example: sysid init mine")
 def init(
     folder: Annotated[Path, typer.Argument(help="Folder to make.")],

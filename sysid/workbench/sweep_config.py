@@ -145,9 +145,12 @@ class SweepConfig(BaseModel):
     start: StartField = Start()
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
-    structure: Annotated[tuple[dict[str, Any], ...], BeforeValidator(_as_list)] = Field(min_length=1)
+    structure: Annotated[
+        tuple[dict[str, Any], ...],
+        BeforeValidator(_as_list, json_schema_input_type=dict[str, Any] | tuple[dict[str, Any], ...]),
+    ] = Field(min_length=1)
     training: dict[str, Any] = Field(default_factory=dict)
-    method: Annotated[MethodConfig, BeforeValidator(_named)] = MethodConfig()
+    method: Annotated[MethodConfig, BeforeValidator(_named, json_schema_input_type=str | MethodConfig)] = MethodConfig()
     objectives: tuple[str, ...] = Field(default=("free_run_mse", "run_time"), min_length=1)
     choose: ChooseConfig = ChooseConfig()
     pruning: tuple[RungConfig, ...] = ()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -30,7 +29,7 @@ def make_workspace(folder: Path) -> list[Path]:
         ConfigError: If a file of the workspace is there already.
     """
     from sysid.ingest import write_csv
-    from sysid.workbench.config import json_schema
+    from sysid.workbench.schemas import write_schemas
 
     templates = sorted(file for file in TEMPLATE.rglob("*") if file.is_file())
     targets = [folder / file.relative_to(TEMPLATE) for file in templates]
@@ -47,12 +46,13 @@ def make_workspace(folder: Path) -> list[Path]:
         for source, target in zip(templates, targets, strict=True):
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
-        schema = folder / "pipelines" / "pipeline.schema.json"
-        schema.write_text(json.dumps(json_schema(), indent=1) + "\n", encoding="utf-8")
+        schemas = write_schemas(folder)
     except OSError as error:
-        raise ConfigError("the workspace cannot be written", where=folder, got=error, remedy="name another") from error
+        raise ConfigError(
+            "the workspace cannot be written", where=folder, got=error, remedy="name another folder"
+        ) from error
     records = [write_csv(tank(name), folder / "datasets" / "tank" / f"{name.lower()}.csv") for name in CASES]
-    return [*targets, schema, *records]
+    return [*targets, *schemas, *records]
 
 
 def tank(case: str, n_samples: int = 1500) -> Trace:

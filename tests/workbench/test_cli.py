@@ -18,7 +18,7 @@ from sysid.workbench import cli
 from sysid.workbench.cli import run_cli
 
 SYSID = [str(Path(sys.executable).with_name("sysid"))]
-COMMANDS = ("run", "ingest", "simulate", "export", "promote", "report", "ui", "init")
+COMMANDS = ("run", "ingest", "simulate", "export", "promote", "report", "ui", "init", "schema")
 
 
 def test_help_is_quick() -> None:
@@ -160,9 +160,14 @@ def test_a_workspace_of_ones_own_from_first_to_last(tmp_path: Path) -> None:
 def test_a_file_is_shown_and_a_data_set_proposed(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run_cli(["ingest", "datasets/rig/run-1.csv"]) == 0
     told = capsys.readouterr().out
-    assert "one sample every 0.05 s" in told
+    assert "one every 0.05 s" in told
     assert "outlet" in told
     assert "sample_time: 0.05" in told
+    assert "400 samples, one every 0.05 s, 19.95 s in all" in told
+    assert "picture: run-1.ingest.svg" in told
+    picture = (workspace / "run-1.ingest.svg").read_text(encoding="utf-8")
+    for label in ("inlet [kPa]", "valve [V]", "outlet [kPa]", "time in s"):
+        assert label in picture
     proposal = workspace / "datasets" / "rig" / "proposed.yaml"
     assert run_cli(["ingest", "datasets/rig/run-1.csv", "--propose", str(proposal)]) == 0
     assert run_cli(["ingest", str(proposal)]) == 0

@@ -61,7 +61,7 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
 
 READER = Reader(
     name="csv",
-    suffixes=(".csv", ".tsv", ".txt"),
+    suffixes=(".csv", ".tsv", ".txt", ".dat", ".asc"),
     read=_read,
     options=frozenset(
         {"separator", "decimal", "thousands", "comment", "encoding", "skip_lines", "header", "units_line"}

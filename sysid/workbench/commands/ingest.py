@@ -10,9 +10,15 @@ from rich.table import Table
 
 from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
+from sysid.ingest.assemble import stamps_in_seconds
+from sysid.ingest.reading import read_table
+from sysid.reporting.record_figure import record_figure
+from sysid.reporting.style import styled
+from sysid.reporting.svg import svg
 from sysid.traces import TraceSet
 from sysid.units import Reference
 from sysid.workbench.commands.run import console
+from sysid.workbench.schemas import schema_line
 from sysid.workbench.store import write_bytes
 
 
@@ -67,9 +73,18 @@ def _no_such(path: Path) -> ConfigError:
 
 
 def _show_file(found: FileFinding, propose: Path | None) -> None:
+    proposal = propose_dataset(found)
+    if propose is not None and propose.exists():
+        raise ConfigError(
+            "the file for the proposal is there already",
+            where=propose,
+            expected="a new file",
+            remedy="name another one; nothing was changed",
+        )
     target = console()
-    step = f"one sample every {found.sample_time:g} s" if found.time else "no time column"
-    target.print(f"{found.path}: read as {found.reader}, {step}", soft_wrap=True)
+    every = f"one every {found.sample_time:g} s, {(found.samples - 1) * found.sample_time:g} s in all"
+    step = every if found.time.step is None else f"no time stamps: {found.time.step:g} s between them is a guess"
+    target.print(f"{found.path}: read as {found.reader}, {found.samples} samples, {step}", soft_wrap=True)
     table = Table(header_style="bold")
     for heading in ("column", "unit", "from", "to", "missing", "remark"):
         table.add_column(heading, justify="right" if heading in {"from", "to", "missing"} else "left")
@@ -83,19 +98,37 @@ def _show_file(found: FileFinding, propose: Path | None) -> None:
     target.print(table)
     for problem in found.problems:
         target.print(f"look at: {escape(problem)}", soft_wrap=True)
+    if propose is not None:
+        write_bytes(propose, (schema_line(propose) + proposal).encode())
+    target.print(f"picture: {_picture(found)}", soft_wrap=True)
     if propose is None:
-        target.print("\nProposed dataset.yaml (a ? above and the comments below mark what was guessed):\n")
-        target.print(propose_dataset(found), markup=False, soft_wrap=True)
+        target.print("\nProposed dataset.yaml (each ? above and the comments below mark what was guessed):\n")
+        target.print(proposal, markup=False, soft_wrap=True)
         return
-    if propose.exists():
-        raise ConfigError(
-            "the file for the proposal is there already",
-            where=propose,
-            expected="a new file",
-            remedy="name another one; nothing was changed",
-        )
-    write_bytes(propose, propose_dataset(found).encode())
     target.print(f"Proposed data set: {propose}; check it, then load it with: sysid ingest {propose}", soft_wrap=True)
+
+
+def _picture(found: FileFinding) -> str:
+    """Draw the channels into the current folder, and say where, or why not."""
+    if not found.channels:
+        return "none, as there is no column to draw"
+    files = found.files.model_copy(update={"time": found.time})
+    table = read_table(found.path, files=files, repairs=found.needed)
+    labels = {column.name: f"{column.name} [{column.unit}]" for column in found.channels}
+    with styled():
+        figure = record_figure(
+            stamps_in_seconds(table, files),
+            {label: table.find(name).values for name, label in labels.items()},
+            title=found.path.name,
+        )
+        drawing = svg(figure, title=f"{found.path.name} as it stands", description=", ".join(labels.values()), name="r")
+    target = Path(f"{found.path.stem}.ingest.svg")
+    try:
+        write_bytes(target, drawing.encode())
+    except OSError as error:
+        # A folder that is not ours to write in shall still be looked into.
+        return f"none, as {target} cannot be written ({error.strerror})"
+    return str(target)
 
 
 def _show_dataset(traces: TraceSet, path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from sysid.workbench.fields import STRICT
 from sysid.yaml_files import FieldError
@@ -42,6 +42,11 @@ class PartConfig(BaseModel):
         return self
 
 
+def _either_form(schema: dict[str, Any]) -> None:
+    """A single part may be written without the word parts, and an editor shall not mark it."""
+    schema.update(required=["name"], additionalProperties=True)
+
+
 class SubjectConfig(BaseModel):
     """What is judged: one model, or several that are used together.
 
@@ -50,7 +55,7 @@ class SubjectConfig(BaseModel):
         parts: The models; a single one can be written without the word parts.
     """
 
-    model_config = STRICT
+    model_config = ConfigDict(**STRICT, json_schema_extra=_either_form)
 
     name: str = Field(min_length=1)
     parts: tuple[PartConfig, ...] = Field(min_length=1)
