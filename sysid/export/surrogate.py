@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import ConfigError
 from sysid.export.layout import DelayLine, LinearState, StateLayout, layout_of, recursion_of
-from sysid.models import AbstractForm, AbstractModel, History, Recursion, Wiring
+from sysid.models import AbstractForm, AbstractModel, Ends, History, Recursion, Wiring
 
 Range = tuple[float, float]
 """Least and greatest value, in the channel's unit."""
@@ -145,6 +146,7 @@ class Surrogate:
         """
         wiring = Wiring.of(models)
         models = [models[i] for i in wiring.order]
+        _check_no_circle(models, wiring)
         units, inputs = wiring.units, wiring.inputs
         columns = {name: i for i, name in enumerate(wiring.channels)}
         stages, first = [], 0
@@ -265,6 +267,18 @@ class Surrogate:
             "lines": [line.to_dict() for line in self.lines],
         }
         return text | ({"state_spaces": [{"first": at, **state.to_dict()} for at, state in spaces]} if spaces else {})
+
+
+def _check_no_circle(models: Sequence[AbstractModel], wiring: Wiring) -> None:
+    """Stages run one after the other; what a later one put out a sample ago is not among their inputs."""
+    back = [str(model.mapping) for model in models if wiring.feeds_back(Ends.of(model))]
+    if back:
+        raise ConfigError(
+            "models that read each other in a circle cannot be exported as stages",
+            expected="models of which each reads inputs and outputs of models before it",
+            got=f"{', '.join(back)} read what is computed after them",
+            remedy="export models without a circle",
+        )
 
 
 def _identifiers(names: Sequence[str] | Dict[str, int]) -> dict[str, str]:

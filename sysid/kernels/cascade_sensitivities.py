@@ -27,19 +27,19 @@ from sysid.kernels.cascade import FREE, HIGH_CHANNEL, LOW_CHANNEL
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _add(row, factor, past, n):
     for i in range(n):
         row[i] += factor * past[i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _add_four(row, f0, f1, f2, f3, p0, p1, p2, p3, n):
     for i in range(n):
         row[i] += f0 * p0[i] + f1 * p1[i] + f2 * p2[i] + f3 * p3[i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _own(row, at, theta, first, j, n, n_x, n_y, linear, x, h):
     """The part of a row that does not go through earlier samples; ``at`` is where the member's parameters stand."""
     readout = first + n * (n_x + 1) + j * n
@@ -56,7 +56,7 @@ def _own(row, at, theta, first, j, n, n_x, n_y, linear, x, h):
             row[constants + n_y + j * n_x + i] = x[i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _factors(c, theta, first, j, n, n_x, n_y, linear, h):
     """Derivative of an output with respect to each regressor."""
     readout = first + n * (n_x + 1) + j * n
@@ -69,7 +69,7 @@ def _factors(c, theta, first, j, n, n_x, n_y, linear, h):
             c[i] += slope * theta[first + k * n_x + i]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, source, carry, J):
     """Rows ``first`` to ``first + n_rows`` of the Jacobians of all outputs, in their scaled numbers.
 

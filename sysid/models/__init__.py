@@ -2,7 +2,8 @@
 
 from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
-from sysid.models.cascade import Cascade, simulate_family
+from sysid.models.cascade import Cascade
+from sysid.models.cascade_batch import simulate_family
 from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.form import AbstractForm

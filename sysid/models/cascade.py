@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
@@ -235,8 +234,10 @@ class Cascade:
             TraceError: If the number of inputs is not the cascade's.
             ChannelError: If a level names a channel that it cannot.
         """
-        inputs = self._checked(inputs, 2)
-        return self._wrapped(*self._run(inputs, rest))
+        inputs = self.checked(inputs, 2)
+        values, held = self.empty(len(inputs))
+        self.run(inputs, rest, values, held)
+        return self.wrapped(values, held)
 
     def simulate_trace(self, trace: Trace, *, rest: Dict[str, Level] | None = None) -> CascadeRun:
         """Free run over a trace's inputs; its other channels are not read.
@@ -279,11 +280,25 @@ class Cascade:
             TraceError: If the number of inputs is not the cascade's.
             ChannelError: If a level names a channel that it cannot.
         """
-        return simulate_family([self] * len(inputs), inputs, rest=rest, workers=workers)
+        from sysid.models.cascade_batch import simulate_records
 
-    def _checked(self, inputs: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
+        return simulate_records(self, inputs, rest=rest, workers=workers)
+
+    def checked(self, inputs: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
+        """Inputs of the right shape, or an error.
+
+        Args:
+            inputs: Samples, or records of samples.
+            axes: How many axes they must have.
+
+        Returns:
+            The inputs as float64.
+
+        Raises:
+            TraceError: If the shape is not the cascade's.
+        """
         inputs = np.asarray(inputs, dtype=np.float64)
-        if inputs.ndim != axes or inputs.shape[-1] != len(self.inputs) or inputs.shape[-2] == 0:
+        if inputs.ndim != axes or inputs.shape[-1] != len(self.inputs) or 0 in inputs.shape:
             raise TraceError(
                 "the inputs do not fit the cascade",
                 expected=f"{axes} axes, the last of them {len(self.inputs)}: {', '.join(self.inputs)}",
@@ -292,22 +307,47 @@ class Cascade:
             )
         return inputs
 
-    def _wrapped(self, values: NDArray[np.float64], held: NDArray[np.int8]) -> CascadeRun:
+    def empty(self, *shape: int) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
+        """Room for a run: values of all channels, and what held the outputs.
+
+        Args:
+            shape: Number of samples, or of records and samples.
+
+        Returns:
+            Both arrays.
+        """
+        return np.empty((*shape, len(self.wiring.channels))), np.empty((*shape, len(self.outputs)), dtype=np.int8)
+
+    def wrapped(self, values: NDArray[np.float64], held: NDArray[np.int8]) -> CascadeRun:
+        """Arrays that are filled as a run.
+
+        Args:
+            values: Of all channels, the last axis.
+            held: What held the outputs.
+
+        Returns:
+            The run.
+        """
         return CascadeRun(
             inputs=self.inputs, outputs=self.outputs, values=values, held=held, units=self.units,
             sample_time=self.sample_time,
         )  # fmt: skip
 
-    def _run(
+    def run(
         self,
         inputs: NDArray[np.float64],
         rest: Dict[str, Level] | None,
-        values: NDArray[np.float64] | None = None,
-        held: NDArray[np.int8] | None = None,
-    ) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
-        n = len(inputs)
-        values = np.empty((n, len(self.wiring.channels))) if values is None else values
-        held = np.empty((n, len(self.outputs)), dtype=np.int8) if held is None else held
+        values: NDArray[np.float64],
+        held: NDArray[np.int8],
+    ) -> None:
+        """Run over one record into arrays that are there.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``.
+            rest: As in :meth:`simulate`.
+            values: Shape ``(n_samples, n_channels)``, written.
+            held: Shape ``(n_samples, n_outputs)``, written.
+        """
         values[:, : inputs.shape[1]] = inputs
         levels = self.levels(inputs[0], rest)
         at = 0
@@ -315,12 +355,11 @@ class Cascade:
             count = sum(len(end.outputs) for end in stage.ends)
             columns = slice(at, at + count)
             if stage.program is not None:
-                z = np.empty((stage.depth + n, len(stage.program.column_channel)))
+                z = np.empty((stage.depth + len(inputs), len(stage.program.column_channel)))
                 kernel.run(stage.program, stage.depth, levels, values, z, _NOTHING, held[:, columns])
             elif stage.model is not None:
                 self._alone(stage.model, levels, values, held[:, columns])
             at += count
-        return values, held
 
     def _alone(
         self,
@@ -359,51 +398,6 @@ class Cascade:
 
 
 _NOTHING = np.empty((0, 0))
-
-
-def simulate_family(
-    cascades: Sequence[Cascade],
-    inputs: NDArray[np.float64],
-    *,
-    rest: Dict[str, Level] | None = None,
-    workers: int = 2,
-) -> CascadeRun:
-    """Free runs of several cascades with the same channels, each over its own record: a model for each car.
-
-    Args:
-        cascades: One for each record.
-        inputs: Shape ``(n_records, n_samples, n_inputs)``.
-        rest: As in :meth:`Cascade.simulate`.
-        workers: Threads.
-
-    Returns:
-        One run whose arrays have a first axis of records.
-
-    Raises:
-        ConfigError: If the cascades have different channels, or their number is not that of the records.
-        TraceError: If the number of inputs is not the cascades'.
-        ChannelError: If a level names a channel that it cannot.
-    """
-    inputs = np.asarray(inputs, dtype=np.float64)
-    kinds = {(one.wiring.channels, one.sample_time) for one in cascades}
-    if len(cascades) != len(inputs) or len(kinds) != 1:
-        raise ConfigError(
-            "the cascades do not fit the records",
-            expected=f"{len(inputs)} cascades with the same channels in the same order, and at least one",
-            got=f"{len(cascades)} cascades of {len(kinds)} kinds",
-        )
-    first = cascades[0]
-    inputs = first._checked(inputs, 3)
-    values = np.empty((*inputs.shape[:2], len(first.wiring.channels)))
-    held = np.empty((*inputs.shape[:2], len(first.outputs)), dtype=np.int8)
-
-    def work(i: int) -> None:
-        cascades[i]._run(inputs[i], rest, values[i], held[i])
-
-    with ThreadPoolExecutor(max(1, workers)) as pool:
-        for future in [pool.submit(work, i) for i in range(len(inputs))]:
-            future.result()
-    return first._wrapped(values, held)
 
 
 def _check_circles(models: Sequence[Member], wiring: Wiring) -> None:

@@ -12,7 +12,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import BrakedTrain, Probe
 from sysid.airbrake.variant import PHYSICAL, Variant
 from sysid.errors import ConfigError
-from sysid.models import AbstractModel, Recursion, Wiring
+from sysid.models import AbstractModel, Ends, Recursion, Wiring
 from sysid.rail import kernel_bank
 from sysid.rail.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
 from sysid.rail.equalising import equalising_from_handle
@@ -152,6 +152,13 @@ class SurrogateBrake(AbstractBrake):
                 got=[str(model.mapping) for model in models],
             )
         wiring = Wiring.of(models)
+        if any(wiring.feeds_back(Ends.of(model)) for model in models):
+            raise ConfigError(
+                "the stages read each other in a circle",
+                where="stages",
+                expected="stages of which each reads the train's channels and outputs of other stages before it",
+                got=[str(model.mapping) for model in models],
+            )
         missing = [name for name in wiring.inputs if name not in known]
         if missing:
             raise ConfigError(

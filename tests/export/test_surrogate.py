@@ -62,6 +62,12 @@ def test_stages_run_in_an_order_in_which_they_can():
     np.testing.assert_array_equal(swapped.simulate(u), Surrogate.wired([first, second]).simulate(u))
 
 
+def test_a_circle_through_the_past_cannot_be_stages():
+    back = linear("z -> y", orders=ARX(na=1, nb=(1,), nk=(1,)))
+    with pytest.raises(ConfigError, match="in a circle cannot be exported"):
+        Surrogate.wired([linear("y -> z"), back])
+
+
 @pytest.mark.parametrize(
     ("models", "match"),
     [

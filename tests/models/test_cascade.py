@@ -214,14 +214,43 @@ def test_a_model_with_a_state_of_its_own_is_wired_like_any_other():
     assert np.ptp(run["AR"]) > 1.0
 
 
-def test_a_batch_is_its_records_one_by_one():
-    cascade = CASCADES["limits"]
-    inputs = np.stack([command(seed=seed) for seed in range(5)])
-    batch = cascade.simulate_batch(inputs)
+def check_records(cascade, inputs, **options):
+    batch = cascade.simulate_batch(inputs, **options)
     assert batch["BC"].shape == inputs.shape[:2]
     for i, one in enumerate(inputs):
-        assert_array_equal(batch.values[i], cascade.simulate(one).values)
-        assert_array_equal(batch.held[i], cascade.simulate(one).held)
+        alone = cascade.simulate(one)
+        assert_allclose(batch.values[i], alone.values, rtol=0.0, atol=1e-10)
+        assert_array_equal(batch.held[i], alone.held)
+    return batch
+
+
+@pytest.mark.parametrize("name", [name for name in CASCADES if name not in {"a linear member", "no neurons"}])
+def test_records_in_lockstep_are_the_records_one_by_one(name):
+    # 27 records: two groups, whose last lanes have no record of their own; several chunks of samples.
+    cascade = CASCADES[name]
+    inputs = np.stack([command(300, len(cascade.inputs), seed) for seed in range(27)])
+    batch = check_records(cascade, inputs)
+    if cascade.limits:
+        assert np.count_nonzero(batch.held) > 100
+
+
+@pytest.mark.parametrize("n", [1, 5, 12])
+def test_few_records_are_the_records_one_by_one(n):
+    check_records(CASCADES["limits"], np.stack([command(seed=seed) for seed in range(n)]), workers=1)
+
+
+def test_many_records_of_a_model_with_a_state_of_its_own():
+    cascade = Cascade(models=(lag("STP -> BP"), network("BP -> BC", seed=3)))
+    check_records(cascade, np.stack([command(seed=seed) for seed in range(30)]))
+
+
+def test_a_value_that_is_not_a_number_stays_in_its_record():
+    cascade = service()
+    inputs = np.stack([command(seed=seed) for seed in range(30)])
+    inputs[3, 50:] = np.nan
+    batch = cascade.simulate_batch(inputs)
+    assert np.isnan(batch["BC"][3, 60:]).all()
+    assert np.isfinite(np.delete(batch["BC"], 3, axis=0)).all()
 
 
 def test_a_family_has_a_cascade_for_each_record():

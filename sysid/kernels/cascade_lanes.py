@@ -1,0 +1,172 @@
+r"""A cascade over several records in lockstep, one in each lane of the vector registers.
+
+A free run is a chain: each sample waits for the one before, each member for those upstream, and for one record much of
+the time is spent waiting. Records in lockstep are chains that wait side by side, share the reading of weights and
+tables, and fill whole registers whatever the number of neurons. What is computed for each is the same as in
+``sysid/kernels/cascade.py``, but for the order of summation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sysid.kernels.cascade import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, _bounded, _limited
+from sysid.kernels.recursion import tanh_in_place
+
+_FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+CHUNK = 128
+"""Samples of which the past is kept at a time, so that it stays in the second-level cache."""
+
+# The number of lanes is read from an array everywhere: loops of a small constant length are unrolled before they can be
+# vectorised, which made this slower than one record at a time.
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _neurons(theta, first, n, n_x, x, h):
+    """Sums of all neurons in all lanes, two neurons and four regressors at a time, before their tanh."""
+    lanes = x.shape[1]
+    fours, pairs = n_x // 4 * 4, n // 2 * 2
+    bias = first + n * n_x
+    for k in range(n):
+        b = theta[bias + k]
+        for lane in range(lanes):
+            h[k, lane] = b
+    for k in range(0, pairs, 2):
+        for i in range(0, fours, 4):
+            p, q = first + k * n_x + i, first + (k + 1) * n_x + i
+            p0, p1, p2, p3 = theta[p], theta[p + 1], theta[p + 2], theta[p + 3]
+            q0, q1, q2, q3 = theta[q], theta[q + 1], theta[q + 2], theta[q + 3]
+            for lane in range(lanes):
+                h[k, lane] += p0 * x[i, lane] + p1 * x[i + 1, lane] + p2 * x[i + 2, lane] + p3 * x[i + 3, lane]
+                h[k + 1, lane] += q0 * x[i, lane] + q1 * x[i + 1, lane] + q2 * x[i + 2, lane] + q3 * x[i + 3, lane]
+    for k in range(n):
+        for i in range(fours if k < pairs else 0, n_x):
+            w = theta[first + k * n_x + i]
+            for lane in range(lanes):
+                h[k, lane] += w * x[i, lane]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _weighted(total, theta, first, n, a):
+    """Add the weighted rows of ``a`` to the totals of all lanes."""
+    for k in range(n):
+        w = theta[first + k]
+        for lane in range(len(total)):
+            total[lane] += w * a[k, lane]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _scaled(z, levels, offset, scale):
+    for lane in range(len(z)):
+        z[lane] = (levels[lane] - offset) / scale
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _outside(total, value, offset, scale, low_bound, high_bound, low, high):
+    """Bring totals to their unit; count the lanes in which something holds them."""
+    count = 0
+    for lane in range(len(total)):
+        value[lane] = total[lane] * scale + offset
+        # Written so that a value that is not a number counts: the slow way keeps it.
+        inside = (total[lane] >= low_bound) & (total[lane] <= high_bound)
+        inside &= (value[lane] >= low[lane]) & (value[lane] <= high[lane])
+        count += 0 if inside else 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _hold(total, value, codes, offset, scale, low_bound, high_bound, low, high, low_code, high_code):
+    """Hold totals and values within bounds and limits, lane by lane."""
+    for lane in range(len(total)):
+        scaled, code = _bounded(total[lane], low_bound, high_bound)
+        limited, held_by = _limited(scaled * scale + offset, code, low[lane], high[lane], low_code, high_code)
+        total[lane] = (limited - offset) / scale if held_by != code else scaled
+        value[lane] = limited
+        codes[lane] = held_by
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sizes(p):
+    width, neurons = 1, 1
+    for m in range(len(p.neurons)):
+        width = max(width, p.regressor_first[m + 1] - p.regressor_first[m])
+        neurons = max(neurons, p.neurons[m])
+    return width, neurons
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def run(p, depth, rest, lanes, values, held):
+    """Run all members over all samples of some records, writing the outputs into ``values``.
+
+    Args:
+        p: The members.
+        depth: Past samples before sample 0: the longest lag.
+        rest: Value of every channel before sample 0 in each record, in its unit, shape ``(n_records, n_channels)``.
+        lanes: At least as many as records; a multiple of four leaves no remainder beside the registers.
+        values: Shape ``(n_records, n_samples, n_channels)``, in units; inputs are read, outputs written.
+        held: What held each output at each sample, shape ``(n_records, n_samples, n_outputs)``, written.
+    """
+    width, most = _sizes(p)
+    records, samples, channels = values.shape
+    x, hidden, total = np.zeros((width, lanes)), np.zeros(most * lanes), np.zeros(lanes)
+    h = hidden.reshape(most, lanes)
+    low, high, codes = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes, dtype=np.int8)
+    z = np.zeros((depth + CHUNK, len(p.column_channel), lanes))
+    now_values = np.zeros((channels, lanes))
+    # Lanes without a record of their own repeat the last one.
+    record = np.minimum(np.arange(lanes), records - 1)
+    is_output = np.zeros(channels, dtype=np.bool_)
+    is_output[p.output_channel] = True
+    for column in range(len(p.column_channel)):
+        for lane in range(lanes):
+            level = rest[record[lane], p.column_channel[column]]
+            for t in range(depth):
+                z[t, column, lane] = (level - p.column_offset[column]) / p.column_scale[column]
+    for t in range(samples):
+        if t > 0 and t % CHUNK == 0:
+            z[:depth] = z[CHUNK : CHUNK + depth].copy()
+        now = depth + t % CHUNK
+        for channel in range(channels):
+            if not is_output[channel]:
+                for lane in range(lanes):
+                    now_values[channel, lane] = values[record[lane], t, channel]
+        for m in range(len(p.neurons)):
+            n = p.neurons[m]
+            first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
+            first_y, n_y = p.output_first[m], p.output_first[m + 1] - p.output_first[m]
+            for column in range(p.column_first[m], p.column_first[m + 1] - n_y):
+                levels = now_values[p.column_channel[column]]  # of a channel that is computed later: the sample before
+                late = 1 if p.column_late[column] else 0
+                if late <= t:  # what came before sample 0 stands there already
+                    _scaled(z[now - late, column], levels, p.column_offset[column], p.column_scale[column])
+            for i in range(n_x):
+                x[i] = z[now - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
+            _neurons(p.theta, p.theta_first[m], n, n_x, x, h)
+            tanh_in_place(hidden[: n * lanes])
+            at = p.theta_first[m] + n * (n_x + 1 + n_y)
+            linear = p.theta_first[m + 1] > at + n_y
+            for j in range(n_y):
+                o = first_y + j
+                column, channel = p.output_column[o], p.output_channel[o]
+                offset, scale = p.column_offset[column], p.column_scale[column]
+                low[:], high[:] = p.limits[o, 0], p.limits[o, 1]
+                low_code, high_code = LOW, HIGH
+                if p.limit_channel[o, 0] >= 0:
+                    low[:], low_code = now_values[p.limit_channel[o, 0]], LOW_CHANNEL
+                if p.limit_channel[o, 1] >= 0:
+                    high[:], high_code = now_values[p.limit_channel[o, 1]], HIGH_CHANNEL
+                total[:] = p.theta[at + j]
+                _weighted(total, p.theta, p.theta_first[m] + n * (n_x + 1) + j * n, n, h)
+                if linear:
+                    _weighted(total, p.theta, at + n_y + j * n_x, n_x, x)
+                value = now_values[channel]
+                codes[:] = FREE
+                low_bound, high_bound = p.bounds[o, 0], p.bounds[o, 1]
+                if _outside(total, value, offset, scale, low_bound, high_bound, low, high):
+                    _hold(total, value, codes, offset, scale, low_bound, high_bound, low, high, low_code, high_code)
+                z[now, column] = total
+                for lane in range(records):
+                    values[lane, t, channel] = value[lane]
+                    held[lane, t, o] = codes[lane]

@@ -1,0 +1,109 @@
+"""Many records at once: the cars of a train, the sequences of a stress test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.kernels import cascade_lanes as kernel
+from sysid.models.cascade import Cascade, Level
+from sysid.models.cascade_run import CascadeRun
+
+MAX_LANES = 32
+"""Records in lockstep at most: their past must stay in the second-level cache."""
+
+MIN_LANES = 12
+"""Records from which lockstep pays (measured: 8 records take 12 ms each, 25 records 6.6, one alone 9.9)."""
+
+
+def simulate_records(
+    cascade: Cascade, inputs: NDArray[np.float64], *, rest: Dict[str, Level] | None = None, workers: int = 2
+) -> CascadeRun:
+    """Free runs of one cascade over independent records of equal length.
+
+    Many records run in lockstep, whose sums are taken in another order: results agree with those of single runs to
+    rounding, not to the last digit.
+
+    Args:
+        cascade: The cascade.
+        inputs: Shape ``(n_records, n_samples, n_inputs)``.
+        rest: As in :meth:`Cascade.simulate`.
+        workers: Threads.
+
+    Returns:
+        One run whose arrays have a first axis of records.
+
+    Raises:
+        TraceError: If the number of inputs is not the cascade's.
+        ChannelError: If a level names a channel that it cannot.
+    """
+    inputs = cascade.checked(inputs, 3)
+    n, workers = len(inputs), max(1, workers)
+    alone = len(cascade.stages) > 1 or cascade.stages[0].program is None
+    if alone or n < MIN_LANES * workers:
+        return simulate_family([cascade] * n, inputs, rest=rest, workers=workers)
+    values, held = cascade.empty(*inputs.shape[:2])
+    values[..., : len(cascade.inputs)] = inputs
+    levels = np.stack([cascade.levels(record[0], rest) for record in inputs])
+    # As many groups as a multiple of the workers, so that all end together.
+    groups = workers * -(-n // (workers * MAX_LANES))
+    ends = [round(n * i / groups) for i in range(groups + 1)]
+    stage = cascade.stages[0]
+
+    def work(group: int) -> None:
+        own = slice(ends[group], ends[group + 1])
+        lanes = -(-(own.stop - own.start) // 4) * 4
+        kernel.run(stage.program, stage.depth, levels[own], lanes, values[own], held[own])
+
+    with ThreadPoolExecutor(workers) as pool:
+        for future in [pool.submit(work, group) for group in range(groups)]:
+            future.result()
+    return cascade.wrapped(values, held)
+
+
+def simulate_family(
+    cascades: Sequence[Cascade],
+    inputs: NDArray[np.float64],
+    *,
+    rest: Dict[str, Level] | None = None,
+    workers: int = 2,
+) -> CascadeRun:
+    """Free runs of several cascades with the same channels, each over its own record: a model for each car.
+
+    Args:
+        cascades: One for each record.
+        inputs: Shape ``(n_records, n_samples, n_inputs)``.
+        rest: As in :meth:`Cascade.simulate`.
+        workers: Threads.
+
+    Returns:
+        One run whose arrays have a first axis of records.
+
+    Raises:
+        ConfigError: If the cascades have different channels, or their number is not that of the records.
+        TraceError: If the number of inputs is not the cascades'.
+        ChannelError: If a level names a channel that it cannot.
+    """
+    kinds = {(one.wiring.channels, one.sample_time) for one in cascades}
+    if len(cascades) != len(inputs) or len(kinds) != 1:
+        raise ConfigError(
+            "the cascades do not fit the records",
+            expected=f"{len(inputs)} cascades with the same channels in the same order, and at least one",
+            got=f"{len(cascades)} cascades of {len(kinds)} kinds",
+        )
+    first = cascades[0]
+    inputs = first.checked(inputs, 3)
+    values, held = first.empty(*inputs.shape[:2])
+
+    def work(i: int) -> None:
+        cascades[i].run(inputs[i], rest, values[i], held[i])
+
+    with ThreadPoolExecutor(max(1, workers)) as pool:
+        for future in [pool.submit(work, i) for i in range(len(inputs))]:
+            future.result()
+    return first.wrapped(values, held)
