@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,8 @@ HISTORY_NOISE = 1e-2
 """Standard deviation of the output's history in scaled numbers, beside a state whose deviation from what the oldest
 sample says is of order 1: weak enough to matter only where the history does not show a state."""
 
-CORRECTIONS = 20
-"""Gauss-Newton steps at most to find the state that a history shows; it converges in a handful."""
+CORRECTIONS = 50
+"""Levenberg-Marquardt steps at most to find the state that a history shows; mostly a handful suffice."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,10 +209,14 @@ class NeuralForm(AbstractForm):
         Returns:
             Shape ``(n_states,)``.
         """
-        # What is expected may lie far outside where the records were, and a rectified output has two states for each
-        # value: descents begin all around.
+        # What is expected may lie far outside where the records were, and from there the output may not show the way:
+        # descents begin all around.
         expected = np.clip(x, -1.0, 1.0)
         around = [expected, np.zeros(len(x)), *np.eye(len(x)), *-np.eye(len(x))]
+        if self.rectified:
+            # Across the kink of an absolute value no descent leads. With either sign given there is no kink.
+            signed = replace(self, rectified=False, low=-np.inf, high=np.inf)
+            around += [signed._descended(scaled, sign * output, around[1], expected) for sign in (1.0, -1.0)]
         found = [self._descended(scaled, output, begin, expected) for begin in around]
         return min(found, key=lambda x: self._misfit(scaled, output, x, expected))
 
