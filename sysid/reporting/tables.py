@@ -277,36 +277,6 @@ def data_table(results: Results) -> Table:
     )
 
 
-def coverage_table(results: Results) -> Table | None:
-    """How often the fits' intervals hold what was measured, by case; ``None`` where no fit has intervals."""
-    fits = [fit for fit in results.fits if any(case.coverage for case in fit.cases.values())]
-    columns = case_columns(fits)
-    rows = []
-    for fit in fits:
-        for kind, words in (("free_run", "free run"), ("one_step", "one step ahead")):
-            cells = [Cell(text=fit.name, header=True, below=words)]
-            cells += [_coverage_cell(fit.cases.get(name), kind, fit.unit) for name in columns]
-            rows.append(tuple(cells))
-    if not rows:
-        return None
-    return Table(
-        caption="How often the 95 % interval of the output holds the measured output, by case [%].",
-        head=(("fit", ""), *((name, role.value) for name, role in columns.items())),
-        rows=tuple(rows),
-        note="95 would be exact; more is a cautious interval, less a promise not kept. Small figures: the mean half "
-        "width, and what the interval from the estimation records alone holds, before it was widened to the errors on "
-        "the traces that choose.",
-    )
-
-
-def _coverage_cell(case: CaseRecord | None, kind: str, unit: str) -> Cell:
-    found = None if case is None or case.coverage is None else case.coverage.get(kind)
-    if found is None:
-        return Cell(text="none")
-    below = f"± {number(found.mean_half_width)} {unit}; {100.0 * found.share_before_spread:.1f} % alone"
-    return Cell(text=f"{100.0 * found.share:.1f}", value=found.share, below=below, mark="number")
-
-
 def facts(fields: dict[str, Any]) -> list[tuple[str, str]]:
     """Plain data as names and texts, nested names joined.
 
