@@ -1,3 +1,33 @@
-"""The system-identification workbench: reference traces in, frozen surrogates of known accuracy out."""
+"""The system-identification workbench: reference traces in, frozen surrogates of known accuracy out.
+
+What follows is the short way, in the words of the command line; each word is explained in :mod:`sysid.api`:
+
+    traces = sysid.load("mine.csv")
+    fit = sysid.fit(traces, "u -> y", sysid.ARX(na=2, nb=(2,), nk=(1,)))
+    print(sysid.compare(traces, fit))
+    sysid.save(fit, traces, "bundle")
+"""
 
 __version__ = "0.1.0"
+
+WORDS = (
+    *("load", "fit", "compare", "save", "Comparison"),
+    *("ARX", "NARX", "NeuralStateSpace", "TransferFunction", "Training", "Start", "Role"),
+)
+"""What is imported when it is first used: ``sysid --help`` loads none of it."""
+
+__all__ = ["ARX", "NARX", "WORDS", "Comparison", "NeuralStateSpace", "Role", "Start", "Training", "TransferFunction"]
+__all__ += ["compare", "fit", "load", "save"]
+
+
+def __getattr__(name: str) -> object:
+    """A word of the short way, imported now."""
+    if name not in WORDS:
+        raise AttributeError(f"module 'sysid' has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module("sysid.api"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *WORDS})

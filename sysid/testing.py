@@ -5,7 +5,9 @@ Nothing here is compiled, cached or clever; each function is the formula written
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,3 +178,20 @@ def finite_difference_jacobian(
         away[i] = width
         columns.append((function(theta + away) - function(theta - away)) / (2.0 * width))
     return np.column_stack(columns)
+
+
+def first_order_record() -> Path:
+    """A file to try things on: 100 s of ``y[n] = 0.9 y[n-1] + 0.2 u[n-1]`` under a random square wave, every 0.5 s.
+
+    Returns:
+        A CSV file in a new temporary folder, columns ``t [s]``, ``u [V]``, ``y [V]``.
+    """
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 20), 10)
+    y = np.full(200, 2.0 * u[0])  # at rest
+    for n in range(1, 200):
+        y[n] = 0.9 * y[n - 1] + 0.2 * u[n - 1]
+    file = Path(tempfile.mkdtemp()) / "record.csv"
+    rows = np.column_stack([0.5 * np.arange(200), u, y])
+    np.savetxt(file, rows, delimiter=",", header="t [s],u [V],y [V]", comments="", fmt="%.17g")
+    return file

@@ -45,8 +45,8 @@ class ARX(AbstractStructure):
     kind = "ARX"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nb", tuple(self.nb))
-        object.__setattr__(self, "nk", tuple(self.nk))
+        object.__setattr__(self, "nb", _each(self.nb))
+        object.__setattr__(self, "nk", _each(self.nk))
         if self.na < 0 or min(self.nb, default=-1) < 0 or min(self.nk, default=-1) < 0 or len(self.nb) != len(self.nk):
             raise ConfigError(
                 "not the orders of an ARX model",
@@ -69,6 +69,11 @@ class ARX(AbstractStructure):
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
         return {"kind": self.kind, "na": self.na, "nb": list(self.nb), "nk": list(self.nk), "intercept": self.intercept}
+
+
+def _each(given: Any) -> tuple[int, ...]:
+    """One order for each input; with a single input it may be written as a number."""
+    return (given,) if isinstance(given, int) else tuple(given)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
