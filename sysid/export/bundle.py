@@ -23,6 +23,7 @@ from sysid.export.manifest import (
     CARD,
     MANIFEST,
     SCHEMA,
+    CascadeMetrics,
     Metrics,
     amplification,
     attachments,
@@ -38,7 +39,8 @@ from sysid.export.parity import check_parity, parity_cases, random_cases
 from sysid.export.stability import WORST, check_free_run, state_stability
 from sysid.export.surrogate import Surrogate
 from sysid.export.verification import write_verification
-from sysid.models import AbstractModel, Start
+from sysid.models import AbstractModel, Cascade, Start
+from sysid.models.wiring import Member, Wiring
 from sysid.traces import TraceSet
 
 
@@ -73,30 +75,41 @@ class Bundle:
 
     Args:
         folder: Where it lies.
-        model: The model, built from ``model.json``.
+        model: The model or cascade, built from ``model.json``.
         metadata: Everything that ``model.json`` says.
         files: The exported files.
     """
 
     folder: Path
-    model: AbstractModel
+    model: AbstractModel | Cascade
     metadata: dict[str, Any]
     files: tuple[BundleFile, ...]
 
+    @property
+    def inputs(self) -> tuple[dict[str, Any], ...]:
+        """What ``model.json`` says of each input: name, unit, reference, range."""
+        return tuple(self.metadata["inputs"])
+
+    @property
+    def outputs(self) -> tuple[dict[str, Any], ...]:
+        """The same of each output; before version 3 there was one."""
+        return tuple(self.metadata.get("outputs") or [self.metadata["output"]])
+
 
 def export_bundle(
-    fit: FitResult,
+    fit: FitResult | Cascade,
     traces: TraceSet,
     folder: Path,
     *,
-    start: Start,
+    start: Start | None = None,
     formats: Sequence[str] = ("onnx", "torchscript"),
     tolerance: float = 1e-9,
     tolerance_float32: float = 1e-3,
-    metrics: Metrics | None = None,
+    metrics: Metrics | CascadeMetrics | None = None,
+    fits: Dict[str, FitResult] | None = None,
     provenance: Dict[str, Any] | None = None,
 ) -> Bundle:
-    """Write a fitted model as a bundle, after each file has reproduced the model on every case and 100 random runs.
+    """Write a fitted model or a whole cascade as a bundle, once each file has reproduced all cases and 100 random runs.
 
     The model's free run is checked over 1,000 random sequences too; a bundle whose free run is unstable is written, and
     its status says so.
@@ -105,14 +118,16 @@ def export_bundle(
     give the same bytes.
 
     Args:
-        fit: The fitted model.
-        traces: The cases that each file is run on; the estimation traces also declare the range of the inputs.
+        fit: The fitted model, or a cascade of models.
+        traces: The cases that each file is run on; the estimation traces also declare the range of the inputs. A
+            cascade's cases need its inputs alone.
         folder: Where the bundle goes. What lies there is replaced if it is a bundle, or empty.
-        start: How the free run over each case begins.
+        start: How the free run over each case begins; at rest by default, and always for a cascade.
         formats: Names of exporters.
-        tolerance: Largest difference from the model allowed, in the output's unit.
+        tolerance: Largest difference from the model allowed, in the outputs' unit.
         tolerance_float32: The same for files that compute in float32.
-        metrics: The model's figures on the cases, as :func:`sysid.validation.evaluate` gives them.
+        metrics: The figures on the cases, as :func:`sysid.validation.evaluate` or ``evaluate_cascade`` give them.
+        fits: Where a cascade's models come from, by mapping.
         provenance: JSON values about where the fit comes from, kept as they are.
 
     Returns:
@@ -125,17 +140,18 @@ def export_bundle(
         ParityError: If a file differs from the model by more than the tolerance; nothing is published then.
     """
     writers = [exporter(name) for name in dict.fromkeys(formats)]
-    _check_finite(fit.model)
-    model = fit.model
-    surrogate = Surrogate.of(model, declared_ranges(model, traces), first_inputs(model, traces))
-    cases, sequences = parity_cases(model, traces, start), random_cases(surrogate)
-    stability = check_free_run(model, traces)
+    source = fit if isinstance(fit, Cascade) else fit.model
+    known = dict(fits or {}) if isinstance(fit, Cascade) else {str(fit.model.mapping): fit}
+    start = Start() if start is None or isinstance(fit, Cascade) else start
+    surrogate = _surrogate(source, traces)
+    cases, sequences = parity_cases(surrogate, traces, start), random_cases(surrogate)
+    stability = None if isinstance(source, Cascade) else check_free_run(source, traces)
+    unit = ", ".join(dict.fromkeys(port.unit for port in surrogate.outputs))
     allowed = {"float64": tolerance, "float32": max(tolerance, tolerance_float32)}
     with _published(Path(folder)) as draft:
         written = [file for writer in writers for file in writer.write(surrogate, draft)]
         checked = [
-            check_parity(file, draft, cases, sequences, tolerance=allowed[file.dtype], unit=model.output_unit)
-            for file in written
+            check_parity(file, draft, cases, sequences, tolerance=allowed[file.dtype], unit=unit) for file in written
         ]
         purposes = {name: f"needed by {file.name}" for file in written for name in file.companions}
         purposes |= write_verification(surrogate, written, (cases[0], sequences[0]), draft, allowed)
@@ -144,15 +160,18 @@ def export_bundle(
             purposes[WORST] = "the random sequence on which the free run did worst"
         (draft / SCHEMA).write_text(schema_text(), encoding="utf-8", newline="\n")
         purposes[SCHEMA] = f"JSON schema of {MANIFEST}"
-        manifest = describe(fit, traces, start, metrics, provenance or {})
+        manifest = describe(surrogate, known, traces, start=start, metrics=metrics, provenance=provenance or {})
         manifest["amplification"] = amplification(cases, sequences)
-        state_stability(manifest, stability)
+        manifest["stability"] = None
+        if stability is not None:
+            state_stability(manifest, stability)
+            manifest["stages"][0]["fit"] = manifest["fit"]
         manifest["files"] = [file_entry(file, parity, draft) for file, parity in zip(written, checked, strict=True)]
         manifest["attachments"] = attachments(purposes, draft)
         (draft / CARD).write_text(model_card(manifest), encoding="utf-8", newline="\n")
         manifest["card"] = {"name": CARD, "sha256": sha256(draft / CARD)}
         (draft / MANIFEST).write_text(seal(manifest), encoding="utf-8", newline="\n")
-    return Bundle(folder=Path(folder), model=model, metadata=manifest, files=bundle_files(manifest))
+    return Bundle(folder=Path(folder), model=source, metadata=manifest, files=bundle_files(manifest))
 
 
 def zip_bundle(folder: Path, path: Path | None = None) -> Path:
@@ -199,8 +218,16 @@ def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
     )
 
 
-def _check_finite(model: AbstractModel) -> None:
-    numbers = model.recursion.numbers
+def _surrogate(source: AbstractModel | Cascade, traces: TraceSet) -> Surrogate:
+    models = source.models if isinstance(source, Cascade) else (source,)
+    for model in models:
+        _check_finite(model)
+    inputs = Wiring.of(models).inputs
+    return Surrogate.of(source, declared_ranges(inputs, traces), first_inputs(inputs, traces))
+
+
+def _check_finite(model: Member) -> None:
+    numbers = model.recursion.numbers if isinstance(model, AbstractModel) else model.theta
     lost = int(np.sum(~np.isfinite(numbers)))
     if lost:  # such a file would reproduce its model: both compute nothing but NaN
         raise ConfigError(

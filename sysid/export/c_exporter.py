@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.export.compiler import build_library
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, with_remainders
 from sysid.export.surrogate import Surrogate
 
 
@@ -39,6 +39,7 @@ class CExporter(AbstractExporter):
             "standard": "C99",
             "prefix": prefix,
             "n_outputs": len(surrogate.outputs),
+            "n_state": surrogate.state_length(self.dtype),
             "float32_macro": f"{prefix.upper()}_FLOAT",
         }
         file = ExportedFile(
@@ -60,7 +61,7 @@ class CExporter(AbstractExporter):
 
         def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
             n_samples, n_cars, _ = inputs.shape
-            after = np.array(state, dtype=dtype, order="C")
+            after = np.array(with_remainders(state, file.details["n_state"]), dtype=dtype, order="C")
             u = np.ascontiguousarray(inputs.transpose(1, 0, 2), dtype=dtype)
             y = np.empty((n_cars, n_samples, n_outputs), dtype=dtype)
             flags = np.empty((n_cars, n_samples), dtype=np.uint32)

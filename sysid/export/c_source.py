@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 
 import sysid
+from sysid.export.cell import LinearCell
 from sysid.export.flags import MEANING
-from sysid.export.surrogate import Stage, Surrogate
-from sysid.export.templating import render
+from sysid.export.layout import LinearState
+from sysid.export.rates import RateForm
+from sysid.export.surrogate import Level, Side, Stage, Surrogate
+from sysid.export.templating import c_real, render
 
 
 def c_files(surrogate: Surrogate) -> dict[str, str]:
@@ -22,7 +25,7 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
     Returns:
         Text by file name.
     """
-    stages = [_stage(stage) for stage in surrogate.stages]
+    stages = [_stage(surrogate, stage) for stage in surrogate.stages]
     values = {
         "s": surrogate,
         "p": surrogate.identifier,
@@ -31,56 +34,140 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "meaning": MEANING,
         "stages": stages,
         "any_neurons": any(stage["neurons"] for stage in stages),
+        "any_sums": any(stage["adds"] for stage in stages),
         "rest_lines": _rest_lines(surrogate),
+        "rest_spaces": _rest_spaces(surrogate),
+        "levels": [level_text(surrogate, port.level) for port in surrogate.channels],
+        "levels_in_words": [_words(port.level) for port in surrogate.channels],
     }
     return {f"{surrogate.identifier}.{end}": render(f"surrogate.{end}.j2", **values) for end in ("h", "c")}
 
 
-def _stage(stage: Stage) -> dict[str, Any]:
+def level_text(surrogate: Surrogate, level: Level) -> str:
+    """A level at rest as an expression over ``inputs``."""
+    if isinstance(level, str):
+        return f"inputs[{[port.name for port in surrogate.inputs].index(level)}]"
+    return f"R({c_real(level)})"
+
+
+def _words(level: Level) -> str:
+    return f"{level} at the first sample" if isinstance(level, str) else c_real(level)
+
+
+def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
     """The numbers and expressions of one stage."""
-    layout, recursion = stage.layout, stage.recursion
-    lags, scaling, n_inputs = recursion.lags, recursion.scaling, len(layout.inputs)
-    columns = layout.regressor_columns(lags)
-    used = [bool(line.length) or 0 in per for line, per in zip(layout.inputs, lags.inputs, strict=True)]
-    newest = [f"u{i}" for i in range(n_inputs)] + ["y"]
-    return {
+    cell, n = stage.cell, stage.cell.n_inputs
+    ends = cell.ends
+    outputs = [
+        {
+            "name": name,
+            "unit": unit,
+            "target": target,
+            "offset": offset,
+            "scale": scale,
+            "sides": [_side(surrogate, side) for side in sides],
+        }
+        for name, unit, target, offset, scale, sides in zip(
+            ends.outputs, ends.output_units, stage.targets, cell.offset[n:], cell.scale[n:], stage.limits, strict=True
+        )
+    ]
+    common = {
         "title": f"{stage.model.mapping}, {stage.model.structure.label}",
         "first": stage.first,
-        "n": lags.n_regressors,
-        "neurons": recursion.neurons,
-        "weights": recursion.hidden_weights.T,
-        "bias": recursion.hidden_bias,
-        "readout": recursion.readout,
-        "linear": recursion.linear,
-        "constant": recursion.constant,
-        "low": recursion.low if np.isfinite(recursion.low) else None,
-        "high": recursion.high if np.isfinite(recursion.high) else None,
-        "scaled": [
-            {
-                "number": i,
-                "source": stage.sources[i],
-                "name": line.channel,
-                "unit": line.unit,
-                "offset": line.offset,
-                "scale": line.scale,
-            }
-            for i, line in enumerate(layout.inputs)
-            if used[i]
+        "lost": stage.first_remainder,
+        "low": cell.low if np.isfinite(cell.low) else None,
+        "high": cell.high if np.isfinite(cell.high) else None,
+        "outputs": outputs,
+        "limited": stage.limited,
+    }
+    return common | (_space(stage) if isinstance(cell, LinearCell) else _lagged(stage))
+
+
+def _side(surrogate: Surrogate, side: Side) -> dict[str, Any]:
+    limit = f"R({c_real(side.value)})" if side.column is None else f"known[{side.column}]"
+    name = "" if side.column is None else surrogate.channels[side.column].name
+    return {"sign": ">" if side.upper else "<", "limit": limit, "name": name}
+
+
+def _lagged(stage: Stage) -> dict[str, Any]:
+    cell, layout = stage.lagged
+    form = RateForm.of(cell)
+    used = [bool(line.length) or 0 in own for line, own in zip(layout.inputs, cell.lags, strict=False)]
+
+    def sample(channel: int, lag: int) -> str:
+        return f"past[{layout.lines[channel].column(lag)}]" if lag else f"u{channel}"
+
+    terms = (*form.inputs, *form.outputs)
+    newest = [f"u{i}" for i in range(cell.n_inputs)] + [f"y[{j}]" for j in range(cell.n_outputs)]
+    return {
+        "kind": "lagged",
+        "n": len(terms),
+        "neurons": cell.neurons,
+        "adds": cell.adds,
+        "weights": form.hidden_weights.T,
+        "bias": cell.hidden_bias,
+        "readout": cell.readout,
+        "linear": form.linear,
+        "constant": cell.constant,
+        "scaled": _scaled(stage, used),
+        "terms": [
+            sample(t.channel, t.lag) + ("" if t.older is None else f" - {sample(t.channel, t.older)}") for t in terms
         ],
-        "regressors": [f"u{column}" if column < n_inputs else f"past[{column - n_inputs}]" for column in columns],
+        "last": [layout.column(cell.n_inputs + j, 1) - cell.n_inputs for j in range(cell.n_outputs)],
         "lines": [
             {"first": line.first, "length": line.length, "newest": newest[i]}
             for i, line in enumerate(layout.lines)
             if line.length
         ],
-        "output": layout.output.channel,
-        "output_unit": layout.output.unit,
-        "output_offset": scaling.output_offset,
-        "output_scale": scaling.output_scale,
     }
+
+
+def _space(stage: Stage) -> dict[str, Any]:
+    form = stage.space
+    return {
+        "kind": "space",
+        "n": form.n_state,
+        "neurons": 0,
+        "adds": form.n_state > 0,
+        "change": np.concatenate([form.A - np.eye(form.n_state), form.B], axis=1),
+        "readout": np.concatenate([form.C, form.D]),
+        "constant": [form.constant],
+        "scaled": _scaled(stage, [True] * form.n_inputs),
+    }
+
+
+def _scaled(stage: Stage, used: list[bool]) -> list[dict[str, Any]]:
+    """The inputs that a stage reads."""
+    cell, ends = stage.cell, stage.cell.ends
+    return [
+        {
+            "number": i,
+            "source": stage.sources[i],
+            "name": ends.inputs[i],
+            "unit": ends.input_units[i],
+            "offset": cell.offset[i],
+            "scale": cell.scale[i],
+        }
+        for i in range(cell.n_inputs)
+        if used[i]
+    ]
 
 
 def _rest_lines(surrogate: Surrogate) -> list[Dict[str, Any]]:
     """Every delay line with the place of its channel in ``[inputs | outputs]``."""
-    names = [port.name for port in (*surrogate.inputs, *surrogate.outputs)]
+    names = [port.name for port in surrogate.channels]
     return [{**line.to_dict(), "source": names.index(line.channel)} for line in surrogate.lines if line.length]
+
+
+def _rest_spaces(surrogate: Surrogate) -> list[dict[str, Any]]:
+    """Every state space with what its scaled inputs hold at rest."""
+    found = []
+    for stage in surrogate.stages:
+        if isinstance(stage.state, LinearState) and stage.state.size:
+            gain = {
+                "first": stage.first,
+                "gain": stage.state.gain,
+                "inputs": _scaled(stage, [True] * stage.cell.n_inputs),
+            }
+            found.append(gain | {"size": stage.state.size, "n_inputs": stage.cell.n_inputs})
+    return found

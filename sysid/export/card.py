@@ -18,4 +18,6 @@ def model_card(manifest: Dict[str, Any]) -> str:
     Returns:
         The text; the same for the same manifest.
     """
-    return render("model_card.md.j2", **manifest, meaning=MEANING)
+    units = {channel["name"]: channel["unit"] for channel in manifest["outputs"]}
+    unit = ", ".join(dict.fromkeys(units.values()))
+    return render("model_card.md.j2", **manifest, meaning=MEANING, units=units, unit=unit)

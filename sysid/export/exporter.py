@@ -60,7 +60,7 @@ class Run:
 
 Runner = Callable[[NDArray[Any], NDArray[Any]], Run]
 """Runs a loaded file on inputs in their units, ``(n_samples, n_cars, n_inputs)``, and a state,
-``(n_cars, n_state)``."""
+``(n_cars, n_state)``. In float32 the state may come without its remainders, which are 0 then; it goes out with them."""
 
 
 class AbstractExporter(ABC):
@@ -115,3 +115,16 @@ def step_by_step(step: Runner) -> Runner:
         return Run(output=np.stack(outputs), state=state, flags=np.stack(flags))
 
     return run
+
+
+def with_remainders(state: NDArray[Any], length: int) -> NDArray[Any]:
+    """A state as long as a file wants it.
+
+    Args:
+        state: Shape ``(n_cars, n_state)``, with or without the remainders of float32.
+        length: Numbers that the file wants of each car.
+
+    Returns:
+        Shape ``(n_cars, length)``, with zeros for remainders that are not given.
+    """
+    return np.pad(state, ((0, 0), (0, length - state.shape[1])))

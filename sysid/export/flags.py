@@ -23,12 +23,15 @@ class Flag(enum.IntFlag):
     """An output is held at one of its bounds: it is wrong."""
     NOT_A_NUMBER = 4
     """An input or an output is not a number: set the state anew before relying on what follows."""
+    AT_LIMIT = 8
+    """An output is held at a limit that was declared for it, such as a pressure that cannot be below atmosphere."""
 
 
 MEANING = {
     Flag.OUTSIDE_RANGE: "an input is outside its declared range; the accuracy is unknown",
     Flag.AT_BOUND: "an output is held at one of its bounds; it is wrong",
     Flag.NOT_A_NUMBER: "an input or an output is not a number; set the state anew",
+    Flag.AT_LIMIT: "an output is held at a limit that was declared for it",
 }
 """Each flag as a sentence, for the files and the model card."""
 
@@ -49,11 +52,23 @@ def expected_flags(
     low, high = (np.array([getattr(port, side) for port in surrogate.inputs]) for side in ("low", "high"))
     outside = ((inputs < low) | (inputs > high)).any(axis=1)
     lost = np.isnan(inputs).any(axis=1) | np.isnan(outputs).any(axis=1)
-    held = np.zeros(len(inputs), dtype=bool)
-    for stage, output in zip(surrogate.stages, outputs.T, strict=True):
-        scaling = stage.form.scaling
-        for bound in (stage.form.low, stage.form.high):
-            if np.isfinite(bound):
-                held |= output == bound * scaling.output_scale + scaling.output_offset
-    flags = outside * int(Flag.OUTSIDE_RANGE) + held * int(Flag.AT_BOUND) + lost * int(Flag.NOT_A_NUMBER)
+    known, n_inputs = np.column_stack([inputs, outputs]), inputs.shape[1]
+    bound, limited = (np.zeros(len(inputs), dtype=bool) for _ in range(2))
+    for stage in surrogate.stages:
+        cell, n = stage.cell, len(stage.sources)
+        for j, (target, sides) in enumerate(zip(stage.targets, stage.limits, strict=True)):
+            output, offset, scale = outputs[:, target - n_inputs], cell.offset[n + j], cell.scale[n + j]
+            reached = np.zeros(len(inputs), dtype=bool)
+            for side in sides:
+                reached |= output == (side.value if side.column is None else known[:, side.column])
+            for value in (cell.low, cell.high):
+                if np.isfinite(value):
+                    bound |= ~reached & (output == value * scale + offset)
+            limited |= reached
+    flags = (
+        outside * int(Flag.OUTSIDE_RANGE)
+        + bound * int(Flag.AT_BOUND)
+        + lost * int(Flag.NOT_A_NUMBER)
+        + limited * int(Flag.AT_LIMIT)
+    )
     return np.asarray(flags, dtype=np.int32)

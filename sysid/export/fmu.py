@@ -12,6 +12,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import sysid
 from sysid.errors import ConfigError
 from sysid.export.archive import write_archive
@@ -103,21 +105,23 @@ def fmu_variables(surrogate: Surrogate) -> list[dict[str, Any]]:
         rows.append({"name": port.name, **kind, "unit": port.unit, "start": c_real(port.start), "description": told})
     for port in surrogate.outputs:
         kind = {"causality": "output", "variability": "continuous", "initial": "calculated"}
-        rows.append(
-            {"name": port.name, **kind, "unit": port.unit, "start": None, "description": "of the sample before"}
-        )
-    for port, rest in zip(surrogate.outputs, surrogate.rest_outputs, strict=True):
+        text = "of the sample before" + (f"; begins at {port.level}" if isinstance(port.level, str) else "")
+        rows.append({"name": port.name, **kind, "unit": port.unit, "start": None, "description": text})
+    for port in surrogate.outputs:
         name, kind = _free(f"{port.name}_at_rest", taken), {"causality": "parameter", "variability": "fixed"}
         text = f"{port.name} before the first sample: the system has stood at it and at the inputs for ever"
-        rows.append({"name": name, **kind, "initial": "exact", "unit": port.unit, "start": c_real(rest)})
-        rows[-1]["description"] = text
+        start = None if isinstance(port.level, str) else c_real(port.level)
+        rows.append({"name": name, **kind, "initial": "exact", "unit": port.unit, "start": start, "description": text})
     kind = {"causality": "output", "variability": "discrete", "initial": "exact"}
     text = "0, or the sum of: " + "; ".join(f"{int(flag)}: {words}" for flag, words in MEANING.items())
     rows.append({"name": _free("flags", taken), **kind, "unit": "1", "start": "0", "description": text})
-    return [
-        row | {"index": i, "reference": i, "integer": i == len(rows), "unit": "" if row["unit"] == "1" else row["unit"]}
+    numbered = [
+        row | {"reference": i, "integer": i == len(rows), "unit": "" if row["unit"] == "1" else row["unit"]}
         for i, row in enumerate(rows, start=1)
     ]
+    # An output that begins at an input has no parameter of its own.
+    shown = [row for row in numbered if row["causality"] != "parameter" or row["start"] is not None]
+    return [row | {"index": i} for i, row in enumerate(shown, start=1)]
 
 
 def _free(name: str, taken: set[str]) -> str:
@@ -131,6 +135,8 @@ def _texts(surrogate: Surrogate, version: int, variables: list[dict[str, Any]]) 
     """The text files of the FMU by their paths, and the token that its binary asks for."""
     prefix = surrogate.identifier
     code = c_files(surrogate)
+    starts = np.array([port.start for port in surrogate.inputs])
+    names = [port.name for port in surrogate.inputs]
     values = {
         "p": prefix,
         "P": prefix.upper(),
@@ -144,7 +150,10 @@ def _texts(surrogate: Surrogate, version: int, variables: list[dict[str, Any]]) 
         "time_name": _free("time", {row["name"] for row in variables}),
         "units": unit_definitions(row["unit"] for row in variables if row["unit"]),
         "starts": [c_real(port.start) for port in surrogate.inputs],
-        "rests": [c_real(value) for value in surrogate.rest_outputs],
+        "rests": [c_real(value) for value in surrogate.levels(starts)[len(surrogate.inputs) :]],
+        "followed": [
+            (k, names.index(port.level)) for k, port in enumerate(surrogate.outputs) if isinstance(port.level, str)
+        ],
     }
     whole = "".join(code.values()) + repr(sorted(values.items()))
     token = hashlib.sha256(whole.encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""The state of an exported recursion: which number of the flat vector is which past sample.
+"""The state of an exported model: which number of the flat vector is which past sample.
 
 Every format carries the same state, one flat row per car, so that a caller who has learnt it once can run
 all of them, and move a run from one to another between two samples.
@@ -13,31 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
-from sysid.models import AbstractModel, History, Lags, Recursion, StateSpace
-
-
-def recursion_of(model: AbstractModel) -> Recursion:
-    """The recursion that a model lowers to, which is what every format is written from.
-
-    Args:
-        model: The model.
-
-    Returns:
-        The recursion.
-
-    Raises:
-        ConfigError: If it lowers to a state space, which formats with delay lines cannot hold.
-    """
-    form = model.recursion
-    if isinstance(form, Recursion):
-        return form
-    raise ConfigError(
-        "this format cannot be written for this kind of model",
-        expected="a model over lagged inputs and outputs (ARX, NARX)",
-        got=model.structure.label,
-        remedy="export a transfer function as onnx, torchscript or torch-export",
-    )
+from sysid.export.cell import Cell, LinearCell, cell_of
+from sysid.models import History
+from sysid.models.wiring import Member
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,20 +23,26 @@ class LinearState:
     """The state of a linear state space: numbers without a channel of their own.
 
     Args:
-        form: The state space.
+        cell: The state space.
     """
 
-    form: StateSpace
+    cell: LinearCell
 
     @property
     def size(self) -> int:
         """Length of the state."""
-        return self.form.n_state
+        return self.cell.form.n_state
 
     @property
     def lines(self) -> tuple[DelayLine, ...]:
         """None: no number of the state is a past sample."""
         return ()
+
+    @property
+    def gain(self) -> NDArray[np.float64]:
+        """From scaled inputs to the state that they hold at rest, shape ``(size, n_inputs)``."""
+        columns = [self.cell.form.equilibrium(unit) for unit in np.eye(self.cell.n_inputs)]
+        return np.column_stack(columns)
 
     def from_history(self, history: History) -> NDArray[np.float64]:
         """The state after some samples.
@@ -69,29 +53,46 @@ class LinearState:
         Returns:
             Shape ``(size,)``.
         """
-        return self.form.state(history)
+        return self.cell.form.state(history)
+
+    def at_rest(self, levels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The state of a system that has stood at some inputs for ever.
+
+        Args:
+            levels: Inputs, then the output, in their units; the output is not read.
+
+        Returns:
+            Shape ``(size,)``.
+        """
+        return self.from_history(History.at_rest(inputs=levels[:-1], output=float(levels[-1])))
 
     def to_dict(self) -> dict[str, Any]:
         """How to begin at rest, as JSON values."""
-        columns = [self.form.equilibrium(unit) for unit in np.eye(self.form.n_inputs)]
+        scaling = self.cell.form.scaling
         return {
             "size": self.size,
-            "rule": "at rest: at_rest times the scaled inputs, (value - offset) / scale, one column per input",
-            "at_rest": np.column_stack(columns).tolist(),
+            "rule": "at rest: at_rest times the scaled channels, (value - offset) / scale, one column per channel",
+            "channels": list(self.cell.ends.inputs),
+            "offset": list(scaling.input_offset),
+            "scale": list(scaling.input_scale),
+            "at_rest": self.gain.tolist(),
         }
 
 
-def layout_of(model: AbstractModel) -> StateLayout | LinearState:
-    """The layout of a model's state, whatever form it lowers to.
+def layout_of(model: Member) -> StateLayout | LinearState:
+    """The layout of a model's state, whatever it lowers to.
 
     Args:
         model: The model.
 
     Returns:
         Delay lines, or the state of a state space.
+
+    Raises:
+        ConfigError: If it lowers to neither.
     """
-    form = model.recursion
-    return LinearState(form=form) if isinstance(form, StateSpace) else StateLayout.of(model)
+    cell = cell_of(model)
+    return LinearState(cell=cell) if isinstance(cell, LinearCell) else StateLayout.of_cell(cell)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +103,7 @@ class DelayLine:
         channel: Its name.
         unit: Its unit.
         first: Where the line begins in the state.
-        length: Samples held: the channel's longest lag. The output's line holds at least its last value.
+        length: Samples held: the channel's longest lag. An output's line holds at least its last value.
         offset: In the channel's unit.
         scale: In the channel's unit.
     """
@@ -139,7 +140,7 @@ class StateLayout:
 
     Args:
         inputs: One line per input, in the mapping's order; empty for an input that is only used directly.
-        output: The line of the output, last in the state.
+        outputs: One line per output, last in the state.
 
     Example:
         >>> from sysid.models import ARX, ARXModel, Mapping
@@ -152,56 +153,47 @@ class StateLayout:
     """
 
     inputs: tuple[DelayLine, ...]
-    output: DelayLine
+    outputs: tuple[DelayLine, ...]
 
     @classmethod
-    def of(cls, model: AbstractModel) -> StateLayout:
-        """The layout of a model's state.
+    def of(cls, model: Member) -> StateLayout:
+        """The layout of a model's state; :class:`ConfigError` if it has no delay lines."""
+        return cls.of_cell(Cell.of(model))
+
+    @classmethod
+    def of_cell(cls, cell: Cell) -> StateLayout:
+        """The layout of a cell's state.
 
         Args:
-            model: The model.
+            cell: The cell.
 
         Returns:
             Lines as long as the model's lags need.
         """
-        recursion = recursion_of(model)
-        lengths = [max(lags, default=0) for lags in recursion.lags.inputs]
-        first = [0, *accumulate(lengths)]
-        scaling = recursion.scaling
-        inputs = tuple(
+        ends, n = cell.ends, cell.n_inputs
+        lengths = [max([int(i >= n), *own]) for i, own in enumerate(cell.lags)]
+        first = [0, *accumulate(lengths)][:-1]
+        names, units = (*ends.inputs, *ends.outputs), (*ends.input_units, *ends.output_units)
+        lines = tuple(
             DelayLine(channel=name, unit=unit, first=at, length=length, offset=offset, scale=scale)
             for name, unit, at, length, offset, scale in zip(
-                model.mapping.inputs,
-                model.input_units,
-                first[:-1],
-                lengths,
-                scaling.input_offset,
-                scaling.input_scale,
-                strict=True,
+                names, units, first, lengths, cell.offset, cell.scale, strict=True
             )
         )
-        output = DelayLine(
-            channel=model.mapping.output,
-            unit=model.output_unit,
-            first=first[-1],
-            length=max([1, *recursion.lags.output]),
-            offset=scaling.output_offset,
-            scale=scaling.output_scale,
-        )
-        return cls(inputs=inputs, output=output)
+        return cls(inputs=lines[:n], outputs=lines[n:])
 
     @property
     def lines(self) -> tuple[DelayLine, ...]:
         """All lines in the state's order."""
-        return (*self.inputs, self.output)
+        return (*self.inputs, *self.outputs)
 
     @property
     def size(self) -> int:
         """Length of the state."""
-        return self.output.first + self.output.length
+        return self.lines[-1].first + self.lines[-1].length
 
     def from_history(self, history: History) -> NDArray[np.float64]:
-        """The state after some samples.
+        """The state after some samples of a model of one output.
 
         Args:
             history: The samples, oldest first, in units; a single one is a system at rest.
@@ -218,26 +210,41 @@ class StateLayout:
             ]
         )
 
-    def regressor_columns(self, lags: Lags) -> NDArray[np.int64]:
-        """Where each regressor stands in ``[scaled inputs | state]``.
+    def at_rest(self, levels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The state of a system that has stood still for ever.
 
         Args:
-            lags: The model's regressors.
-
-        Returns:
-            Shape ``(n_regressors,)``, in the model's order.
-        """
-        n = len(self.inputs)
-        inputs = [n + self.inputs[i].column(lag) if lag else i for i, per in enumerate(lags.inputs) for lag in per]
-        return np.array(inputs + [n + self.output.column(lag) for lag in lags.output], dtype=np.int64)
-
-    def next_columns(self) -> NDArray[np.int64]:
-        """Where each number of the next state comes from in ``[scaled inputs | scaled output | state]``.
+            levels: Inputs, then outputs, in their units.
 
         Returns:
             Shape ``(size,)``.
         """
-        n_new = len(self.inputs) + 1
+        return np.concatenate(
+            [
+                np.full(line.length, (level - line.offset) / line.scale)
+                for line, level in zip(self.lines, levels, strict=True)
+            ]
+        )
+
+    def column(self, channel: int, lag: int) -> int:
+        """Where a sample stands in ``[scaled inputs | state]``.
+
+        Args:
+            channel: An input, or the number of inputs plus the place of an output.
+            lag: How many steps ago; 0 for an input of this step.
+
+        Returns:
+            The column.
+        """
+        return len(self.inputs) + self.lines[channel].column(lag) if lag else channel
+
+    def next_columns(self) -> NDArray[np.int64]:
+        """Where each number of the next state comes from in ``[scaled inputs | scaled outputs | state]``.
+
+        Returns:
+            Shape ``(size,)``.
+        """
+        n_new = len(self.lines)
         columns = [
             i if lag == 1 else n_new + line.column(lag - 1)
             for i, line in enumerate(self.lines)

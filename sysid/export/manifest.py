@@ -15,15 +15,17 @@ from typing import Any, Protocol
 import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
-from sysid.export.layout import LinearState, layout_of
+from sysid.export.layout import LinearState
 from sysid.export.parity import Parity, ParityCase
-from sysid.export.surrogate import Range, Surrogate
-from sysid.models import AbstractModel, History, Start
+from sysid.export.surrogate import Port, Range, Stage, Surrogate
+from sysid.models import Cascade, Start
 from sysid.traces import Role, Trace, TraceSet
+from sysid.units import Reference
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Raised when a reader of an earlier version would misread the file. Every version from 1 on can be read: 2 added what
-lies beside the exported files (``attachments``), and parity over random sequences."""
+lies beside the exported files (``attachments``), and parity over random sequences; 3 has several outputs and models in
+place of one (``outputs``, ``stages``), and float32 files whose state is longer by the remainders."""
 SCHEMA = "model.schema.json"
 """The JSON schema of ``model.json``, which travels in every bundle."""
 MANIFEST = "model.json"
@@ -47,13 +49,28 @@ class Metrics(Protocol):
         """Figures by name of the case."""
 
 
+class CascadeMetrics(Protocol):
+    """The figures of a cascade, such as :class:`sysid.validation.CascadeEvaluation`."""
+
+    @property
+    def outputs(self) -> Dict[str, Any]:
+        """Figures by output, each as of a model."""
+
+
 def describe(
-    fit: FitResult, traces: TraceSet, start: Start, metrics: Metrics | None, provenance: Dict[str, Any]
+    surrogate: Surrogate,
+    fits: Dict[str, FitResult],
+    traces: TraceSet,
+    *,
+    start: Start,
+    metrics: Metrics | CascadeMetrics | None,
+    provenance: Dict[str, Any],
 ) -> dict[str, Any]:
     """Everything that ``model.json`` says before the files are known.
 
     Args:
-        fit: The fitted model.
+        surrogate: What is exported.
+        fits: The fits that its models come from, by mapping; models without one are told without.
         traces: The cases, and the estimation traces that declare the range of the inputs.
         start: How the free runs began.
         metrics: The figures, if there are any.
@@ -62,35 +79,56 @@ def describe(
     Returns:
         JSON values; a number that is not finite is ``None``.
     """
-    model, recursion = fit.model, fit.model.recursion
-    scaling = recursion.scaling
-    estimation = traces.with_role(Role.ESTIMATION)
-    stored = model.to_dict()
+    source, estimation = surrogate.source, traces.with_role(Role.ESTIMATION)
+    stored, single = source.to_dict(), not isinstance(source, Cascade)
+    limits = {} if single else stored["limits"]
+    stages = [_stage(stage, fits.get(str(stage.model.mapping))) for stage in surrogate.stages]
     manifest = {
         "schema_version": SCHEMA_VERSION,
-        "label": model.structure.label,
+        "label": surrogate.label,
         "structure": stored["structure"],
-        "mapping": str(model.mapping),
-        "sample_time_s": model.sample_time,
-        "inputs": [
-            _channel(name, unit, traces, estimation)
-            for name, unit in zip(model.mapping.inputs, model.input_units, strict=True)
+        "mapping": surrogate.mapping,
+        "sample_time_s": surrogate.sample_time,
+        "inputs": [_channel(port, traces, estimation) for port in surrogate.inputs],
+        "outputs": [
+            _channel(port, traces, estimation) | {"limits": limits.get(port.name, {"low": None, "high": None})}
+            for port in surrogate.outputs
         ],
-        "output": _channel(model.mapping.output, model.output_unit, traces, estimation),
-        "scaling": {
-            "input_offset": list(scaling.input_offset),
-            "input_scale": list(scaling.input_scale),
-            "output_offset": scaling.output_offset,
-            "output_scale": scaling.output_scale,
-        },
-        "output_bounds": [
-            bound * scaling.output_scale + scaling.output_offset for bound in (recursion.low, recursion.high)
-        ],
+        "stages": stages,
         "model": stored,
-        "n_parameters": model.n_parameters,
-        "state": Surrogate.of(model).state_text(),
-        "initialisation": _initialisation(fit, _example(traces)),
-        "fit": {
+        "n_parameters": source.n_parameters,
+        "state": surrogate.state_text(),
+        "initialisation": _initialisation(surrogate, _example(traces)),
+        "fit": stages[0]["fit"] if single else None,
+        "cases_start": {"kind": start.kind.value, "n_measured": start.n_measured},
+        "metrics": None if metrics is None else _metrics(metrics),
+        "provenance": {**provenance, "data": _data(traces), "software": _software()},
+    }
+    return {name: _json(value) for name, value in manifest.items()}
+
+
+def _stage(stage: Stage, fit: FitResult | None) -> dict[str, Any]:
+    """One of the models: how it is scaled, what it is held within, and the fit that it comes from."""
+    cell, n = stage.cell, stage.cell.n_inputs
+    bounds = [
+        [bound * scale + offset for bound in (cell.low, cell.high)]
+        for offset, scale in zip(cell.offset[n:], cell.scale[n:], strict=True)
+    ]
+    return {
+        "mapping": str(stage.model.mapping),
+        "label": stage.model.structure.label,
+        "structure": stage.model.to_dict()["structure"],
+        "n_parameters": stage.model.n_parameters,
+        "scaling": {
+            "input_offset": list(cell.offset[:n]),
+            "input_scale": list(cell.scale[:n]),
+            "output_offset": list(cell.offset[n:]),
+            "output_scale": list(cell.scale[n:]),
+        },
+        "output_bounds": bounds,
+        "fit": None
+        if fit is None
+        else {
             "status": fit.status.name,
             "status_text": fit.status.value,
             "loop": fit.loop.value,
@@ -98,11 +136,21 @@ def describe(
             "train_time_s": fit.train_time_s,
             "notes": list(fit.notes),
         },
-        "cases_start": {"kind": start.kind.value, "n_measured": start.n_measured},
-        "metrics": None if metrics is None else {name: case.to_dict() for name, case in metrics.cases.items()},
-        "provenance": {**provenance, "data": _data(traces), "software": _software()},
     }
-    return {name: _json(value) for name, value in manifest.items()}
+
+
+def _metrics(metrics: Metrics | CascadeMetrics) -> dict[str, Any]:
+    """Figures by case: of a model as they are; of a cascade by output, with what is the whole's beside them."""
+    if not hasattr(metrics, "outputs"):
+        return {name: case.to_dict() for name, case in metrics.cases.items()}
+    found: dict[str, Any] = {}
+    for output, evaluation in metrics.outputs.items():
+        for name, case in evaluation.cases.items():
+            figures = case.to_dict()
+            whole = {key: figures.get(key) for key in ("role", "n_samples", "run_time_s")}
+            entry = found.setdefault(name, whole | {"outputs": {}})
+            entry["outputs"][output] = {key: figures[key] for key in ("free_run", "one_step")}
+    return found
 
 
 def file_entry(file: ExportedFile, parity: Parity, folder: Path) -> dict[str, Any]:
@@ -188,32 +236,32 @@ def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def declared_ranges(model: AbstractModel, traces: TraceSet) -> dict[str, Range]:
+def declared_ranges(inputs: Sequence[str], traces: TraceSet) -> dict[str, Range]:
     """The range that each input has in the estimation traces, which is what a bundle is declared for.
 
     Args:
-        model: The model.
+        inputs: Names of the inputs.
         traces: The cases.
 
     Returns:
         By channel; empty without estimation traces.
     """
     estimation = traces.with_role(Role.ESTIMATION)
-    return {name: found for name in model.mapping.inputs if (found := _range(name, estimation))}
+    return {name: found for name in inputs if (found := _range(name, estimation))}
 
 
-def first_inputs(model: AbstractModel, traces: TraceSet) -> dict[str, float]:
+def first_inputs(inputs: Sequence[str], traces: TraceSet) -> dict[str, float]:
     """What each input is at the beginning of the first estimation trace, or of the first trace without one.
 
     Args:
-        model: The model.
+        inputs: Names of the inputs.
         traces: The cases.
 
     Returns:
         By channel.
     """
     example = _example(traces)
-    return {name: float(example[name][0]) for name in model.mapping.inputs}
+    return {name: float(example[name][0]) for name in inputs}
 
 
 def _example(traces: TraceSet) -> Trace:
@@ -241,37 +289,35 @@ def amplification(cases: Sequence[ParityCase], sequences: Sequence[ParityCase]) 
 
 
 def _range(name: str, estimation: tuple[Trace, ...]) -> Range | None:
-    if not estimation:
-        return None
-    return min(float(t[name].min()) for t in estimation), max(float(t[name].max()) for t in estimation)
+    there = [trace[name] for trace in estimation if name in trace.channel_names]
+    return (min(float(v.min()) for v in there), max(float(v.max()) for v in there)) if there else None
 
 
-def _channel(name: str, unit: str, traces: TraceSet, estimation: tuple[Trace, ...]) -> dict[str, Any]:
-    channel = traces.traces[0].channel(name)
-    found = _range(name, estimation)
+def _channel(port: Port, traces: TraceSet, estimation: tuple[Trace, ...]) -> dict[str, Any]:
+    """A channel as the traces describe it; an output that they lack is known by its model alone."""
+    first = traces.traces[0]
+    channel = first.channel(port.name) if port.name in first.channel_names else None
+    found = _range(port.name, estimation)
     return {
-        "name": name,
-        "unit": unit,
-        "reference": channel.reference.value,
-        "description": channel.description,
+        "name": port.name,
+        "unit": port.unit,
+        "reference": Reference.NONE.value if channel is None else channel.reference.value,
+        "description": "" if channel is None else channel.description,
         "range": None if found is None else list(found),
     }
 
 
-def _initialisation(fit: FitResult, example: Trace) -> dict[str, Any]:
-    model = fit.model
-    inputs = example.columns(model.mapping.inputs)[0]
-    layout = layout_of(model)
-    state = layout.from_history(History.at_rest(inputs=inputs, output=model.rest_output))
+def _initialisation(surrogate: Surrogate, example: Trace) -> dict[str, Any]:
+    first = example.columns(tuple(port.name for port in surrogate.inputs))[0]
     lines = "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale"
+    spaces = [stage for stage in surrogate.stages if isinstance(stage.state, LinearState)]
+    levels = surrogate.levels(first).tolist()
     return {
-        "rule": "a system at rest: the equilibrium at its inputs" if isinstance(layout, LinearState) else lines,
-        "values": {
-            **dict(zip(model.mapping.inputs, inputs.tolist(), strict=True)),
-            model.mapping.output: model.rest_output,
-        },
-        "values_from": f"the inputs' first sample in {example.name}; the output's declared rest value",
-        "state": state.tolist(),
+        "rule": lines + ("; a state space is at the equilibrium of its inputs" if spaces else ""),
+        "levels": {port.name: port.level for port in surrogate.channels},
+        "values": {port.name: value for port, value in zip(surrogate.channels, levels, strict=True)},
+        "values_from": f"the inputs' first sample in {example.name}, and the levels: numbers, or inputs",
+        "state": surrogate.at_rest(first).tolist(),
     }
 
 

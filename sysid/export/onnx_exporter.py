@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sysid
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step, with_remainders
 from sysid.export.surrogate import Surrogate
 
 
@@ -51,9 +51,11 @@ class OnnxExporter(AbstractExporter):
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         session = onnxruntime.InferenceSession(folder / file.name, options, providers=["CPUExecutionProvider"])
         dtype = np.dtype(file.dtype)
+        length = session.get_inputs()[1].shape[1]
 
         def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
-            feed = {"u": np.asarray(inputs, dtype=dtype), "state": np.asarray(state, dtype=dtype)}
+            before = np.asarray(with_remainders(state, length), dtype=dtype)
+            feed = {"u": np.asarray(inputs, dtype=dtype), "state": before}
             output, state_out, flags = session.run(["y", "state_out", "flags"], feed)
             return Run(output=output, state=state_out, flags=flags[..., 0])
 

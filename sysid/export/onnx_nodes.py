@@ -65,12 +65,12 @@ class Nodes:
         self.nodes.append(helper.make_node(operator, list(inputs), [output], name=f"make_{output}", **attributes))
         return output
 
-    def split(self, value: str, outputs: Sequence[str]) -> list[str]:
-        """Cut a value into equal parts along its last axis, one for each name."""
+    def split(self, value: str, outputs: Sequence[str], axis: int = -1) -> list[str]:
+        """Cut a value into equal parts along an axis, the last by default, one for each name."""
         if len(outputs) == 1:
             return [value]
         names = [self.prefix + output for output in outputs]
-        self.nodes.append(helper.make_node("Split", [value], names, name=f"make_{names[0]}", axis=-1))
+        self.nodes.append(helper.make_node("Split", [value], names, name=f"make_{names[0]}", axis=axis))
         return names
 
     def add_scan(

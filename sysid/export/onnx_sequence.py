@@ -1,26 +1,30 @@
-"""A whole free run as an ONNX graph: one ``Scan`` of any length, for any number of cars at once.
+"""A whole free run as an ONNX graph: one ``Scan`` a stage, of any length, for any number of cars at once.
 
-The past inputs of all samples are laid side by side before the loop, and the body is left with few nodes:
-in a network of this size a node costs more than its arithmetic. Two other forms were measured on 20,000 samples
-of a 4/4/20 network. With the inputs' share of the matrix product before the loop one car is a tenth faster, but
-a hundred cars are slower by a fifth and more, because the products of all samples do not fit into the cache. With
-the delay lines of the inputs inside the loop a hundred cars are a tenth faster, but one car is slower by a third.
+The regressors of all inputs are laid side by side before the loop, and the body is left with few nodes: in a network
+of this size a node costs more than its arithmetic. Inside the loop cars lie along the last axis: to put rows of one
+number each behind one another costs as much as the products do, and a hundred cars take a quarter less time without.
+Measured on 20,000 samples of a 4/4/20 network and given up: the inputs' share of the product before the loop (one car
+a tenth faster, a hundred cars slower by a fifth: the products of all samples do not fit into the cache), the inputs'
+delay lines inside it (one car slower by a third), and several samples in one pass through the body (no gain).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 from onnx import numpy_helper
 
+from sysid.export.cell import Cell, LinearCell
 from sysid.export.flags import Flag
-from sysid.export.layout import StateLayout
+from sysid.export.layout import DelayLine
+from sysid.export.onnx_body import Body, clip_range, lagged_body, limit_name, linear_body, scanned_limits
 from sysid.export.onnx_nodes import TO_END, Nodes
-from sysid.export.onnx_step import INT32, clipped, ends, held_outputs, linear_step, run_stages, unscaled_output
+from sysid.export.onnx_step import INT32, Made, ends, held_outputs, join_states, stage_part, stage_state
+from sysid.export.rates import RateForm, Term
 from sysid.export.surrogate import Stage, Surrogate
-from sysid.models import AbstractForm, Lags, StateSpace
 
 
 def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
@@ -38,48 +42,176 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         The ``GraphProto``.
     """
     nodes = Nodes(dtype)
-    _flags(nodes, surrogate, run_stages(nodes, surrogate, _stage))
+    inputs = _channels(nodes, "u", [f"u{i}" for i in range(len(surrogate.inputs))])
+    known, made = list(inputs), []
+    for k, stage in enumerate(surrogate.stages):
+        part = stage_part(nodes, surrogate, k)
+        state, remainder = stage_state(part, surrogate, stage)
+        sequence = _Sequence(part, stage, known, state, remainder)
+        made.append(sequence.made())
+        known += sequence.outputs
+    _columns(nodes, known[len(inputs) :], "y")
+    join_states(nodes, made)
+    _flags(nodes, surrogate, inputs, made)
     return nodes.graph("sequence", *ends(nodes, surrogate, ["time", "batch"]))
 
 
-def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, str, str]:
-    if isinstance(stage.form, StateSpace):
-        return _linear_stage(nodes, stage, stage.form, inputs, state)
-    layout, recursion = stage.layout, stage.recursion
-    n_inputs, longest = recursion.lags.n_inputs, max(line.length for line in layout.inputs)
-    scaled = _scaled_inputs(nodes, inputs, recursion, n_inputs)
-    history = _with_past(nodes, layout, scaled, state, longest)
-    columns = _input_columns(recursion.lags)
-    regressors = _input_regressors(nodes, columns, history, n_inputs, longest)
-    line = layout.output
-    span = [nodes.integers([line.first]), nodes.integers([TO_END]), nodes.integers([1])]
-    past = nodes.add("Slice", [state, *span], "output_line")
-    body = _scan_body(stage, columns, line.length, nodes)
-    output = nodes.add_scan([past], [regressors], ["output_line_end"], "y_scaled", body)
-    flat = nodes.add("Squeeze", [output, nodes.integers([-1])], "y_scaled_flat")
-    y = _columns(nodes, [unscaled_output(nodes, flat, recursion, "y_flat")], "y")
-    return flat, y, _state_out(nodes, layout, history, longest)
+class _Sequence:
+    """The nodes of one stage; channels are arrays ``(time, batch)``.
 
+    Args:
+        nodes: The graph, with the stage's names.
+        stage: The stage.
+        known: All inputs of the whole and outputs of earlier stages, in units.
+        state: The stage's state.
+        remainder: What rounding took from it; ``None`` where that is not kept.
+    """
 
-def _linear_stage(nodes: Nodes, stage: Stage, form: StateSpace, inputs: str, state: str) -> tuple[str, str, str]:
-    """A state space: the loop carries its state, and each step is two products."""
-    scaled = _scaled_inputs(nodes, inputs, form, form.n_inputs)
-    body = Nodes(nodes.dtype, prefix=f"{nodes.prefix}body_")
-    x, u = f"{body.prefix}x", f"{body.prefix}u"
-    output, state_out = linear_step(body, form, body.add("Concat", [x, u], "state_and_inputs", axis=1))
-    output = clipped(body, output, stage)
-    graph = body.graph(
-        "one_step",
-        [body.value("x", ["batch", form.n_state]), body.value("u", ["batch", form.n_inputs])],
-        [
-            body.value(state_out.removeprefix(body.prefix), ["batch", form.n_state]),
-            body.value(output.removeprefix(body.prefix), ["batch", 1]),
-        ],
-    )
-    result = nodes.add_scan([state], [scaled], ["state_out"], "y_scaled", graph)
-    flat = nodes.add("Squeeze", [result, nodes.integers([-1])], "y_scaled_flat")
-    y = _columns(nodes, [unscaled_output(nodes, flat, form, "y_flat")], "y")
-    return flat, y, f"{nodes.prefix}state_out"
+    def __init__(self, nodes: Nodes, stage: Stage, known: Sequence[str], state: str, remainder: str | None) -> None:
+        self.nodes, self.stage, self.known, self.keeps = nodes, stage, list(known), remainder is not None
+        self.state = nodes.add("Transpose", [state], "state_by_row", perm=[1, 0])
+        self.remainder = (
+            [] if remainder is None else [nodes.add("Transpose", [remainder], "remainder_rows", perm=[1, 0])]
+        )
+        self.outputs: list[str] = []
+
+    def made(self) -> Made:
+        """Add the nodes; ``outputs`` has the names of the outputs in units afterwards."""
+        nodes = self.nodes
+        numbers, state = self._linear() if isinstance(self.stage.cell, LinearCell) else self._lagged()
+        limited = self._in_units(numbers)
+        lost = nodes.add("Transpose", [f"{nodes.prefix}remainder_end"], "lost", perm=[1, 0]) if self.keeps else None
+        return Made(scaled=tuple(numbers), state=state, remainder=lost, limited=tuple(limited))
+
+    def _lagged(self) -> tuple[list[str], str]:
+        nodes, (cell, layout) = self.nodes, self.stage.lagged
+        form = RateForm.of(cell, blocks=True)
+        scaled = [self._scaled(self.known[source], i, f"u{i}") for i, source in enumerate(self.stage.sources)]
+        histories = [self._with_past(name, line) for name, line in zip(scaled, layout.inputs, strict=True)]
+        scanned = {"x": self._terms(form.inputs, histories, layout.inputs)}
+        for j, side in scanned_limits(self.stage):
+            row = self._scaled(self.known[side.column or 0], cell.n_inputs + j, limit_name(j, side))
+            scanned[limit_name(j, side)] = nodes.add(
+                "Unsqueeze", [row, nodes.integers([1])], f"{limit_name(j, side)}_row"
+            )
+        begin = self._begin(cell, layout.outputs)
+        body = lagged_body(nodes, self.stage, form, list(begin), list(scanned))
+        numbers = self._loop(begin, list(scanned.values()), body)
+        pieces = [self._newest(history, line) for history, line in zip(histories, layout.inputs, strict=True)]
+        for number, line in zip(numbers, layout.outputs, strict=True):
+            span = [nodes.integers([-line.length]), nodes.integers([TO_END]), nodes.integers([0])]
+            tail = nodes.add("Slice", [number, *span], f"{line.channel}_tail")
+            pieces.append(self._newest(self._with_past(tail, line), line))
+        return numbers, nodes.add("Concat", [piece for piece in pieces if piece], "next_state", axis=1)
+
+    def _linear(self) -> tuple[list[str], str]:
+        """A state space: the loop carries its state."""
+        nodes = self.nodes
+        rows = [self._scaled(self.known[source], i, f"u{i}") for i, source in enumerate(self.stage.sources)]
+        begin = {"state": self.state} | dict(zip(["remainder"], self.remainder, strict=False))
+        body = linear_body(nodes, self.stage, keeps=self.keeps)
+        numbers = self._loop(begin, [_rows(nodes, rows, "x")], body)
+        return numbers, nodes.add("Transpose", [f"{nodes.prefix}state_end"], "next_state", perm=[1, 0])
+
+    def _loop(self, begin: dict[str, str], scanned: list[str], body: Body) -> list[str]:
+        """The loop; gives back the scaled outputs, each ``(time, batch)``."""
+        nodes, n, one = self.nodes, self.stage.cell.n_outputs, self.nodes.integers([1])
+        ends_of = [f"{name}_end" for name in begin]
+        numbers = nodes.add_scan(list(begin.values()), scanned, ends_of, "y_loop", body.graph)
+        span = clip_range(self.stage)
+        if span is not None and not body.held:
+            low, high = nodes.numbers("low", span[0]), nodes.numbers("high", span[1])
+            numbers = nodes.add("Clip", [numbers, low, high], "y_bounded")
+        rows = nodes.split(numbers, [f"y_row{j}" for j in range(n)], axis=1)
+        return [nodes.add("Squeeze", [row, one], f"y_scaled{j}") for j, row in enumerate(rows)]
+
+    def _begin(self, cell: Cell, lines: Sequence[DelayLine]) -> dict[str, str]:
+        """What the loop carries, before the first sample."""
+        nodes = self.nodes
+        if not cell.adds:
+            count = sum(line.length for line in lines)
+            return {"line": self._gathered(range(lines[0].first, lines[0].first + count), "line")}
+        begin = {"level": self._gathered([line.column(1) for line in lines], "level")}
+        longest = max(line.length for line in lines)
+        if longest > 1:
+            # Beyond a shorter line the weights are zero.
+            back = [(lag, line) for lag in range(1, longest) for line in lines]
+            newer = self._gathered([line.column(min(lag, line.length)) for lag, line in back], "newer")
+            older = self._gathered([line.column(min(lag + 1, line.length)) for lag, line in back], "older")
+            begin["rates"] = nodes.add("Sub", [newer, older], "rates")
+        return begin | dict(zip(["remainder"], self.remainder, strict=False))
+
+    def _gathered(self, rows: Sequence[int], name: str) -> str:
+        """Some rows of the state."""
+        return self.nodes.add("Gather", [self.state, self.nodes.integers(list(rows))], name, axis=0)
+
+    def _scaled(self, channel: str, column: int, name: str) -> str:
+        """A channel in the numbers of one of the stage's columns."""
+        nodes, cell = self.nodes, self.stage.cell
+        centred = nodes.add("Sub", [channel, nodes.numbers(f"{name}_offset", cell.offset[column])], f"{name}_centred")
+        return nodes.add("Div", [centred, nodes.numbers(f"{name}_scale", cell.scale[column])], f"{name}_scaled")
+
+    def _with_past(self, channel: str, line: DelayLine) -> str:
+        """A channel with the samples before it, oldest first; as it is where none are held."""
+        if not line.length:
+            return channel
+        past = self._gathered([line.column(lag) for lag in range(line.length, 0, -1)], f"{line.channel}_past")
+        return self.nodes.add("Concat", [past, channel], f"{line.channel}_with_past", axis=0)
+
+    def _newest(self, history: str, line: DelayLine) -> str:
+        """The line after the last sample, ``(batch, length)``; nothing for an empty one."""
+        if not line.length:
+            return ""
+        nodes, back = self.nodes, self.nodes.integers([-1])
+        span = [back, nodes.integers([-line.length - 1]), nodes.integers([0]), back]
+        rows = nodes.add("Slice", [history, *span], f"{line.channel}_newest")
+        return nodes.add("Transpose", [rows], f"{line.channel}_line", perm=[1, 0])
+
+    def _terms(self, terms: Sequence[Term], histories: Sequence[str], lines: Sequence[DelayLine]) -> str:
+        """The inputs' terms of all samples, ``(time, n_terms, batch)``."""
+        nodes = self.nodes
+        if not terms:
+            # The loop needs something to run over; zeros, because an input that the model does not read may be NaN.
+            zero = numpy_helper.from_array(np.zeros(1, dtype=nodes.dtype))
+            shape = nodes.add("Shape", [histories[0]], "shape")
+            return _rows(nodes, [nodes.add("ConstantOfShape", [shape], "nothing_used", value=zero)], "x")
+
+        def sample(channel: int, lag: int) -> str:
+            length = lines[channel].length
+            if not length:
+                return histories[channel]
+            span = [nodes.integers([length - lag]), nodes.integers([-lag if lag else TO_END]), nodes.integers([0])]
+            return nodes.add("Slice", [histories[channel], *span], f"u{channel}_lag{lag}")
+
+        samples = {(t.channel, lag): "" for t in terms for lag in (t.lag, t.older) if lag is not None}
+        samples = {key: sample(*key) for key in samples}
+        rows = []
+        for term in terms:
+            newer = samples[term.channel, term.lag]
+            if term.older is not None:
+                names = [newer, samples[term.channel, term.older]]
+                newer = nodes.add("Sub", names, f"u{term.channel}_rate{term.lag}")
+            rows.append(newer)
+        return _rows(nodes, rows, "x")
+
+    def _in_units(self, numbers: Sequence[str]) -> list[str]:
+        """Outputs in units, held within their declared limits to the last digit; gives back where they are."""
+        nodes, cell, limited = self.nodes, self.stage.cell, []
+        for j, (number, sides) in enumerate(zip(numbers, self.stage.limits, strict=True)):
+            scale = nodes.numbers(f"y{j}_scale", cell.scale[cell.n_inputs + j])
+            offset = nodes.numbers(f"y{j}_offset", cell.offset[cell.n_inputs + j])
+            value = nodes.add("Add", [nodes.add("Mul", [number, scale], f"y{j}_centred"), offset], f"y{j}_in_units")
+            for side in sides:
+                part = nodes.within(f"{nodes.prefix}{limit_name(j, side)}_")
+                limit = part.numbers("value", side.value) if side.column is None else self._channel(side.column)
+                beyond = part.add("Greater" if side.upper else "Less", [value, limit], "beyond_in_units")
+                value = part.add("Where", [beyond, limit, value], "in_units")
+                limited.append(part.add("Equal", [value, limit], "reached"))
+            self.outputs.append(value)
+        return limited
+
+    def _channel(self, column: int) -> str:
+        return [*self.known, *self.outputs][column]
 
 
 def _channels(nodes: Nodes, value: str, names: list[str]) -> list[str]:
@@ -93,7 +225,7 @@ def _channels(nodes: Nodes, value: str, names: list[str]) -> list[str]:
     return [nodes.add("Squeeze", [part, last], name) for part, name in zip(parts, names, strict=True)]
 
 
-def _columns(nodes: Nodes, channels: list[str], output: str) -> str:
+def _columns(nodes: Nodes, channels: Sequence[str], output: str) -> str:
     """Arrays ``(time, batch)`` side by side as ``(time, batch, n)``."""
     last = nodes.integers([-1])
     if len(channels) == 1:
@@ -102,31 +234,29 @@ def _columns(nodes: Nodes, channels: list[str], output: str) -> str:
     return nodes.add("Concat", columns, output, axis=2)
 
 
-def _scaled_inputs(nodes: Nodes, inputs: str, recursion: AbstractForm, n_inputs: int) -> str:
-    """Inputs in the model's numbers."""
-    scaling, scaled = recursion.scaling, []
-    channels = _channels(nodes, inputs, [f"u{i}" for i in range(n_inputs)])
-    for i, (offset, scale) in enumerate(zip(scaling.input_offset, scaling.input_scale, strict=True)):
-        centred = nodes.add("Sub", [channels[i], nodes.numbers(f"input_offset{i}", offset)], f"u{i}_centred")
-        scaled.append(nodes.add("Div", [centred, nodes.numbers(f"input_scale{i}", scale)], f"u{i}_scaled"))
-    return _columns(nodes, scaled, "u_scaled")
+def _rows(nodes: Nodes, channels: Sequence[str], output: str) -> str:
+    """Arrays ``(time, batch)`` as ``(time, n, batch)``."""
+    middle = nodes.integers([1])
+    rows = [nodes.add("Unsqueeze", [channel, middle], f"{output}_{i}") for i, channel in enumerate(channels)]
+    return rows[0] if len(rows) == 1 else nodes.add("Concat", rows, output, axis=1)
 
 
-def _flags(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> None:
+def _flags(nodes: Nodes, surrogate: Surrogate, inputs: Sequence[str], made: Sequence[Made]) -> None:
     """The flags of all samples, after the loops."""
-    channels = _channels(nodes, "u", [f"u{i}_seen" for i in range(len(surrogate.inputs))])
     outside, lost = [], []
-    for i, (port, channel) in enumerate(zip(surrogate.inputs, channels, strict=True)):
+    for i, (port, channel) in enumerate(zip(surrogate.inputs, inputs, strict=True)):
         if port.range is not None:
             low, high = nodes.numbers(f"declared_low{i}", port.low), nodes.numbers(f"declared_high{i}", port.high)
             outside.append(nodes.add("Less", [channel, low], f"u{i}_below"))
             outside.append(nodes.add("Greater", [channel, high], f"u{i}_above"))
         lost.append(nodes.add("IsNaN", [channel], f"u{i}_lost"))
+    scaled = [number for one in made for number in one.scaled]
     lost += [nodes.add("IsNaN", [output], f"y{k}_lost") for k, output in enumerate(scaled)]
     causes = {
         Flag.OUTSIDE_RANGE: outside,
-        Flag.AT_BOUND: held_outputs(nodes, surrogate, scaled),
+        Flag.AT_BOUND: held_outputs(nodes, surrogate, made),
         Flag.NOT_A_NUMBER: lost,
+        Flag.AT_LIMIT: [name for one in made for name in one.limited],
     }
     bits = []
     for flag, raised in causes.items():
@@ -140,100 +270,3 @@ def _flags(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> None:
     for i, bit in enumerate(bits[1:]):
         total = nodes.add("Add", [total, bit], f"flags_{i}")
     nodes.add("Unsqueeze", [total, nodes.integers([-1])], "flags")
-
-
-def _input_columns(lags: Lags) -> list[tuple[int, int, int]]:
-    """Every input regressor as (lag, input, its place in the model), by lag, the order in which they are cut out."""
-    pairs = [(lag, i) for i, lags_i in enumerate(lags.inputs) for lag in lags_i]
-    return sorted((lag, i, place) for place, (lag, i) in enumerate(pairs))
-
-
-def _with_past(nodes: Nodes, layout: StateLayout, scaled: str, state: str, longest: int) -> str:
-    """The inputs with ``longest`` samples before them, oldest first: ``(longest + time, batch, n_inputs)``."""
-    if longest == 0:
-        return scaled
-    # An input with a shorter line is filled up with its oldest sample, which no regressor reads.
-    lags = range(longest, 0, -1)
-    columns = [line.column(min(lag, line.length)) if line.length else 0 for lag in lags for line in layout.inputs]
-    past = nodes.add("Gather", [state, nodes.integers(columns)], "past_inputs_by_car", axis=1)
-    shape = nodes.integers([0, longest, len(layout.inputs)])
-    past = nodes.add("Reshape", [past, shape], "past_inputs_table")
-    past = nodes.add("Transpose", [past], "past_inputs", perm=[1, 0, 2])
-    return nodes.add("Concat", [past, scaled], "u_with_past", axis=0)
-
-
-def _input_regressors(
-    nodes: Nodes, columns: list[tuple[int, int, int]], history: str, n_inputs: int, longest: int
-) -> str:
-    """The input regressors of all samples, ``(time, batch, n_columns)``."""
-    lags = sorted({lag for lag, _, _ in columns} or {0})
-    cuts = []
-    for lag in lags:
-        bounds = [nodes.integers([longest - lag]), nodes.integers([-lag if lag else TO_END]), nodes.integers([0])]
-        cuts.append(nodes.add("Slice", [history, *bounds], f"u_lag_{lag}"))
-    table = nodes.add("Concat", cuts, "u_lagged", axis=2)
-    if not columns:
-        # The loop needs something to run over; zeros, because an input that the model does not read may be NaN.
-        shape = nodes.add("Shape", [table], "u_lagged_shape")
-        zero = numpy_helper.from_array(np.zeros(1, dtype=nodes.dtype))
-        return nodes.add("ConstantOfShape", [shape], "nothing_used", value=zero)
-    if len(columns) == len(lags) * n_inputs:
-        return table
-    used = nodes.integers([lags.index(lag) * n_inputs + i for lag, i, _ in columns])
-    return nodes.add("Gather", [table, used], "u_used", axis=2)
-
-
-def _state_out(nodes: Nodes, layout: StateLayout, history: str, longest: int) -> str:
-    """The state after the last sample, from the ends of the inputs and of the output."""
-    ends, n_inputs = [f"{nodes.prefix}output_line_end"], len(layout.inputs)
-    columns = [lag - 1 for lag in range(1, layout.output.length + 1)]
-    if longest:
-        back = [nodes.integers([-1]), nodes.integers([-longest - 1]), nodes.integers([0]), nodes.integers([-1])]
-        newest = nodes.add("Slice", [history, *back], "inputs_end")
-        newest = nodes.add("Transpose", [newest], "inputs_end_by_car", perm=[1, 0, 2])
-        flat = nodes.integers([0, longest * n_inputs])
-        ends.insert(0, nodes.add("Reshape", [newest, flat], "inputs_end_row"))
-        inputs = [(lag * n_inputs) + i for i, line in enumerate(layout.inputs) for lag in range(line.length)]
-        columns = [*inputs, *(longest * n_inputs + column for column in columns)]
-    row = nodes.add("Concat", ends, "ends", axis=1)
-    return nodes.add("Gather", [row, nodes.integers(columns)], "state_out", axis=1)
-
-
-def _scan_body(stage: Stage, columns: list[tuple[int, int, int]], length: int, outer: Nodes) -> Any:
-    """One step: the output's past and the input regressors in, the shifted past and the output out."""
-    recursion, nodes = stage.recursion, Nodes(outer.dtype, prefix=f"{outer.prefix}body_")
-    lags, past, x = recursion.lags, f"{nodes.prefix}past", f"{nodes.prefix}x"
-    if lags.output:
-        lagged = past
-        if lags.output != tuple(range(1, length + 1)):
-            lagged = nodes.add("Gather", [past, nodes.integers([lag - 1 for lag in lags.output])], "lagged", axis=1)
-        x = nodes.add("Concat", [x, lagged], "regressors", axis=1)
-    W, w = (_by_column(table, columns, lags) for table in (recursion.hidden_weights, recursion.linear[np.newaxis]))
-    if recursion.neurons:
-        hidden = nodes.add(
-            "Gemm", [x, nodes.numbers("W", W.T), nodes.numbers("b", recursion.hidden_bias)], "hidden_sum"
-        )
-        hidden = nodes.add("Tanh", [hidden], "hidden")
-        # Side by side, neurons and regressors reach the output in one product.
-        x = nodes.add("Concat", [hidden, x], "neurons_and_regressors", axis=1)
-        w = np.concatenate([recursion.readout[np.newaxis], w], axis=1)
-    constant = nodes.numbers("c", [recursion.constant])
-    output = clipped(nodes, nodes.add("Gemm", [x, nodes.numbers("v_and_w", w.T), constant], "output"), stage)
-    span = [nodes.integers([0]), nodes.integers([length - 1]), nodes.integers([1])]
-    nodes.add("Concat", [output, nodes.add("Slice", [past, *span], "kept")], "past_out", axis=1)
-    n_columns = len(columns) or lags.n_inputs
-    return nodes.graph(
-        "one_step",
-        [nodes.value("past", ["batch", length]), nodes.value("x", ["batch", n_columns])],
-        [
-            nodes.value("past_out", ["batch", length]),
-            nodes.value(output.removeprefix(nodes.prefix), ["batch", 1]),
-        ],
-    )
-
-
-def _by_column(table: NDArray[np.float64], columns: list[tuple[int, int, int]], lags: Lags) -> NDArray[np.float64]:
-    """Weights ``(n, n_regressors)`` in the order of the columns; zeros for inputs that the model does not read."""
-    places = [place for _, _, place in columns]
-    inputs = table[:, places] if columns else np.zeros((len(table), lags.n_inputs))
-    return np.concatenate([inputs, table[:, lags.n_regressors - len(lags.output) :]], axis=1)

@@ -1,19 +1,45 @@
-"""One step of a surrogate as an ONNX graph: sample and state in, output, next state and flags out."""
+"""One step of a surrogate as an ONNX graph: sample and state in, outputs, next state and flags out."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
+from sysid.export.cell import Cell, LinearCell
 from sysid.export.flags import MEANING, Flag
+from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.surrogate import Port, Stage, Surrogate
-from sysid.models import AbstractForm, StateSpace
+from sysid.export.rates import RateForm
+from sysid.export.surrogate import Port, Side, Stage, Surrogate
+from sysid.models import StateSpace
 
 STATE_TEXT = "past samples, scaled; the layout stands in model.json under state"
 FLAGS_TEXT = "the sum of: " + "; ".join(f"{int(flag)}: {text}" for flag, text in MEANING.items())
+INT32 = 6
+"""``TensorProto.INT32``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """The names of what a stage gives.
+
+    Args:
+        scaled: Its outputs in scaled numbers, all in one value or each in one.
+        state: Its state afterwards.
+        remainder: What rounding took from the newest numbers of its state; ``None`` where that is not kept.
+        limited: Where an output is at a declared limit.
+        outputs: Its outputs in their units, all in one value.
+    """
+
+    scaled: tuple[str, ...]
+    state: str
+    remainder: str | None = None
+    limited: tuple[str, ...] = ()
+    outputs: str = ""
 
 
 def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
@@ -30,72 +56,143 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         The ``GraphProto``.
     """
     nodes = Nodes(dtype)
-    _flags(nodes, surrogate, run_stages(nodes, surrogate, _stage))
+    known, made = "u", []
+    for k, stage in enumerate(surrogate.stages):
+        part = stage_part(nodes, surrogate, k)
+        inputs = known
+        n_known = stage.targets[0]
+        if stage.sources != tuple(range(n_known)):
+            inputs = part.add("Gather", [known, nodes.integers(list(stage.sources))], "u", axis=-1)
+        add_stage = _linear_stage if isinstance(stage.cell, LinearCell) else _stage
+        one = add_stage(part, stage, inputs, *stage_state(part, surrogate, stage))
+        made.append(_within_limits(part, stage, one, known))
+        if k + 1 < len(surrogate.stages):
+            known = part.add("Concat", [known, made[-1].outputs], "known", axis=-1)
+    nodes.add("Concat", [one.outputs for one in made], "y", axis=-1)
+    join_states(nodes, made)
+    _flags(nodes, surrogate, made)
     return nodes.graph("step", *ends(nodes, surrogate, ["batch"]))
 
 
-def run_stages(nodes: Nodes, surrogate: Surrogate, stage_nodes: Any) -> list[str]:
-    """Lay the stages one behind the other, up to the graph's outputs ``y`` and ``state_out``.
+def stage_part(nodes: Nodes, surrogate: Surrogate, k: int) -> Nodes:
+    """The same graph with the names of a stage."""
+    return nodes.within("" if len(surrogate.stages) == 1 else f"stage{k}_")
+
+
+def stage_state(nodes: Nodes, surrogate: Surrogate, stage: Stage) -> tuple[str, str | None]:
+    """A stage's own state and its remainder; ``None`` where it keeps none.
 
     Args:
         nodes: The graph.
-        surrogate: What to write.
-        stage_nodes: Adds one stage, from the names of its inputs and its state to those of its scaled output, its
-            output ``y`` and its ``state_out``.
+        surrogate: The whole.
+        stage: The stage.
 
     Returns:
-        The names of the scaled outputs.
+        Their names, both with the cars as first axis.
     """
-    alone = len(surrogate.stages) == 1
-    known, outputs, states, scaled = "u", [], [], []
-    for k, stage in enumerate(surrogate.stages):
-        part = nodes.within("" if alone else f"stage{k}_")
-        inputs, state = known, "state"
-        if stage.sources != tuple(range(len(surrogate.inputs) + k)):
-            inputs = part.add("Gather", [known, nodes.integers(list(stage.sources))], "u", axis=-1)
-        if not alone:
-            bounds = [nodes.integers([at]) for at in (stage.first, stage.first + stage.state.size, 1)]
-            state = part.add("Slice", ["state", *bounds], "state")
-        y_scaled, y, state_out = stage_nodes(part, stage, inputs, state)
-        scaled.append(y_scaled)
-        outputs.append(y)
-        states.append(state_out)
-        if k + 1 < len(surrogate.stages):
-            known = part.add("Concat", [known, y], "known", axis=-1)
-    if not alone:
-        nodes.add("Concat", outputs, "y", axis=-1)
-        nodes.add("Concat", states, "state_out", axis=1)
-    return scaled
+    state = _cut(nodes, surrogate, stage.first, stage.state.size, "own_state")
+    if nodes.dtype != np.float32 or not stage.remainders:
+        return state, None
+    return state, _cut(nodes, surrogate, surrogate.state_size + stage.first_remainder, stage.remainders, "remainder")
 
 
-def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str) -> tuple[str, str, str]:
-    if isinstance(stage.form, StateSpace):
-        return _linear_stage(nodes, stage, stage.form, inputs, state)
-    layout, recursion = stage.layout, stage.recursion
-    scaled = scaled_inputs(nodes, inputs, recursion)
+def _cut(nodes: Nodes, surrogate: Surrogate, first: int, size: int, name: str) -> str:
+    """Some columns of the state; no node where they are all."""
+    if size == surrogate.state_length(nodes.dtype):
+        return "state"
+    bounds = [nodes.integers([at]) for at in (first, first + size, 1)]
+    return nodes.add("Slice", ["state", *bounds], name)
+
+
+def join_states(nodes: Nodes, made: Sequence[Made]) -> None:
+    """Lay the stages' states end to end as ``state_out``, the remainders after them."""
+    states = [one.state for one in made] + [one.remainder for one in made if one.remainder]
+    nodes.add("Concat", states, "state_out", axis=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Draft:
+    """What a stage gives before its declared limits.
+
+    Args:
+        scaled: Its outputs in scaled numbers.
+        following: Adds its state afterwards, from its outputs as they are held in the end.
+        remainder: As in :class:`Made`.
+    """
+
+    scaled: str
+    following: Callable[[str], str]
+    remainder: str | None
+
+
+def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str | None) -> _Draft:
+    cell, layout = stage.lagged
+    form = RateForm.of(cell)
+    scaled = scaled_inputs(nodes, inputs, cell)
     known = nodes.add("Concat", [scaled, state], "inputs_and_state", axis=1)
-    columns = nodes.integers(layout.regressor_columns(recursion.lags))
-    regressors = nodes.add("Gather", [known, columns], "regressors", axis=1)
-    linear = nodes.numbers("w", recursion.linear[:, np.newaxis])
-    constant = nodes.numbers("c", [recursion.constant])
-    total = nodes.add("Gemm", [regressors, linear, constant], "linear_part")
-    if recursion.neurons:
-        weights, bias = nodes.numbers("W", recursion.hidden_weights.T), nodes.numbers("b", recursion.hidden_bias)
-        hidden = nodes.add("Tanh", [nodes.add("Gemm", [regressors, weights, bias], "hidden_sum")], "hidden")
-        readout = nodes.numbers("v", recursion.readout[:, np.newaxis])
-        total = nodes.add("Gemm", [hidden, readout, total], "network")
-    output = clipped(nodes, total, stage)
-    everything = nodes.add("Concat", [scaled, output, state], "inputs_output_and_state", axis=1)
-    state_out = nodes.add("Gather", [everything, nodes.integers(layout.next_columns())], "state_out", axis=1)
-    return output, unscaled_output(nodes, output, recursion), state_out
+    terms, order = _terms(nodes, layout, form, known)
+    linear = [nodes.numbers("w", form.linear[:, order].T), nodes.numbers("c", cell.constant)]
+    output = nodes.add("Gemm", [terms, *linear], "linear_part")
+    if cell.neurons:
+        hidden = [nodes.numbers("W", form.hidden_weights[:, order].T), nodes.numbers("b", cell.hidden_bias)]
+        neurons = nodes.add("Tanh", [nodes.add("Gemm", [terms, *hidden], "hidden_sum")], "hidden")
+        output = nodes.add("Gemm", [neurons, nodes.numbers("V", cell.readout.T), output], "network")
+    lost = None
+    if cell.adds:
+        columns = nodes.integers([layout.column(cell.n_inputs + j, 1) for j in range(cell.n_outputs)])
+        output, lost = added(nodes, nodes.add("Gather", [known, columns], "last", axis=1), output, remainder)
+
+    def following(held: str) -> str:
+        together = nodes.add("Concat", [scaled, held, state], "inputs_outputs_and_state", axis=1)
+        return nodes.add("Gather", [together, nodes.integers(layout.next_columns())], "next_state", axis=1)
+
+    return _Draft(scaled=clipped(nodes, output, stage), following=following, remainder=lost)
 
 
-def _linear_stage(nodes: Nodes, stage: Stage, form: StateSpace, inputs: str, state: str) -> tuple[str, str, str]:
-    scaled = scaled_inputs(nodes, inputs, form)
+def _terms(nodes: Nodes, layout: StateLayout, form: RateForm, known: str) -> tuple[str, list[int]]:
+    """Levels, then rates, of ``[scaled inputs | state]``, and the place of each in the form."""
+    terms = (*form.inputs, *form.outputs)
+    levels = [i for i, term in enumerate(terms) if term.older is None]
+    rates = [i for i, term in enumerate(terms) if term.older is not None]
+    picked = nodes.integers([layout.column(terms[i].channel, terms[i].lag) for i in levels])
+    parts = [nodes.add("Gather", [known, picked], "levels", axis=1)]
+    if not rates:
+        return parts[0], levels
+    newer, older = (
+        nodes.add("Gather", [known, nodes.integers(columns)], name, axis=1)
+        for name, columns in (
+            ("newer", [layout.column(terms[i].channel, terms[i].lag) for i in rates]),
+            ("older", [layout.column(terms[i].channel, terms[i].older or 0) for i in rates]),
+        )
+    )
+    return nodes.add("Concat", [*parts, nodes.add("Sub", [newer, older], "rates")], "terms", axis=1), levels + rates
+
+
+def added(nodes: Nodes, last: str, change: str, remainder: str | None) -> tuple[str, str | None]:
+    """The sum of last numbers and their change.
+
+    Args:
+        nodes: The graph.
+        last: The last numbers.
+        change: What is added to them.
+        remainder: What rounding took from the last numbers; ``None`` where it is not kept.
+
+    Returns:
+        The numbers, and what rounding takes from them.
+    """
+    if remainder is None:
+        return nodes.add("Add", [last, change], "sum"), None
+    whole = nodes.add("Add", [change, remainder], "whole_change")
+    total = nodes.add("Add", [last, whole], "sum")
+    return total, nodes.add("Sub", [whole, nodes.add("Sub", [total, last], "moved")], "lost")
+
+
+def _linear_stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str | None) -> _Draft:
+    scaled = scaled_inputs(nodes, inputs, stage.cell)
     known = nodes.add("Concat", [state, scaled], "state_and_inputs", axis=1)
-    output, state_out = linear_step(nodes, form, known)
-    output = clipped(nodes, output, stage)
-    return output, unscaled_output(nodes, output, form), state_out
+    output, change = linear_step(nodes, stage.space, known)
+    following, lost = added(nodes, state, change, remainder)
+    return _Draft(scaled=clipped(nodes, output, stage), following=lambda _: following, remainder=lost)
 
 
 def linear_step(nodes: Nodes, form: StateSpace, known: str) -> tuple[str, str]:
@@ -107,13 +204,47 @@ def linear_step(nodes: Nodes, form: StateSpace, known: str) -> tuple[str, str]:
         known: State and scaled inputs side by side, ``(batch, n_state + n_inputs)``.
 
     Returns:
-        The scaled output ``(batch, 1)`` and the next state.
+        The scaled output ``(batch, 1)``, and what is added to the state: a slow mode is nearly an integrator, so that
+        ``A - 1`` is kept and not ``A``.
     """
     readout = np.concatenate([form.C, form.D])[:, np.newaxis]
-    constant = nodes.numbers("c", [form.constant])
-    output = nodes.add("Gemm", [known, nodes.numbers("C_and_D", readout), constant], "output")
-    matrix = nodes.numbers("A_and_B", np.concatenate([form.A, form.B], axis=1).T)
-    return output, nodes.add("MatMul", [known, matrix], "state_out")
+    output = nodes.add(
+        "Gemm", [known, nodes.numbers("C_and_D", readout), nodes.numbers("c", [form.constant])], "output"
+    )
+    matrix = nodes.numbers("A_and_B", np.concatenate([form.A - np.eye(form.n_state), form.B], axis=1).T)
+    return output, nodes.add("MatMul", [known, matrix], "change")
+
+
+def _within_limits(nodes: Nodes, stage: Stage, draft: _Draft, known: str) -> Made:
+    """The outputs within their declared limits, in scaled numbers and in units, and the state that follows."""
+    cell, scaled, limited = stage.cell, draft.scaled, []
+    outputs = unscaled_outputs(nodes, scaled, cell)
+    if stage.limited:
+        numbers = nodes.split(scaled, [f"scaled_{j}" for j in range(cell.n_outputs)])
+        values = nodes.split(outputs, [f"output_{j}" for j in range(cell.n_outputs)])
+        for j, sides in enumerate(stage.limits):
+            for side in sides:
+                part = nodes.within(f"{nodes.prefix}limit{j}_{'high' if side.upper else 'low'}_")
+                limit = _limit(part, stage, side, values, known)
+                offset, scale = cell.offset[cell.n_inputs + j], cell.scale[cell.n_inputs + j]
+                centred = part.add("Sub", [limit, part.numbers("offset", offset)], "centred")
+                number = part.add("Div", [centred, part.numbers("scale", scale)], "scaled")
+                beyond = part.add("Greater" if side.upper else "Less", [values[j], limit], "beyond")
+                numbers[j] = part.add("Where", [beyond, number, numbers[j]], "number")
+                values[j] = part.add("Where", [beyond, limit, values[j]], "value")
+                limited.append(part.add("Equal", [values[j], limit], "reached"))
+        scaled = nodes.add("Concat", numbers, "scaled_within_limits", axis=1)
+        outputs = nodes.add("Concat", values, "outputs_within_limits", axis=1)
+    state = draft.following(scaled)
+    return Made(scaled=(scaled,), outputs=outputs, state=state, remainder=draft.remainder, limited=tuple(limited))
+
+
+def _limit(nodes: Nodes, stage: Stage, side: Side, values: Sequence[str], known: str) -> str:
+    if side.column is None:
+        return nodes.numbers("limit", [[side.value]])
+    if side.column in stage.targets:
+        return values[stage.targets.index(side.column)]
+    return nodes.add("Gather", [known, nodes.integers([side.column])], "channel", axis=1)
 
 
 def ends(nodes: Nodes, surrogate: Surrogate, leading: list[str]) -> tuple[list[Any], list[Any]]:
@@ -127,7 +258,7 @@ def ends(nodes: Nodes, surrogate: Surrogate, leading: list[str]) -> tuple[list[A
     Returns:
         Those of the inputs, and those of the outputs.
     """
-    size = surrogate.state_size
+    size = surrogate.state_length(nodes.dtype)
     inputs, outputs = surrogate.inputs, surrogate.outputs
     return (
         [
@@ -146,29 +277,29 @@ def _channels(ports: tuple[Port, ...]) -> str:
     return ", ".join(f"{port.name} [{port.unit}]" for port in ports)
 
 
-def scaled_inputs(nodes: Nodes, inputs: str, recursion: AbstractForm) -> str:
+def scaled_inputs(nodes: Nodes, inputs: str, cell: Cell | LinearCell) -> str:
     """Inputs in the model's numbers, scaled on the last axis."""
-    offset = nodes.numbers("input_offset", recursion.scaling.input_offset)
-    scale = nodes.numbers("input_scale", recursion.scaling.input_scale)
+    offset = nodes.numbers("input_offset", cell.offset[: cell.n_inputs])
+    scale = nodes.numbers("input_scale", cell.scale[: cell.n_inputs])
     return nodes.add("Div", [nodes.add("Sub", [inputs, offset], "u_centred"), scale], "u_scaled")
 
 
-def unscaled_output(nodes: Nodes, output: str, recursion: AbstractForm, name: str = "y") -> str:
-    """The stage's output in its unit."""
-    scale = nodes.numbers("output_scale", recursion.scaling.output_scale)
-    offset = nodes.numbers("output_offset", recursion.scaling.output_offset)
-    return nodes.add("Add", [nodes.add("Mul", [output, scale], "y_centred"), offset], name)
+def unscaled_outputs(nodes: Nodes, scaled: str, cell: Cell | LinearCell) -> str:
+    """The stage's outputs in their units, on the last axis."""
+    scale = nodes.numbers("output_scale", cell.scale[cell.n_inputs :])
+    offset = nodes.numbers("output_offset", cell.offset[cell.n_inputs :])
+    return nodes.add("Add", [nodes.add("Mul", [scaled, scale], "y_centred"), offset], "in_units")
 
 
 def clipped(nodes: Nodes, output: str, stage: Stage) -> str:
-    """The output within its bounds; no node where there are none. NaN stays NaN, as in the model."""
+    """Outputs within the model's own bounds; no node where there are none. NaN stays NaN, as in the model."""
     if not stage.bounded:
         return output
-    low, high = nodes.numbers("low", stage.form.low), nodes.numbers("high", stage.form.high)
+    low, high = nodes.numbers("low", stage.cell.low), nodes.numbers("high", stage.cell.high)
     return nodes.add("Clip", [output, low, high], "bounded")
 
 
-def _flags(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> None:
+def _flags(nodes: Nodes, surrogate: Surrogate, made: Sequence[Made]) -> None:
     """The flags of a sample, with few nodes: in one step a node costs more than its arithmetic."""
     low, high = ([getattr(port, side) for port in surrogate.inputs] for side in ("low", "high"))
     below = nodes.add("Less", ["u", nodes.numbers("declared_low", low)], "u_below")
@@ -176,8 +307,9 @@ def _flags(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> None:
     known = nodes.add("Concat", ["u", "y"], "u_and_y", axis=-1)
     raised = {
         Flag.OUTSIDE_RANGE: [nodes.add("Or", [below, above], "u_outside")],
-        Flag.AT_BOUND: held_outputs(nodes, surrogate, scaled),
+        Flag.AT_BOUND: held_outputs(nodes, surrogate, made),
         Flag.NOT_A_NUMBER: [nodes.add("IsNaN", [known], "u_and_y_lost")],
+        Flag.AT_LIMIT: [name for one in made for name in one.limited],
     }
     bits = []
     for flag, causes in raised.items():
@@ -188,20 +320,16 @@ def _flags(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> None:
             bits.append(part.add("Mul", [whole, part.whole(int(flag))], "bit"))
     last = bits[0]
     for i, bit in enumerate(bits[1:], start=2):
-        last = nodes.add("Add", [last, bit], "flags" if i == len(bits) else "flags_but_last")
+        last = nodes.add("Add", [last, bit], "flags" if i == len(bits) else f"flags_{i}")
 
 
-def held_outputs(nodes: Nodes, surrogate: Surrogate, scaled: list[str]) -> list[str]:
-    """Where the output of each bounded stage is at a bound."""
+def held_outputs(nodes: Nodes, surrogate: Surrogate, made: Sequence[Made]) -> list[str]:
+    """Where the outputs of each bounded stage are at a bound of the model itself."""
     held = []
-    for k, (stage, output) in enumerate(zip(surrogate.stages, scaled, strict=True)):
-        if stage.bounded:
-            part, recursion = nodes.within(f"held{k}_"), stage.recursion
-            low = part.add("LessOrEqual", [output, part.numbers("low", recursion.low)], "at_low")
-            high = part.add("GreaterOrEqual", [output, part.numbers("high", recursion.high)], "at_high")
+    for k, (stage, one) in enumerate(zip(surrogate.stages, made, strict=True)):
+        for j, output in enumerate(one.scaled if stage.bounded else ()):
+            part, cell = nodes.within(f"held{k}_{j}_"), stage.cell
+            low = part.add("LessOrEqual", [output, part.numbers("low", cell.low)], "at_low")
+            high = part.add("GreaterOrEqual", [output, part.numbers("high", cell.high)], "at_high")
             held.append(part.add("Or", [low, high], "at_bound"))
     return held
-
-
-INT32 = 6
-"""``TensorProto.INT32``."""

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from sysid.errors import ParityError
 from sysid.export.exporter import ExportedFile, Runner
 from sysid.export.exporters import exporter
-from sysid.export.layout import layout_of
 from sysid.export.surrogate import Surrogate
-from sysid.models import AbstractModel, History, Start
-from sysid.traces import TraceSet
+from sysid.models import AbstractModel, Cascade, History, Start
+from sysid.traces import Trace, TraceSet
 
 RANDOM_SEQUENCES = 100
 RANDOM_SAMPLES = 400
@@ -83,45 +82,68 @@ class Parity:
         }
 
 
-def parity_cases(model: AbstractModel, traces: TraceSet, start: Start) -> tuple[ParityCase, ...]:
-    """The model's free run on every trace.
+def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[ParityCase, ...]:
+    """The free run of the model or cascade on every trace.
 
     Args:
-        model: The model.
-        traces: The cases.
-        start: How each free run begins.
+        surrogate: What is exported.
+        traces: The cases; a cascade's need its inputs alone.
+        start: How each free run of a single model begins; a cascade begins at rest.
 
     Returns:
         One case per trace.
 
     Raises:
-        ChannelError: If a trace lacks a channel of the mapping.
+        ChannelError: If a trace lacks a channel.
         TraceError: If a trace is not longer than its measured start.
     """
-    cases, layout = [], layout_of(model)
-    change = DISTURBANCE * model.recursion.scaling.output_scale
-    for trace in traces:
-        inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
-        history = start.history(inputs, target, model.rest_output)
-        inputs = inputs[start.n_measured :]
-        output = model.simulate(inputs, history)
-        disturbed = model.simulate(inputs, History(inputs=history.inputs, output=history.output + change))
-        cases.append(
-            ParityCase(
-                name=trace.name,
-                inputs=inputs,
-                state=layout.from_history(history),
-                output=output[:, np.newaxis],
-                amplification=largest_difference(disturbed, output) / change,
-            )
-        )
-    return tuple(cases)
+    if isinstance(surrogate.source, Cascade):
+        names = tuple(port.name for port in surrogate.inputs)
+        return tuple(_from_rest(surrogate, trace.name, trace.columns(names)) for trace in traces)
+    return tuple(_from_history(surrogate, surrogate.source, trace, start) for trace in traces)
+
+
+def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, start: Start) -> ParityCase:
+    inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
+    history = start.history(inputs, target, model.rest_output)
+    inputs = inputs[start.n_measured :]
+    output, change = model.simulate(inputs, history), float(_disturbances(surrogate)[0])
+    disturbed = model.simulate(inputs, History(inputs=history.inputs, output=history.output + change))
+    return ParityCase(
+        name=trace.name,
+        inputs=inputs,
+        state=surrogate.stages[0].state.from_history(history),
+        output=output[:, np.newaxis],
+        amplification=largest_difference(disturbed, output) / change,
+    )
+
+
+def _from_rest(surrogate: Surrogate, name: str, inputs: NDArray[np.float64]) -> ParityCase:
+    change = _disturbances(surrogate)
+    output = surrogate.simulate(inputs)
+    levels = surrogate.levels(inputs[0])[len(surrogate.inputs) :]
+    disturbed = surrogate.simulate(inputs, rest_outputs=levels + change)
+    return ParityCase(
+        name=name,
+        inputs=inputs,
+        state=surrogate.at_rest(inputs[0]),
+        output=output,
+        amplification=largest_difference(disturbed / change, output / change),
+    )
+
+
+def _disturbances(surrogate: Surrogate) -> NDArray[np.float64]:
+    scales = [scale for stage in surrogate.stages for scale in stage.cell.scale[stage.cell.n_inputs :]]
+    return DISTURBANCE * np.array(scales)
 
 
 def random_cases(
     surrogate: Surrogate, *, sequences: int = RANDOM_SEQUENCES, samples: int = RANDOM_SAMPLES, seed: int = RANDOM_SEED
 ) -> tuple[ParityCase, ...]:
     """The models' free runs from rest on random inputs within the declared ranges: steps, ramps and noise.
+
+    The inputs are numbers that float32 can hold, so that a difference is the file's doing: a network that follows
+    rates a thousand times as strongly as levels makes more of the rounding of its inputs alone than is allowed here.
 
     Args:
         surrogate: What is exported. An input without a declared range moves over its scaling's (offset plus and
@@ -135,29 +157,25 @@ def random_cases(
     """
     rng = np.random.default_rng(seed)
     low, high = _ranges(surrogate)
-    change = DISTURBANCE * np.array([stage.form.scaling.output_scale for stage in surrogate.stages])
+    # A bound of the range that float32 cannot hold must not be overstepped by its rounding.
+    least, most = (np.asarray(bound, dtype=np.float32) for bound in (low, high))
+    least, most = (
+        np.where(least < low, np.nextafter(least, np.float32(np.inf)), least),
+        np.where(most > high, np.nextafter(most, np.float32(-np.inf)), most),
+    )
     cases = []
     for number in range(sequences):
-        inputs = low + (high - low) * _excitation(rng, samples, len(low))
-        output = surrogate.simulate(inputs)
-        disturbed = surrogate.simulate(inputs, rest_outputs=surrogate.rest_outputs + change)
-        cases.append(
-            ParityCase(
-                name=f"random {number + 1}",
-                inputs=inputs,
-                state=surrogate.at_rest(inputs[0]),
-                output=output,
-                amplification=largest_difference(disturbed / change, output / change),
-            )
-        )
+        drawn = (low + (high - low) * _excitation(rng, samples, len(low))).astype(np.float32)
+        inputs = np.clip(drawn, least, most).astype(np.float64)
+        cases.append(_from_rest(surrogate, f"random {number + 1}", inputs))
     return tuple(cases)
 
 
 def _ranges(surrogate: Surrogate) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     scale: dict[int, tuple[float, float]] = {}
     for stage in surrogate.stages:
-        scaling = stage.form.scaling
-        for column, offset, half in zip(stage.sources, scaling.input_offset, scaling.input_scale, strict=True):
+        cell = stage.cell
+        for column, offset, half in zip(stage.sources, cell.offset, cell.scale, strict=False):
             scale.setdefault(column, (offset - half, offset + half))
     ranges = [port.range or scale[i] for i, port in enumerate(surrogate.inputs)]
     return np.array([low for low, _ in ranges]), np.array([high for _, high in ranges])

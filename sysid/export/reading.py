@@ -15,7 +15,7 @@ from typing import Any
 from sysid.errors import BundleError, SysidError
 from sysid.export.bundle import Bundle, bundle_files
 from sysid.export.manifest import MANIFEST, SCHEMA_VERSION, manifest_digest
-from sysid.models import AbstractModel, model_from_dict
+from sysid.models import AbstractModel, Cascade, cascade_from_dict, model_from_dict
 
 LARGEST = 1 << 30
 """Bytes; a file that says it unpacks to more is not a bundle's."""
@@ -31,7 +31,7 @@ def read_bundle(folder: Path) -> Bundle:
         folder: The bundle's folder, or its zip.
 
     Returns:
-        The model and what ``model.json`` says.
+        The model or cascade, and what ``model.json`` says.
 
     Raises:
         BundleError: If a file is missing, changed or newer than this version can read.
@@ -150,9 +150,12 @@ def _read_manifest(content: _AbstractContent) -> dict[str, Any]:
     return fields
 
 
-def _model(manifest: dict[str, Any], content: _AbstractContent) -> AbstractModel:
+def _model(manifest: dict[str, Any], content: _AbstractContent) -> AbstractModel | Cascade:
+    stored = manifest["model"]
     try:
-        model = model_from_dict(manifest["model"])
+        if stored["structure"].get("kind") == Cascade.kind:
+            return cascade_from_dict(stored)
+        model = model_from_dict(stored)
         model.recursion  # noqa: B018 - it checks that parameters and structure belong together
     except (SysidError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise BundleError(

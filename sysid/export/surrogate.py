@@ -1,8 +1,8 @@
 """What exporters lower: one model, or several wired output to input, as stages run one after the other.
 
-A single model is a surrogate of one stage. A cascade without a loop between its models is several: each stage reads
-inputs of the whole or outputs of earlier stages, in their units, within the same sample. Exporters know stages only,
-so that whatever can be written as stages runs in every format.
+A single model is a surrogate of one stage. A cascade is several: each stage reads inputs of the whole or outputs of
+earlier stages, in their units, within the same sample. Exporters know stages only, so that whatever can be written as
+stages runs in every format. How models are wired is :class:`sysid.models.Cascade`'s to say.
 """
 
 from __future__ import annotations
@@ -11,17 +11,22 @@ import re
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.layout import DelayLine, LinearState, StateLayout, layout_of, recursion_of
-from sysid.models import AbstractForm, AbstractModel, Ends, History, Recursion, Wiring
+from sysid.export.cell import Cell, LinearCell, cell_of
+from sysid.export.layout import DelayLine, LinearState, StateLayout, layout_of
+from sysid.models import AbstractModel, Cascade, History, Limit, StateSpace
+from sysid.models.wiring import Member, Wiring
 
 Range = tuple[float, float]
 """Least and greatest value, in the channel's unit."""
+Level = float | str
+"""A value at rest, or the input whose first sample it is."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +37,8 @@ class Port:
         name: Name of the channel.
         unit: Its unit.
         identifier: The name as a lower-case C identifier.
+        level: Its value before the first sample, or the name of the input whose first sample it is; an input's own
+            name is the usual case.
         range: The values that an input is declared for; ``None`` where nothing is declared.
         start: The value of an input that nobody sets.
     """
@@ -39,6 +46,7 @@ class Port:
     name: str
     unit: str
     identifier: str
+    level: Level
     range: Range | None = None
     start: float = 0.0
 
@@ -53,6 +61,21 @@ class Port:
         return np.inf if self.range is None else self.range[1]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """One declared limit of an output.
+
+    Args:
+        upper: Whether the output may not be above it; below it otherwise.
+        value: The limit in the channel's unit, where it is not a channel.
+        column: The channel that is the limit, in ``[inputs of the whole | outputs]``; ``None`` where it is a value.
+    """
+
+    upper: bool
+    value: float = 0.0
+    column: int | None = None
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
     """One model of a surrogate.
@@ -60,37 +83,58 @@ class Stage:
     Args:
         model: The model.
         sources: For each of its inputs the column in ``[inputs of the whole | outputs of earlier stages]``.
+        targets: For each of its outputs the column.
+        limits: For each of its outputs the declared limits: the upper before the lower, which wins where they cross.
         first: Where its state begins in the state of the whole.
+        first_remainder: Where its remainders begin among those of the whole, in float32.
     """
 
-    model: AbstractModel
+    model: Member
     sources: tuple[int, ...]
+    targets: tuple[int, ...]
+    limits: tuple[tuple[Side, ...], ...]
     first: int
+    first_remainder: int
 
-    @property
-    def form(self) -> AbstractForm:
-        """The form that is exported."""
-        return self.model.recursion
+    @cached_property
+    def cell(self) -> Cell | LinearCell:
+        """What is written."""
+        return cell_of(self.model)
 
-    @property
-    def recursion(self) -> Recursion:
-        """The form, where it has delay lines (:class:`ConfigError` where it is a state space)."""
-        return recursion_of(self.model)
-
-    @property
+    @cached_property
     def state(self) -> StateLayout | LinearState:
         """The layout of its own state, counted from ``first``."""
         return layout_of(self.model)
 
     @property
-    def layout(self) -> StateLayout:
-        """The layout of its delay lines, counted from ``first``; as for ``recursion``."""
-        return StateLayout.of(self.model)
+    def lagged(self) -> tuple[Cell, StateLayout]:
+        """Cell and layout of a model over lagged regressors."""
+        cell = Cell.of(self.model)
+        return cell, StateLayout.of_cell(cell)
+
+    @property
+    def space(self) -> StateSpace:
+        """The state space of a linear model that is one."""
+        if isinstance(self.cell, LinearCell):
+            return self.cell.form
+        raise ConfigError("not a state space", got=self.cell.ends.outputs)
+
+    @property
+    def remainders(self) -> int:
+        """Numbers more in its state in float32: what rounding took from its newest numbers, for the next step."""
+        if isinstance(self.cell, LinearCell):
+            return self.state.size
+        return self.cell.n_outputs if self.cell.adds else 0
 
     @property
     def bounded(self) -> bool:
-        """Whether its output is held within bounds."""
-        return bool(np.isfinite(self.form.low) or np.isfinite(self.form.high))
+        """Whether its outputs are held within bounds of the model itself."""
+        return bool(np.isfinite(self.cell.low) or np.isfinite(self.cell.high))
+
+    @property
+    def limited(self) -> bool:
+        """Whether an output has a declared limit."""
+        return any(self.limits)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,41 +142,28 @@ class Surrogate:
     """Stages and what goes in.
 
     Args:
+        source: The model or cascade that is written.
         inputs: What goes in.
-        stages: In the order in which they run; the output of each is an output of the whole.
+        outputs: What comes out, in the order in which it is computed.
+        stages: In the order in which they run.
     """
 
+    source: AbstractModel | Cascade
     inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
     stages: tuple[Stage, ...]
 
     @classmethod
     def of(
-        cls, model: AbstractModel, ranges: Dict[str, Range] | None = None, starts: Dict[str, float] | None = None
-    ) -> Surrogate:
-        """A single model as a surrogate.
-
-        Args:
-            model: The model.
-            ranges: The values that its inputs are declared for, by channel.
-            starts: The values of inputs that nobody sets, by channel.
-
-        Returns:
-            A surrogate of one stage.
-        """
-        return cls.wired([model], ranges, starts)
-
-    @classmethod
-    def wired(
         cls,
-        models: Sequence[AbstractModel],
+        source: AbstractModel | Cascade,
         ranges: Dict[str, Range] | None = None,
         starts: Dict[str, float] | None = None,
     ) -> Surrogate:
-        """Models wired by the names of their channels.
+        """A model or a cascade as a surrogate.
 
         Args:
-            models: In any order that :class:`~sysid.models.Wiring` can put right: a model reads another's output under
-                its name, and whatever no model computes is an input of the whole.
+            source: What to write.
             ranges: The values that inputs are declared for, by channel.
             starts: The values of inputs that nobody sets, by channel; the middle of their range by default, 0
                 without one.
@@ -141,48 +172,41 @@ class Surrogate:
             The surrogate.
 
         Raises:
-            ConfigError: If there is no model, an output is computed twice, the models read each other in a circle, or
-                sample times or units differ.
+            ConfigError: If a model is of a kind that cannot be written, or models read each other in a circle.
         """
-        wiring = Wiring.of(models)
-        models = [models[i] for i in wiring.order]
+        if isinstance(source, Cascade):
+            models, wiring, limits = source.models, source.wiring, source.limits
+        else:
+            models, wiring, limits = (source,), Wiring.of([source]), {}
         _check_no_circle(models, wiring)
-        units, inputs = wiring.units, wiring.inputs
-        columns = {name: i for i, name in enumerate(wiring.channels)}
-        stages, first = [], 0
-        for model in models:
-            stages.append(
-                Stage(model=model, sources=tuple(columns[name] for name in model.mapping.inputs), first=first)
-            )
-            first += layout_of(model).size
-        identifiers = _identifiers(columns)
         ranges, starts = ranges or {}, starts or {}
-        ports = [
+        identifiers, levels = _identifiers(wiring.channels), _levels(source, wiring)
+        inputs = tuple(
             Port(
                 name=name,
-                unit=units[name],
+                unit=wiring.units[name],
                 identifier=identifiers[name],
+                level=levels[name],
                 range=ranges.get(name),
                 start=starts.get(name, sum(ranges.get(name, (0.0, 0.0))) / 2.0),
             )
-            for name in inputs
-        ]
-        return cls(inputs=tuple(ports), stages=tuple(stages))
+            for name in wiring.inputs
+        )
+        outputs = tuple(
+            Port(name=name, unit=wiring.units[name], identifier=identifiers[name], level=levels[name])
+            for name in wiring.outputs
+        )
+        return cls(source=source, inputs=inputs, outputs=outputs, stages=_stages(models, wiring, limits))
 
     @property
-    def outputs(self) -> tuple[Port, ...]:
-        """The output of every stage."""
-        names = [port.name for port in self.inputs] + [stage.model.mapping.output for stage in self.stages]
-        identifiers = _identifiers(names)
-        models = [stage.model for stage in self.stages]
-        return tuple(
-            Port(name=m.mapping.output, unit=m.output_unit, identifier=identifiers[m.mapping.output]) for m in models
-        )
+    def channels(self) -> tuple[Port, ...]:
+        """Inputs, then outputs."""
+        return (*self.inputs, *self.outputs)
 
     @property
     def sample_time(self) -> float:
         """Seconds."""
-        return self.stages[0].model.sample_time
+        return self.source.sample_time
 
     @property
     def identifier(self) -> str:
@@ -213,49 +237,64 @@ class Surrogate:
         return sum(stage.state.size for stage in self.stages)
 
     @property
-    def rest_outputs(self) -> NDArray[np.float64]:
-        """The declared output at rest of every stage, in its unit, shape ``(n_outputs,)``."""
-        return np.array([stage.model.rest_output for stage in self.stages])
+    def remainders(self) -> int:
+        """Numbers more in the state in float32, at its end; 0 at the beginning of a run."""
+        return sum(stage.remainders for stage in self.stages)
 
-    def at_rest(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The state of a system that has stood at some inputs for ever, its outputs at their declared rest values.
+    def state_length(self, dtype: DTypeLike) -> int:
+        """Length of the state of a file.
 
         Args:
-            inputs: Shape ``(n_inputs,)``, in their units.
+            dtype: Number type of the file.
+
+        Returns:
+            The state's size; in float32 with a place for every remainder.
+        """
+        return self.state_size + (self.remainders if np.dtype(dtype) == np.float32 else 0)
+
+    def levels(self, first: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Every channel before the first sample, as declared.
+
+        Args:
+            first: The inputs' first sample, shape ``(n_inputs,)``.
+
+        Returns:
+            Shape ``(n_inputs + n_outputs,)``, in units.
+        """
+        values = dict(zip((port.name for port in self.inputs), map(float, first), strict=True))
+        return np.array([values[p.level] if isinstance(p.level, str) else p.level for p in self.channels])
+
+    def at_rest(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The state of a system at rest, every channel at its declared level.
+
+        Args:
+            inputs: Their first sample, shape ``(n_inputs,)``, in units.
 
         Returns:
             Shape ``(state_size,)``.
         """
-        known = np.concatenate([np.asarray(inputs, dtype=np.float64), self.rest_outputs])
-        return np.concatenate(
-            [
-                stage.state.from_history(
-                    History.at_rest(inputs=known[list(stage.sources)], output=stage.model.rest_output)
-                )
-                for stage in self.stages
-            ]
-        )
+        levels = self.levels(inputs)
+        return np.concatenate([stage.state.at_rest(levels[[*stage.sources, *stage.targets]]) for stage in self.stages])
 
     def simulate(
         self, inputs: NDArray[np.float64], rest_outputs: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Free run from rest by the models themselves, each fed with what the earlier ones put out.
+        """Free run from rest by the model or cascade itself.
 
         Args:
             inputs: Shape ``(n_samples, n_inputs)``, in their units.
-            rest_outputs: Shape ``(n_outputs,)``; the declared ones by default.
+            rest_outputs: Shape ``(n_outputs,)``; the declared levels by default.
 
         Returns:
             Shape ``(n_samples, n_outputs)``, in their units.
         """
-        known = np.asarray(inputs, dtype=np.float64)
-        rest = np.asarray(self.rest_outputs if rest_outputs is None else rest_outputs, dtype=np.float64)
-        first = np.concatenate([known[0], rest])
-        for k, stage in enumerate(self.stages):
-            history = History.at_rest(inputs=first[list(stage.sources)], output=float(rest[k]))
-            output = stage.model.simulate(known[:, list(stage.sources)], history)
-            known = np.column_stack([known, output])
-        return known[:, len(self.inputs) :]
+        inputs = np.asarray(inputs, dtype=np.float64)
+        rest = self.levels(inputs[0])[len(self.inputs) :] if rest_outputs is None else rest_outputs
+        if isinstance(self.source, Cascade):
+            levels = dict(zip(self.source.outputs, map(float, rest), strict=True))
+            return self.source.simulate(inputs, rest=levels).values[:, len(self.inputs) :]
+        history = History.at_rest(inputs=inputs[0], output=float(rest[0]))
+        return self.source.simulate(inputs, history)[:, np.newaxis]
 
     def state_text(self) -> dict[str, Any]:
         """The state as JSON values, with how to read it."""
@@ -265,23 +304,62 @@ class Surrogate:
             "order": "delay line after delay line; within a line the newest sample first",
             "number": "(value in the channel's unit - offset) / scale",
             "lines": [line.to_dict() for line in self.lines],
+            "remainders_float32": self.remainders,
         }
         return text | ({"state_spaces": [{"first": at, **state.to_dict()} for at, state in spaces]} if spaces else {})
 
 
-def _check_no_circle(models: Sequence[AbstractModel], wiring: Wiring) -> None:
+def _check_no_circle(models: Sequence[Member], wiring: Wiring) -> None:
     """Stages run one after the other; what a later one put out a sample ago is not among their inputs."""
-    back = [str(model.mapping) for model in models if wiring.feeds_back(Ends.of(model))]
+    back = [str(model.mapping) for model in models if wiring.feeds_back(cell_of(model).ends)]
     if back:
         raise ConfigError(
             "models that read each other in a circle cannot be exported as stages",
             expected="models of which each reads inputs and outputs of models before it",
             got=f"{', '.join(back)} read what is computed after them",
-            remedy="export models without a circle",
+            remedy="export models without a circle, or one model of several outputs (VectorNARX) in their place",
         )
 
 
-def _identifiers(names: Sequence[str] | Dict[str, int]) -> dict[str, str]:
+def _stages(models: Sequence[Member], wiring: Wiring, limits: Dict[str, Limit]) -> tuple[Stage, ...]:
+    columns = {name: i for i, name in enumerate(wiring.channels)}
+    stages: list[Stage] = []
+    first = remainder = 0
+    for model in models:
+        ends = cell_of(model).ends
+        stage = Stage(
+            model=model,
+            sources=tuple(columns[name] for name in ends.inputs),
+            targets=tuple(columns[name] for name in ends.outputs),
+            limits=tuple(_sides(limits.get(name, Limit()), columns) for name in ends.outputs),
+            first=first,
+            first_remainder=remainder,
+        )
+        stages.append(stage)
+        first, remainder = first + stage.state.size, remainder + stage.remainders
+    return tuple(stages)
+
+
+def _sides(limit: Limit, columns: Dict[str, int]) -> tuple[Side, ...]:
+    sides = []
+    for upper, value in ((True, limit.high), (False, limit.low)):
+        if isinstance(value, str):
+            sides.append(Side(upper=upper, column=columns[value]))
+        elif value is not None and np.isfinite(value):
+            sides.append(Side(upper=upper, value=float(value)))
+    return tuple(sides)
+
+
+def _levels(source: AbstractModel | Cascade, wiring: Wiring) -> dict[str, Level]:
+    """Every channel's level; an input without a declared one stands at its own first sample."""
+    levels: dict[str, Level] = {name: name for name in wiring.inputs}
+    models = source.models if isinstance(source, Cascade) else (source,)
+    for ends in (cell_of(model).ends for model in models):
+        levels |= dict(zip(ends.outputs, ends.rest_outputs, strict=True))
+    return levels | dict(source.rest if isinstance(source, Cascade) else {})
+
+
+def _identifiers(names: Sequence[str]) -> dict[str, str]:
     """Channel names as different C identifiers."""
     found: dict[str, str] = {}
     for name in names:

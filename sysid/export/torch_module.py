@@ -8,9 +8,63 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from sysid.export.cell import Cell, LinearCell
 from sysid.export.flags import Flag
 from sysid.export.surrogate import Stage, Surrogate
-from sysid.models import StateSpace
+
+
+class Limits(nn.Module):
+    """The declared limits of a stage's outputs.
+
+    Args:
+        stage: The stage.
+    """
+
+    outputs: list[int]
+    upper: list[bool]
+    values: list[float]
+    columns: list[int]
+    offsets: list[float]
+    scales: list[float]
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__()
+        cell, n = stage.cell, stage.cell.n_inputs
+        self.first = int(stage.targets[0])
+        self.offsets = [float(value) for value in cell.offset[n:]]
+        self.scales = [float(value) for value in cell.scale[n:]]
+        sides = [(j, side) for j, own in enumerate(stage.limits) for side in own]
+        self.outputs = [j for j, _ in sides]
+        self.upper = [side.upper for _, side in sides]
+        self.values = [float(side.value) for _, side in sides]
+        self.columns = [-1 if side.column is None else int(side.column) for _, side in sides]
+
+    def forward(self, known: Tensor, scaled: Tensor, outputs: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Hold a stage's outputs.
+
+        Args:
+            known: Inputs of the whole and outputs of earlier stages in their units, shape ``(batch, n_known)``.
+            scaled: The stage's outputs in scaled numbers, shape ``(batch, n_outputs)``.
+            outputs: The same in their units.
+
+        Returns:
+            Both within the limits, and whether one of them is at one, shape ``(batch, 1)``.
+        """
+        together = torch.cat([known, outputs], dim=1)
+        channels = list(torch.chunk(together, together.size(1), dim=1))
+        numbers = list(torch.chunk(scaled, scaled.size(1), dim=1))
+        reached = torch.zeros_like(numbers[0], dtype=torch.bool)
+        for i in range(len(self.outputs)):
+            j = self.outputs[i]
+            at = self.first + j
+            limit = torch.full_like(channels[at], self.values[i])
+            if self.columns[i] >= 0:
+                limit = channels[self.columns[i]]
+            beyond = channels[at] > limit if self.upper[i] else channels[at] < limit
+            channels[at] = torch.where(beyond, limit, channels[at])
+            numbers[j] = torch.where(beyond, (limit - self.offsets[j]) / self.scales[j], numbers[j])
+            reached = reached | (channels[at] == limit)
+        return torch.cat(numbers, dim=1), torch.cat(channels[self.first :], dim=1), reached
 
 
 class StageStep(nn.Module):
@@ -24,6 +78,8 @@ class StageStep(nn.Module):
     sources: Tensor
     input_offset: Tensor
     input_scale: Tensor
+    output_offset: Tensor
+    output_scale: Tensor
     regressor_columns: Tensor
     state_columns: Tensor
     hidden_weights: Tensor
@@ -34,28 +90,27 @@ class StageStep(nn.Module):
 
     def __init__(self, stage: Stage, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
-        layout, recursion = stage.layout, stage.recursion
-        scaling = recursion.scaling
+        cell, layout = stage.lagged
         numbers = {
-            "input_offset": scaling.input_offset,
-            "input_scale": scaling.input_scale,
-            "hidden_weights": recursion.hidden_weights.T,
-            "hidden_bias": recursion.hidden_bias,
-            "readout": recursion.readout[:, np.newaxis],
-            "linear": recursion.linear[:, np.newaxis],
-            "constant": [recursion.constant],
+            **_scaling(cell),
+            "hidden_weights": cell.hidden_weights.T,
+            "hidden_bias": cell.hidden_bias,
+            "readout": cell.readout.T,
+            "linear": cell.linear.T,
+            "constant": cell.constant,
         }
         for name, values in numbers.items():
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
+        regressors = [layout.column(channel, lag) for channel, own in enumerate(cell.lags) for lag in own]
         self.register_buffer("sources", torch.tensor(stage.sources))
-        self.register_buffer("regressor_columns", torch.tensor(layout.regressor_columns(recursion.lags)))
+        self.register_buffer("regressor_columns", torch.tensor(regressors))
         self.register_buffer("state_columns", torch.tensor(layout.next_columns()))
         self.first, self.size = int(stage.first), int(layout.size)
-        self.bounded = stage.bounded
-        self.low, self.high = float(recursion.low), float(recursion.high)
-        self.output_offset, self.output_scale = float(scaling.output_offset), float(scaling.output_scale)
+        self.bounded, self.limited = stage.bounded, stage.limited
+        self.low, self.high = float(cell.low), float(cell.high)
+        self.limits = Limits(stage)
 
-    def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """One step.
 
         Args:
@@ -63,8 +118,8 @@ class StageStep(nn.Module):
             whole_state: State of the whole, shape ``(batch, n_state)``.
 
         Returns:
-            Output in its unit, shape ``(batch, 1)``, the stage's next state, and whether the output is held at a
-            bound, shape ``(batch, 1)``.
+            Outputs in their units, shape ``(batch, n_outputs)``, the stage's next state, and whether an output is held
+            at a bound, and at a declared limit, both of shape ``(batch, 1)``.
         """
         state = whole_state.narrow(1, self.first, self.size)
         scaled = (known.index_select(1, self.sources) - self.input_offset) / self.input_scale
@@ -72,9 +127,15 @@ class StageStep(nn.Module):
         hidden = torch.tanh(torch.addmm(self.hidden_bias, x, self.hidden_weights))
         total = torch.addmm(torch.addmm(self.constant, x, self.linear), hidden, self.readout)
         y = torch.clamp(total, self.low, self.high)
-        held = (y <= self.low) | (y >= self.high) if self.bounded else torch.zeros_like(y, dtype=torch.bool)
+        outputs = y * self.output_scale + self.output_offset
+        reached = torch.zeros_like(y[:, :1], dtype=torch.bool)
+        if self.limited:
+            y, outputs, reached = self.limits(known, y, outputs)
+        held = torch.zeros_like(reached)
+        if self.bounded:
+            held = ((y <= self.low) | (y >= self.high)).any(dim=1, keepdim=True)
         following = torch.cat([scaled, y, state], dim=1).index_select(1, self.state_columns)
-        return y * self.output_scale + self.output_offset, following, held
+        return outputs, following, held, reached
 
 
 class LinearStep(nn.Module):
@@ -82,23 +143,23 @@ class LinearStep(nn.Module):
 
     Args:
         stage: The stage.
-        form: Its state space.
         dtype: Of the numbers; inputs and state must have it too.
     """
 
     sources: Tensor
     input_offset: Tensor
     input_scale: Tensor
+    output_offset: Tensor
+    output_scale: Tensor
     transition: Tensor
     readout: Tensor
     constant: Tensor
 
-    def __init__(self, stage: Stage, form: StateSpace, dtype: torch.dtype = torch.float64) -> None:
+    def __init__(self, stage: Stage, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
-        scaling = form.scaling
+        form = stage.space
         numbers = {
-            "input_offset": scaling.input_offset,
-            "input_scale": scaling.input_scale,
+            **_scaling(stage.cell),
             "transition": np.concatenate([form.A, form.B], axis=1).T,
             "readout": np.concatenate([form.C, form.D])[:, np.newaxis],
             "constant": [form.constant],
@@ -107,18 +168,34 @@ class LinearStep(nn.Module):
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
         self.register_buffer("sources", torch.tensor(stage.sources))
         self.first, self.size = int(stage.first), form.n_state
-        self.bounded = stage.bounded
+        self.bounded, self.limited = stage.bounded, stage.limited
         self.low, self.high = float(form.low), float(form.high)
-        self.output_offset, self.output_scale = float(scaling.output_offset), float(scaling.output_scale)
+        self.limits = Limits(stage)
 
-    def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """One step; see :class:`StageStep`."""
         state = whole_state.narrow(1, self.first, self.size)
         scaled = (known.index_select(1, self.sources) - self.input_offset) / self.input_scale
         x = torch.cat([state, scaled], dim=1)
         y = torch.clamp(torch.addmm(self.constant, x, self.readout), self.low, self.high)
-        held = (y <= self.low) | (y >= self.high) if self.bounded else torch.zeros_like(y, dtype=torch.bool)
-        return y * self.output_scale + self.output_offset, x @ self.transition, held
+        outputs = y * self.output_scale + self.output_offset
+        reached = torch.zeros_like(y, dtype=torch.bool)
+        if self.limited:
+            y, outputs, reached = self.limits(known, y, outputs)
+        held = torch.zeros_like(reached)
+        if self.bounded:
+            held = (y <= self.low) | (y >= self.high)
+        return outputs, x @ self.transition, held, reached
+
+
+def _scaling(cell: Cell | LinearCell) -> dict[str, tuple[float, ...]]:
+    n = cell.n_inputs
+    return {
+        "input_offset": cell.offset[:n],
+        "input_scale": cell.scale[:n],
+        "output_offset": cell.offset[n:],
+        "output_scale": cell.scale[n:],
+    }
 
 
 class SurrogateStep(nn.Module):
@@ -136,14 +213,14 @@ class SurrogateStep(nn.Module):
         super().__init__()
         self.stages = nn.ModuleList(
             [
-                LinearStep(stage, stage.form, dtype) if isinstance(stage.form, StateSpace) else StageStep(stage, dtype)
+                LinearStep(stage, dtype) if isinstance(stage.cell, LinearCell) else StageStep(stage, dtype)
                 for stage in surrogate.stages
             ]
         )
         self.register_buffer("declared_low", torch.tensor([port.low for port in surrogate.inputs], dtype=dtype))
         self.register_buffer("declared_high", torch.tensor([port.high for port in surrogate.inputs], dtype=dtype))
         self.outside_bit, self.bound_bit = int(Flag.OUTSIDE_RANGE), int(Flag.AT_BOUND)
-        self.lost_bit = int(Flag.NOT_A_NUMBER)
+        self.lost_bit, self.limit_bit = int(Flag.NOT_A_NUMBER), int(Flag.AT_LIMIT)
 
     def forward(self, u: Tensor, state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """One step.
@@ -158,15 +235,18 @@ class SurrogateStep(nn.Module):
         known = u
         states: list[Tensor] = []
         held: list[Tensor] = []
+        limited: list[Tensor] = []
         for stage in self.stages:
-            y, following, at_bound = stage(known, state)
+            y, following, at_bound, at_limit = stage(known, state)
             known = torch.cat([known, y], dim=1)
             states.append(following)
             held.append(at_bound)
+            limited.append(at_limit)
         outside = ((u < self.declared_low) | (u > self.declared_high)).any(dim=1, keepdim=True)
         flags = outside.to(torch.int32) * self.outside_bit
         flags = flags + torch.cat(held, dim=1).any(dim=1, keepdim=True).to(torch.int32) * self.bound_bit
         flags = flags + torch.isnan(known).any(dim=1, keepdim=True).to(torch.int32) * self.lost_bit
+        flags = flags + torch.cat(limited, dim=1).any(dim=1, keepdim=True).to(torch.int32) * self.limit_bit
         n_inputs = u.size(1)
         return known[:, n_inputs:], torch.cat(states, dim=1), flags
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from sysid.export import EXPORTERS, Surrogate
 from sysid.export.parity import largest_difference, random_cases
-from sysid.models import NARX, Mapping, NARXModel, Scaling, parameter_count
+from sysid.models import NARX, Cascade, Mapping, NARXModel, Scaling, parameter_count
 
 SAMPLES = 20_000
 RANGES = {"STP": (0.0, 90.0), "BP": (0.0, 90.0), "AR": (50.0, 90.0)}
@@ -106,13 +106,15 @@ def build(mapping: str, structure: NARX, seed: int) -> NARXModel:
 def cascade() -> Surrogate:
     """The combined brake's wiring with networks as large as published ones, and long spaced lags for the pipe."""
     powers = [0, 1, 2, 4, 8, 16, 32, 64, 128, 256]
-    return Surrogate.wired(
-        [
-            build("STP -> BP", NARX(input_delays=powers, output_delays=powers[1:], neurons=15), 1),
-            build("BP -> ER", NARX(input_delays=4, output_delays=4, neurons=20), 2),
-            build("BP+ER -> AR", NARX(input_delays=4, output_delays=4, neurons=20), 3),
-            build("BP+AR+ER -> BC", NARX(input_delays=4, output_delays=4, neurons=20), 4),
-        ],
+    return Surrogate.of(
+        Cascade(
+            models=(
+                build("STP -> BP", NARX(input_delays=powers, output_delays=powers[1:], neurons=15), 1),
+                build("BP -> ER", NARX(input_delays=4, output_delays=4, neurons=20), 2),
+                build("BP+ER -> AR", NARX(input_delays=4, output_delays=4, neurons=20), 3),
+                build("BP+AR+ER -> BC", NARX(input_delays=4, output_delays=4, neurons=20), 4),
+            )
+        ),
         RANGES,
     )
 

@@ -16,13 +16,22 @@ from sysid.models import (
     NARX,
     AbstractModel,
     ARXModel,
+    Cascade,
+    Domain,
     History,
+    Limit,
     Mapping,
     NARXModel,
     Scaling,
     Start,
+    TransferFunction,
+    VectorMapping,
+    VectorNARX,
+    VectorNARXModel,
+    VectorScaling,
     parameter_count,
 )
+from sysid.models.transfer_function import TransferFunctionModel
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.units import Reference
 
@@ -288,40 +297,124 @@ def start() -> Start:
     return Start()
 
 
-def build_cascade() -> Surrogate:
-    """Three models: the first computes BP, the second reads it, the third reads both outputs and the command."""
-
-    def stage(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) -> NARXModel:
-        rng = np.random.default_rng(seed)
-        parsed = Mapping.parse(mapping)
-        n_inputs = len(parsed.inputs)
-        lags = structure.lags(n_inputs)
-        theta = rng.normal(size=parameter_count(lags, structure.neurons, linear=True))
-        theta *= 0.4 / np.sqrt(len(theta))
-        return NARXModel(
-            network=structure,
-            theta=theta,
-            scaling=Scaling(
-                input_offset=(45.0,) * n_inputs, input_scale=(45.0,) * n_inputs, output_offset=40.0, output_scale=38.0
-            ),
-            mapping=parsed,
-            sample_time=0.1,
-            input_units=("psi",) * n_inputs,
-            output_unit="psi",
-            rest_output=3.0,
-            clamp=clamp,
-        )
-
-    return Surrogate.wired(
-        [
-            stage("STP+FLOW -> BP", NARX(input_delays="0:3", output_delays=[1, 2, 5], neurons=6), 1),
-            stage("BP -> AR", NARX(input_delays=2, output_delays=3, neurons=4), 2),
-            stage("BP+AR+STP -> BC", NARX(input_delays=[[0], [1, 3], [2]], output_delays=2, neurons=5), 3, clamp=0.05),
-        ],
-        {"STP": (0.0, 80.0)},
+def wired_narx(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) -> NARXModel:
+    """A network of a cascade, all of whose channels lie between 0 and 90 psi."""
+    rng = np.random.default_rng(seed)
+    parsed = Mapping.parse(mapping)
+    n_inputs = len(parsed.inputs)
+    theta = rng.normal(size=parameter_count(structure.lags(n_inputs), structure.neurons, linear=True))
+    return NARXModel(
+        network=structure,
+        theta=theta * 0.4 / np.sqrt(len(theta)),
+        scaling=Scaling(
+            input_offset=(45.0,) * n_inputs, input_scale=(45.0,) * n_inputs, output_offset=40.0, output_scale=38.0
+        ),
+        mapping=parsed,
+        sample_time=0.1,
+        input_units=("psi",) * n_inputs,
+        output_unit="psi",
+        rest_output=3.0,
+        clamp=clamp,
     )
+
+
+def wired_vector(mapping: str, structure: VectorNARX, seed: int) -> VectorNARXModel:
+    """A network of several outputs in a cascade."""
+    parsed = VectorMapping.parse(mapping)
+    n, m = len(parsed.inputs), len(parsed.outputs)
+    theta = np.random.default_rng(seed).normal(size=structure.parameter_count(n, m))
+    return VectorNARXModel(
+        network=structure,
+        theta=theta * 0.4 / np.sqrt(len(theta)),
+        scaling=VectorScaling(
+            input_offset=(45.0,) * n, input_scale=(45.0,) * n, output_offset=(40.0,) * m, output_scale=(38.0,) * m
+        ),
+        mapping=parsed,
+        sample_time=0.1,
+        input_units=("psi",) * n,
+        output_units=("psi",) * m,
+        rest_outputs=(5.0,) * m,
+    )
+
+
+def wired_transfer_function(mapping: str) -> TransferFunctionModel:
+    """A slow linear model of one input in a cascade."""
+    return TransferFunctionModel(
+        orders=TransferFunction(poles=(2,), zeros=(1,), delays=(2,), domain=Domain.DISCRETE),
+        sections=((np.array([1.0, -1.9, 0.905]),),),
+        taps=(np.array([0.004, 0.001]),),
+        constant=0.1,
+        scaling=Scaling(input_offset=(45.0,), input_scale=(45.0,), output_offset=38.0, output_scale=40.0),
+        mapping=Mapping.parse(mapping),
+        sample_time=0.1,
+        input_units=("psi",),
+        output_unit="psi",
+        rest_output=0.0,
+    )
+
+
+def build_cascade() -> Cascade:
+    """Three models: the first computes BP, the second reads it, the third reads both outputs and the command."""
+    return Cascade(
+        models=(
+            wired_narx("STP+FLOW -> BP", NARX(input_delays="0:3", output_delays=[1, 2, 5], neurons=6), 1),
+            wired_narx("BP -> AR", NARX(input_delays=2, output_delays=3, neurons=4), 2),
+            wired_narx(
+                "BP+AR+STP -> BC", NARX(input_delays=[[0], [1, 3], [2]], output_delays=2, neurons=5), 3, clamp=0.05
+            ),
+        )
+    )
+
+
+def build_limited() -> Cascade:
+    """Every kind of model, levels that follow an input, and limits of every kind, all of which are reached."""
+    return Cascade(
+        models=(
+            wired_narx("STP+FLOW -> BP", NARX(input_delays="0:1", output_delays=1, neurons=6), 1),
+            wired_vector(
+                "BP+STP -> AR+ER", VectorNARX(input_delays="0:1", output_delays=[[1, 2], [1, 4]], neurons=5), 2
+            ),
+            wired_vector("STP -> V+W", VectorNARX(input_delays=1, output_delays=[[2], [1]], neurons=3), 4),
+            wired_narx("BP+AR -> BC", NARX(input_delays=1, output_delays=2, neurons=5), 3),
+            wired_transfer_function("BP -> X"),
+        ),
+        rest={"BP": "STP", "AR": "STP", "ER": 60.0, "FLOW": 10.0},
+        limits={
+            "BP": Limit(low=0.0, high="STP"),
+            "AR": Limit(low=12.0, high="BP"),
+            "ER": Limit(low=41.0, high=50.0),
+            "W": Limit(low="FLOW", high=37.0),
+            "BC": Limit(low=37.6, high=37.9),
+            "X": Limit(low=36.0, high="STP"),
+        },
+    )
+
+
+CASCADES = {"three models": build_cascade, "every kind, limits and levels": build_limited}
 
 
 @pytest.fixture(scope="session")
 def cascade() -> Surrogate:
-    return build_cascade()
+    return Surrogate.of(build_cascade(), {"STP": (0.0, 80.0)})
+
+
+@pytest.fixture(params=CASCADES, scope="session")
+def any_cascade(request: pytest.FixtureRequest) -> Surrogate:
+    return Surrogate.of(CASCADES[request.param](), {"STP": (0.0, 80.0)})
+
+
+@pytest.fixture(scope="session")
+def limited() -> Cascade:
+    return build_limited()
+
+
+@pytest.fixture(scope="session")
+def command() -> TraceSet:
+    """Cases of a cascade: its inputs, and one of its outputs."""
+    channels = tuple(Channel(name=name, unit="psi", reference=Reference.GAUGE) for name in ("STP", "FLOW", "BC"))
+    records = []
+    for i, name in enumerate(["EST01", "VAL01"]):
+        columns = random_inputs(250, 2, seed=30 + i)
+        output = build_limited().simulate(columns)["BC"]
+        records.append(Trace(name=name, sample_time=0.1, channels=channels, values=np.column_stack([columns, output])))
+    return TraceSet(name="commands", traces=tuple(records), roles={"EST01": Role.ESTIMATION}, source="Made for a test.")

@@ -64,7 +64,8 @@ def test_manifest_declares_channels_ranges_and_units(manifest, traces):
     assert (bp["name"], bp["unit"], bp["reference"], bp["description"]) == ("BP", "psi", "gauge", "brake pipe")
     assert bp["range"] == [traces["EST01"]["BP"].min(), traces["EST01"]["BP"].max()]
     assert ar["range"] == [traces["EST01"]["AR"].min(), traces["EST01"]["AR"].max()]
-    assert (manifest["output"]["name"], manifest["sample_time_s"]) == ("BC", 0.1)
+    (bc,) = manifest["outputs"]
+    assert (bc["name"], bc["limits"], manifest["sample_time_s"]) == ("BC", {"low": None, "high": None}, 0.1)
 
 
 def test_manifest_keeps_provenance_with_digests(manifest, traces):
@@ -162,7 +163,9 @@ def test_figures_that_are_not_finite_are_null_and_said_so(fit, traces, start, tm
     lost_metrics = replace(metrics, cases={"VAL01": lost})
     bundle = export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onnx"], metrics=lost_metrics)
     assert read_bundle(bundle.folder).metadata["metrics"]["VAL01"]["free_run"]["mse"] is None
-    assert "| VAL01 | validation | not finite | not finite |" in (bundle.folder / "MODEL_CARD.md").read_text("utf-8")
+    assert "| VAL01 | validation | BC | not finite psi² | not finite |" in (bundle.folder / "MODEL_CARD.md").read_text(
+        "utf-8"
+    )
 
 
 def test_without_estimation_traces_no_range_is_declared(fit, traces, start, tmp_path):

@@ -13,16 +13,23 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from sysid.errors import ConfigError
-from sysid.export import EXPORTERS, Flag, expected_flags
+from sysid.export import EXPORTERS, Flag, Surrogate, expected_flags
 from sysid.export.fmi_units import unit_definitions
 from sysid.export.fmu import HEADERS, fmu_variables, platform_folder
 
 VERSIONS = {"fmi2": FMU2Slave, "fmi3": FMU3Slave}
 
 
-@pytest.fixture(scope="module", params=["a model", "a cascade"])
-def surrogate(request, models, declared, cascade):
+@pytest.fixture(scope="module", params=["a model", "a cascade", "a cascade with limits and levels"])
+def surrogate(request, models, declared, cascade, limited):
+    if request.param == "a cascade with limits and levels":
+        return Surrogate.of(limited, {"STP": (0.0, 80.0)})
     return declared(models["NARX 4/4/20"]()) if request.param == "a model" else cascade
+
+
+def at_rest(surrogate, first):
+    """Every output before the first sample."""
+    return surrogate.levels(np.asarray(first, dtype=float))[len(surrogate.inputs) :]
 
 
 @pytest.fixture(scope="module", params=VERSIONS)
@@ -98,7 +105,7 @@ def test_a_simulation_by_fmpy_equals_the_model_with_the_offset_of_one_step(fmu, 
         set_input_derivatives=False,
     )
     found = np.column_stack([result[port.name] for port in surrogate.outputs])
-    np.testing.assert_array_equal(found[0], surrogate.rest_outputs)
+    np.testing.assert_array_equal(found[0], at_rest(surrogate, u[0]))
     expected = surrogate.simulate(u)
     np.testing.assert_allclose(found[1:], expected, rtol=0.0, atol=1e-9)
     np.testing.assert_array_equal(result["flags"][1:], expected_flags(surrogate, u, expected))
@@ -109,9 +116,13 @@ def test_description_has_units_start_values_and_meaning(fmu, surrogate):
     variables = {variable.name: variable for variable in description.modelVariables}
     for port in surrogate.inputs:
         assert (variables[port.name].unit, float(variables[port.name].start)) == ("psi", port.start)
-    for port, rest in zip(surrogate.outputs, surrogate.rest_outputs, strict=True):
+    for port in surrogate.outputs:
         assert variables[port.name].unit == "psi"
-        assert float(variables[f"{port.name}_at_rest"].start) == rest
+        if isinstance(port.level, str):  # it begins where an input does
+            assert f"{port.name}_at_rest" not in variables
+            assert f"begins at {port.level}" in variables[port.name].description
+        else:
+            assert float(variables[f"{port.name}_at_rest"].start) == port.level
     (unit,) = description.unitDefinitions
     base = unit.baseUnit
     assert (unit.name, base.kg, base.m, base.s) == ("psi", 1, -1, -2)
@@ -188,21 +199,21 @@ def test_a_step_that_is_not_whole_samples_is_refused(slave, step):
 
 
 def test_outputs_cannot_be_set_nor_rest_values_after_the_start(slave, surrogate):
-    rest = slave.references[f"{surrogate.outputs[0].name}_at_rest"]
+    rest = slave.references[f"{surrogate.outputs[-1].name}_at_rest"]
     for reference in (slave.outputs[0], rest, 999):
         with pytest.raises(fmpy.fmi1.FMICallException):
             slave.set([reference], [1.0])
 
 
 def test_a_value_at_rest_set_before_the_start_is_where_the_run_begins(slave, surrogate):
-    rest = slave.references[f"{surrogate.outputs[0].name}_at_rest"]
+    rest = slave.references[f"{surrogate.outputs[-1].name}_at_rest"]
     slave.reset()
     slave.set([rest], [12.5])
     initialise(slave)
-    assert slave.get([slave.outputs[0]]) == [12.5]
+    assert slave.get([slave.outputs[-1]]) == [12.5]
     u = np.full((3, len(surrogate.inputs)), 50.0)
-    changed = surrogate.rest_outputs.copy()
-    changed[0] = 12.5
+    changed = at_rest(surrogate, u[0])
+    changed[-1] = 12.5
     np.testing.assert_allclose(walk(slave, u)[0], surrogate.simulate(u, rest_outputs=changed), rtol=0.0, atol=1e-9)
 
 

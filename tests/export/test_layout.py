@@ -52,10 +52,10 @@ def test_next_columns_shift_every_line_by_one_sample(model):
     np.testing.assert_array_equal(np.concatenate([heads, before])[layout.next_columns()], after)
 
 
-def test_regressor_columns_read_what_the_recursion_reads(model):
-    layout, lags = StateLayout.of(model), model.recursion.lags
+def test_columns_are_where_samples_stand(model):
+    layout = StateLayout.of(model)
     names = [f"{name}-0" for name in model.mapping.inputs]
     names += [f"{line.channel}-{lag}" for line in layout.lines for lag in range(1, line.length + 1)]
-    inputs = [f"{name}-{lag}" for name, own in zip(model.mapping.inputs, lags.inputs, strict=True) for lag in own]
-    expected = inputs + [f"{model.mapping.output}-{lag}" for lag in lags.output]
-    assert [names[column] for column in layout.regressor_columns(lags)] == expected
+    for channel, own in enumerate((*model.recursion.lags.inputs, model.recursion.lags.output)):
+        for lag in own:
+            assert names[layout.column(channel, lag)] == f"{layout.lines[channel].channel}-{lag}"

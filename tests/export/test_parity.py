@@ -33,7 +33,7 @@ def test_largest_difference(output, expected, difference):
 
 
 def passes(row, model, surrogate, traces, begin, folder):  # noqa: PLR0917 - called twice, just below
-    cases, sequences = parity_cases(model, traces, begin), random_cases(surrogate, sequences=3, samples=50)
+    cases, sequences = parity_cases(surrogate, traces, begin), random_cases(surrogate, sequences=3, samples=50)
     for file in written(row, surrogate, folder):
         parity = check_parity(file, folder, cases, sequences, tolerance=row.tolerance, unit="psi")
         assert max(parity.largest_difference, parity.random_difference) <= parity.tolerance == row.tolerance
@@ -57,7 +57,7 @@ def test_files_of_the_model_pass_for_every_start(*, rows, fit, declared, traces,
 
 def test_files_of_another_model_are_refused_with_the_worst_case(*, row, fit, declared, traces, narx, tmp_path):
     other = narx(NARX(input_delays=4, output_delays=4, neurons=20), seed=99)
-    cases = parity_cases(fit.model, traces, Start())
+    cases = parity_cases(declared(fit.model), traces, Start())
     expected = {case.name: np.abs(other.simulate(case.inputs) - case.output[:, 0]).max() for case in cases}
     worst = max(expected, key=expected.get)
     for file in written(row, declared(other), tmp_path):
@@ -67,7 +67,10 @@ def test_files_of_another_model_are_refused_with_the_worst_case(*, row, fit, dec
 
 def test_a_difference_on_a_random_sequence_alone_is_refused(fit, declared, traces, tmp_path):
     surrogate = declared(fit.model)
-    cases, sequences = parity_cases(fit.model, traces, Start()), random_cases(surrogate, sequences=2, samples=20)
+    cases, sequences = (
+        parity_cases(declared(fit.model), traces, Start()),
+        random_cases(surrogate, sequences=2, samples=20),
+    )
     sequences[1].output[7] += 1e-6
     (file, _) = EXPORTERS["onnx"].write(surrogate, tmp_path)
     with pytest.raises(ParityError, match=r"(?s)case random 2.*1e-06 psi"):
@@ -80,6 +83,22 @@ def test_random_sequences_fill_the_declared_range_and_never_leave_it(fit, declar
     assert drawn.shape == (100, 400, 2)
     assert (drawn.min(axis=(0, 1)) == [0.0, 0.0]).all()
     assert (drawn.max(axis=(0, 1)) == [95.0, 95.0]).all()
+
+
+def test_random_sequences_are_numbers_that_float32_can_hold(fit):
+    surrogate = Surrogate.of(fit.model, {"BP": (0.1, 90.1), "AR": (1.0 / 3.0, 66.7)})
+    drawn = np.stack([case.inputs for case in random_cases(surrogate)])
+    np.testing.assert_array_equal(drawn, drawn.astype(np.float32))
+    assert (drawn.min(axis=(0, 1)) >= [0.1, 1.0 / 3.0]).all()
+    assert (drawn.max(axis=(0, 1)) <= [90.1, 66.7]).all()
+
+
+def test_cases_of_a_cascade_need_its_inputs_alone(limited, command):
+    surrogate = Surrogate.of(limited)
+    for case, trace in zip(parity_cases(surrogate, command, Start()), command, strict=True):
+        expected = limited.simulate(trace.columns(("STP", "FLOW"))).values[:, 2:]
+        np.testing.assert_array_equal(case.output, expected)
+        np.testing.assert_array_equal(case.state, surrogate.at_rest(case.inputs[0]))
 
 
 def test_without_a_declared_range_sequences_keep_to_the_scaling(fit):

@@ -12,7 +12,7 @@ import pytest
 
 from sysid.errors import BundleError
 from sysid.export import export_bundle, read_bundle, zip_bundle
-from sysid.export.manifest import seal
+from sysid.export.manifest import SCHEMA_VERSION, seal
 
 FILES = [
     "sequence.onnx",
@@ -93,7 +93,7 @@ def test_manifest_that_is_none(folder, text, match):
 
 
 def test_newer_schema(folder):
-    rewrite(folder, lambda manifest: manifest.update(schema_version=3), sealed=True)
+    rewrite(folder, lambda manifest: manifest.update(schema_version=SCHEMA_VERSION + 1), sealed=True)
     with pytest.raises(BundleError, match=r"(?s)newer version.*up to 2.*got:\s+3.*pip install --upgrade"):
         read_bundle(folder)
 
@@ -190,11 +190,13 @@ def test_a_file_that_is_no_zip(tmp_path, data):
         read_bundle(tmp_path / "b.zip")
 
 
-def test_a_bundle_of_version_1_is_read_for_ever(tmp_path):
-    with zipfile.ZipFile(Path(__file__).parent / "data" / "bundle-1.zip") as archive:
+@pytest.mark.parametrize("version", range(1, SCHEMA_VERSION))
+def test_a_bundle_of_an_earlier_version_is_read_for_ever(tmp_path, version):
+    with zipfile.ZipFile(Path(__file__).parent / "data" / f"bundle-{version}.zip") as archive:
         archive.extractall(tmp_path)
     bundle = read_bundle(tmp_path)
-    assert bundle.metadata["schema_version"] == 1
+    assert bundle.metadata["schema_version"] == version
+    assert [channel["name"] for channel in bundle.outputs] == ["BC"]
     assert [(file.name, file.format) for file in bundle.files] == [("step.onnx", "onnx"), ("sequence.onnx", "onnx")]
     assert bundle.model.structure.label == "NARX 2/2/3"
     output = bundle.model.simulate(np.array([[80.0, 70.0], [70.0, 60.0], [60.0, 65.0], [60.0, 65.0]]))

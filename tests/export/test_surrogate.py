@@ -9,7 +9,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.export import Surrogate
-from sysid.models import ARX, NARX, ARXModel, Mapping
+from sysid.models import ARX, NARX, ARXModel, Cascade, Mapping
 
 
 def linear(mapping, **changes):
@@ -51,21 +51,19 @@ def test_cascade_is_its_models_one_after_the_other():
     u = np.arange(5.0)[:, np.newaxis]
     bp = first.simulate(u)
     bc = second.simulate(np.column_stack([bp, u[:, 0]]))
-    np.testing.assert_array_equal(Surrogate.wired([first, second]).simulate(u), np.column_stack([bp, bc]))
+    np.testing.assert_array_equal(Surrogate.of(Cascade(models=(second, first))).simulate(u), np.column_stack([bp, bc]))
 
 
 def test_stages_run_in_an_order_in_which_they_can():
     first, second = linear("STP -> BP"), linear("BP+STP -> BC")
-    u = np.arange(5.0)[:, np.newaxis]
-    swapped = Surrogate.wired([second, first])
-    assert [stage.model for stage in swapped.stages] == [first, second]
-    np.testing.assert_array_equal(swapped.simulate(u), Surrogate.wired([first, second]).simulate(u))
+    surrogate = Surrogate.of(Cascade(models=(second, first)))
+    assert [stage.model for stage in surrogate.stages] == [first, second]
 
 
 def test_a_circle_through_the_past_cannot_be_stages():
     back = linear("z -> y", orders=ARX(na=1, nb=(1,), nk=(1,)))
     with pytest.raises(ConfigError, match="in a circle cannot be exported"):
-        Surrogate.wired([linear("y -> z"), back])
+        Surrogate.of(Cascade(models=(linear("y -> z"), back)))
 
 
 @pytest.mark.parametrize(
@@ -84,7 +82,7 @@ def test_wiring_that_cannot_run_is_refused(models, match):
         for m in models
     ]
     with pytest.raises(ConfigError, match=match):
-        Surrogate.wired(built)
+        Surrogate.of(Cascade(models=tuple(built)))
 
 
 @pytest.mark.parametrize(
@@ -106,4 +104,22 @@ def test_identifiers_are_c_names_and_all_different(mapping, identifier):
 
 def test_state_of_a_single_model_is_the_models_own(narx, declared):
     surrogate = declared(narx(NARX(input_delays=2, output_delays=3, neurons=1)))
-    assert surrogate.state_text() == surrogate.stages[0].layout.to_dict()
+    assert surrogate.state_text() == {**surrogate.stages[0].state.to_dict(), "remainders_float32": 1}
+
+
+def test_at_rest_every_channel_stands_at_its_declared_level(limited):
+    surrogate = Surrogate.of(limited)
+    levels = dict(
+        zip((port.name for port in surrogate.channels), surrogate.levels(np.array([70.0, 20.0])), strict=True)
+    )
+    assert (levels["STP"], levels["FLOW"], levels["BP"], levels["AR"], levels["ER"]) == (70.0, 10.0, 70.0, 70.0, 60.0)
+    u = np.tile([70.0, 20.0], (30, 1))
+    np.testing.assert_array_equal(surrogate.simulate(u), limited.simulate(u).values[:, 2:])
+
+
+def test_a_cascade_lies_in_its_own_order(limited):
+    surrogate = Surrogate.of(limited)
+    assert tuple(port.name for port in surrogate.outputs) == limited.outputs
+    assert [stage.targets for stage in surrogate.stages] == [(2,), (3, 4), (5, 6), (7,), (8,)]
+    assert surrogate.state_length("float32") - surrogate.state_size == surrogate.remainders
+    assert [stage.remainders for stage in surrogate.stages] == [1, 2, 0, 1, surrogate.stages[-1].state.size]

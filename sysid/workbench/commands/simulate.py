@@ -38,7 +38,7 @@ def simulate_command(bundle: Path, inputs: Path, out: Path, *, initial: float | 
         )
     read = read_bundle(bundle)
     model = read.model
-    described = {entry["name"]: entry for entry in [*read.metadata["inputs"], read.metadata["output"]]}
+    described = {entry["name"]: entry for entry in [*read.inputs, *read.outputs]}
     channels = {
         name: Channel(name=name, unit=entry["unit"], reference=Reference(entry.get("reference", "none")))
         for name, entry in described.items()

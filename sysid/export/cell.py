@@ -1,0 +1,163 @@
+"""A model over lagged regressors as exporters see it: one table of columns, inputs before outputs, one or several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.models import AbstractModel, StateSpace
+from sysid.models.cascade_program import Part
+from sysid.models.wiring import Ends, Member
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cell:
+    r"""``y = clip(w x + c + V tanh(W x + b))`` in scaled numbers, with the regressors of each column side by side.
+
+    Args:
+        ends: Names, units and values at rest of what goes in and comes out.
+        lags: Lags of every input, then of every output.
+        hidden_weights: ``W``, shape ``(n_neurons, n_regressors)``.
+        hidden_bias: ``b``, shape ``(n_neurons,)``.
+        readout: ``V``, shape ``(n_outputs, n_neurons)``.
+        constant: ``c``, shape ``(n_outputs,)``.
+        linear: ``w``, shape ``(n_outputs, n_regressors)``; zeros where the model has no linear part.
+        offset: Of every column, in its unit.
+        scale: Of every column, in its unit.
+        low: Lower bound of the outputs in scaled numbers; ``-inf`` for none.
+        high: Upper bound of the outputs in scaled numbers; ``inf`` for none.
+    """
+
+    ends: Ends
+    lags: tuple[tuple[int, ...], ...]
+    hidden_weights: NDArray[np.float64]
+    hidden_bias: NDArray[np.float64]
+    readout: NDArray[np.float64]
+    constant: NDArray[np.float64]
+    linear: NDArray[np.float64]
+    offset: tuple[float, ...]
+    scale: tuple[float, ...]
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, model: Member) -> Cell:
+        """A model as a cell.
+
+        Args:
+            model: A model of one output or several.
+
+        Returns:
+            The cell.
+
+        Raises:
+            ConfigError: If the model does not lower to lagged regressors.
+        """
+        part = Part.of(model)
+        if part is None:
+            raise ConfigError(
+                "this kind of model cannot be exported",
+                expected="a model over lagged inputs and outputs (ARX, NARX), or a transfer function",
+                got=model.structure.label,
+                remedy="fit one of these to what this model puts out, and export that",
+            )
+        ends = Ends.of(model)
+        m, k, n = len(ends.outputs), part.neurons, part.lags.n_regressors
+        cuts = np.cumsum([k * n, k, m * k, m])
+        hidden, bias, readout, constant, linear = np.split(part.theta, cuts)
+        return cls(
+            ends=ends,
+            lags=part.lags.inputs,
+            hidden_weights=hidden.reshape(k, n),
+            hidden_bias=bias,
+            readout=readout.reshape(m, k),
+            constant=constant,
+            linear=linear.reshape(m, n) if part.linear else np.zeros((m, n)),
+            offset=part.offset,
+            scale=part.scale,
+            low=part.low,
+            high=part.high,
+        )
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.ends.inputs)
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return len(self.ends.outputs)
+
+    @property
+    def neurons(self) -> int:
+        """Number of neurons."""
+        return len(self.hidden_bias)
+
+    @property
+    def adds(self) -> bool:
+        """Whether a step can be written as what is added to the last output: where every output reads its last one."""
+        return all(1 in own for own in self.lags[self.n_inputs :])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearCell:
+    """A state space as exporters see it.
+
+    Args:
+        ends: Names, units and values at rest of what goes in and comes out.
+        form: The state space.
+    """
+
+    ends: Ends
+    form: StateSpace
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.ends.inputs)
+
+    @property
+    def n_outputs(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def offset(self) -> tuple[float, ...]:
+        """Of every input, then of the output, in its unit."""
+        return (*self.form.scaling.input_offset, self.form.scaling.output_offset)
+
+    @property
+    def scale(self) -> tuple[float, ...]:
+        """Of every input, then of the output, in its unit."""
+        return (*self.form.scaling.input_scale, self.form.scaling.output_scale)
+
+    @property
+    def low(self) -> float:
+        """Lower bound of the output in scaled numbers."""
+        return self.form.low
+
+    @property
+    def high(self) -> float:
+        """Upper bound of the output in scaled numbers."""
+        return self.form.high
+
+
+def cell_of(model: Member) -> Cell | LinearCell:
+    """A model as a cell, whichever kind it lowers to.
+
+    Args:
+        model: The model.
+
+    Returns:
+        The cell.
+
+    Raises:
+        ConfigError: If it lowers to neither kind.
+    """
+    if isinstance(model, AbstractModel) and isinstance(model.recursion, StateSpace):
+        return LinearCell(ends=Ends.of(model), form=model.recursion)
+    return Cell.of(model)

@@ -1,0 +1,246 @@
+"""The bodies of the loops of a whole free run: one step, cars along the last axis, as few nodes as it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sysid.export.cell import Cell
+from sysid.export.layout import StateLayout
+from sysid.export.onnx_nodes import Nodes
+from sysid.export.onnx_step import added
+from sysid.export.rates import RateForm
+from sysid.export.surrogate import Side, Stage
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A loop's body.
+
+    Args:
+        graph: The graph: carried numbers and scanned rows in, carried numbers and the scaled outputs out.
+        held: Whether the outputs are within their bounds already; if not, they have to be clipped after the loop, which
+            takes a node out of it.
+    """
+
+    graph: Any
+    held: bool
+
+
+def clip_range(stage: Stage) -> tuple[float, float] | None:
+    """What one ``Clip`` holds the scaled outputs within; ``None`` where nothing is left for it.
+
+    Args:
+        stage: The stage.
+
+    Returns:
+        The model's own bounds, drawn in to the declared limits where these are numbers and there is one output.
+    """
+    cell, (low, high) = stage.cell, (stage.cell.low, stage.cell.high)
+    if merges_limits(stage):
+        offset, scale = cell.offset[-1], cell.scale[-1]
+        for side in stage.limits[0]:
+            value = (side.value - offset) / scale
+            low, high = (low, min(high, value)) if side.upper else (max(low, value), high)
+    return (low, high) if np.isfinite(low) or np.isfinite(high) else None
+
+
+def merges_limits(stage: Stage) -> bool:
+    """Whether the declared limits are part of the one ``Clip``: a single output, and numbers that do not cross."""
+    sides = stage.limits[0]
+    if len(stage.limits) > 1 or any(side.column is not None for side in sides):
+        return False
+    values = {side.upper: side.value for side in sides}
+    return values.get(False, -np.inf) <= values.get(True, np.inf)
+
+
+def lagged_body(outer: Nodes, stage: Stage, form: RateForm, carried: Sequence[str], scanned: Sequence[str]) -> Body:
+    """The body for a model over lagged regressors.
+
+    Args:
+        outer: The graph around it.
+        stage: The stage.
+        form: Its weights, with the outputs in blocks.
+        carried: Names of what is carried: ``level`` and perhaps ``rates`` and ``remainder``, or ``line``.
+        scanned: Names of the rows of a sample: ``x``, and channels that are limits.
+
+    Returns:
+        The body.
+    """
+    nodes = Nodes(outer.dtype, prefix=f"{outer.prefix}body_")
+    cell, layout = stage.lagged
+    past = [nodes.prefix + name for name in carried]
+    if not cell.adds:
+        rows = [layout.outputs[term.channel - cell.n_inputs].column(term.lag) for term in form.outputs]
+        rows = [row - layout.outputs[0].first for row in rows]
+        past = [nodes.add("Gather", [past[0], nodes.integers(rows)], "lagged", axis=0)] if rows else []
+    z = nodes.add("Concat", [f"{nodes.prefix}x", *past], "regressors", axis=0)
+    change = _network(nodes, cell, form, z, keeps="remainder" in carried)
+    total = nodes.add("Add", [f"{nodes.prefix}level", change], "sum") if cell.adds else change
+    held = _held(nodes, stage, total)
+    output = total if merges_limits(stage) and held != total else nodes.add("Identity", [held], "y")
+    sizes = _sizes(cell, layout)
+    after = _carry(nodes, stage, carried, sizes, _Sums(change=change, total=total, held=held))
+    n_x = max(1, len(form.inputs))
+    graph = nodes.graph(
+        "one_step",
+        [nodes.value(name, [sizes[name], "batch"]) for name in carried]
+        + [nodes.value(name, [n_x if name == "x" else 1, "batch"]) for name in scanned],
+        [
+            nodes.value(name.removeprefix(nodes.prefix), [sizes[c], "batch"])
+            for c, name in zip(carried, after, strict=True)
+        ]
+        + [nodes.value(output.removeprefix(nodes.prefix), [cell.n_outputs, "batch"])],
+    )
+    return Body(graph=graph, held=output != total)
+
+
+def _sizes(cell: Cell, layout: StateLayout) -> dict[str, int]:
+    """Rows of everything that can be carried."""
+    longest = max(line.length for line in layout.outputs)
+    n = cell.n_outputs
+    return {
+        "level": n,
+        "rates": n * (longest - 1),
+        "remainder": n,
+        "line": sum(line.length for line in layout.outputs),
+    }
+
+
+def _network(nodes: Nodes, cell: Cell, form: RateForm, z: str, *, keeps: bool) -> str:
+    """The network's sums; the remainder, last among the regressors, is added by a weight of one."""
+    n = cell.n_outputs
+    pad = 0 if form.inputs else 1  # the loop needs a row to run over
+    weights, linear = (
+        np.concatenate([np.zeros((len(table), pad)), table], axis=1) for table in (form.hidden_weights, form.linear)
+    )
+    if keeps:
+        weights, linear = np.pad(weights, ((0, 0), (0, n))), np.concatenate([linear, np.eye(n)], axis=1)
+    if cell.neurons:
+        bias = nodes.numbers("b", cell.hidden_bias[:, np.newaxis])
+        hidden = nodes.add("Gemm", [nodes.numbers("W", weights), z, bias], "hidden_sum")
+        # Side by side, neurons and regressors reach the outputs in one product.
+        z = nodes.add("Concat", [nodes.add("Tanh", [hidden], "hidden"), z], "neurons_and_regressors", axis=0)
+        linear = np.concatenate([cell.readout, linear], axis=1)
+    constant = nodes.numbers("c", cell.constant[:, np.newaxis])
+    return nodes.add("Gemm", [nodes.numbers("V_and_w", linear), z, constant], "change")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Sums:
+    """Names of the outputs on their way: their change, their sum with the last ones, and what is held of it."""
+
+    change: str
+    total: str
+    held: str
+
+
+def _carry(nodes: Nodes, stage: Stage, carried: Sequence[str], sizes: dict[str, int], sums: _Sums) -> list[str]:
+    """What the next step begins with."""
+    cell, layout = stage.lagged
+    held = sums.held
+    after = {"level": held}
+    if "rates" in carried:
+        rate = nodes.add("Sub", [held, f"{nodes.prefix}level"], "rate")
+        kept = sizes["rates"] - cell.n_outputs
+        if kept:
+            span = [nodes.integers([0]), nodes.integers([kept]), nodes.integers([0])]
+            rate = nodes.add("Concat", [rate, nodes.add("Slice", [f"{nodes.prefix}rates", *span], "kept")], "r", axis=0)
+        after["rates"] = rate
+    if "remainder" in carried:
+        moved = nodes.add("Sub", [sums.total, f"{nodes.prefix}level"], "moved")
+        after["remainder"] = nodes.add("Sub", [sums.change, moved], "lost")
+    if "line" in carried:
+        first, n = layout.outputs[0].first, cell.n_outputs
+        rows = [
+            j if lag == 1 else n + line.column(lag - 1) - first
+            for j, line in enumerate(layout.outputs)
+            for lag in range(1, line.length + 1)
+        ]
+        both = nodes.add("Concat", [held, f"{nodes.prefix}line"], "newest_and_line", axis=0)
+        after["line"] = nodes.add("Gather", [both, nodes.integers(rows)], "line_out", axis=0)
+    return [after[name] for name in carried]
+
+
+def _held(nodes: Nodes, stage: Stage, total: str) -> str:
+    """The scaled outputs within bounds and declared limits."""
+    span = clip_range(stage)
+    if span is not None:
+        total = nodes.add("Clip", [total, nodes.numbers("low", span[0]), nodes.numbers("high", span[1])], "bounded")
+    if merges_limits(stage) or not stage.limited:
+        return total
+    rows = [total]
+    if len(stage.limits) > 1:
+        rows = nodes.split(total, [f"y{j}" for j in range(len(stage.limits))], axis=0)
+    for j, sides in enumerate(stage.limits):
+        for side in sides:
+            part = nodes.within(f"{nodes.prefix}limit{j}_{'high' if side.upper else 'low'}_")
+            at = nodes.prefix + limit_name(j, side)
+            limit = at if (j, side) in scanned_limits(stage) else _limit(part, stage, j, side, rows)
+            beyond = part.add("Greater" if side.upper else "Less", [rows[j], limit], "beyond")
+            rows[j] = part.add("Where", [beyond, limit, rows[j]], "value")
+    return nodes.add("Concat", rows, "within_limits", axis=0)
+
+
+def limit_name(j: int, side: Side) -> str:
+    """The scanned row that is a limit."""
+    return f"limit{j}_{'high' if side.upper else 'low'}"
+
+
+def scanned_limits(stage: Stage) -> list[tuple[int, Side]]:
+    """Limits that are channels from outside the stage, each a scanned row."""
+    return [
+        (j, side)
+        for j, sides in enumerate(stage.limits)
+        for side in sides
+        if side.column is not None and side.column not in stage.targets
+    ]
+
+
+def _limit(nodes: Nodes, stage: Stage, j: int, side: Side, rows: Sequence[str]) -> str:
+    """A limit from within the stage in the scaled numbers of an output."""
+    cell, n = stage.cell, stage.cell.n_inputs
+    offset, scale = cell.offset[n + j], cell.scale[n + j]
+    if side.column is None:
+        return nodes.numbers("limit", [[(side.value - offset) / scale]])
+    i = stage.targets.index(side.column)
+    slope, shift = cell.scale[n + i] / scale, (cell.offset[n + i] - offset) / scale
+    return nodes.add(
+        "Add",
+        [nodes.add("Mul", [rows[i], nodes.numbers("slope", slope)], "sloped"), nodes.numbers("shift", shift)],
+        "limit",
+    )
+
+
+def linear_body(outer: Nodes, stage: Stage, *, keeps: bool) -> Body:
+    """The body for a state space: it carries its state, and each step is two products.
+
+    Args:
+        outer: The graph around it.
+        stage: The stage.
+        keeps: Whether what rounding takes from the state is kept.
+
+    Returns:
+        The body; declared limits hold the output alone, after the loop.
+    """
+    nodes, form = Nodes(outer.dtype, prefix=f"{outer.prefix}body_"), stage.space
+    n, x = form.n_state, f"{nodes.prefix}state"
+    z = nodes.add("Concat", [x, f"{nodes.prefix}x"], "state_and_inputs", axis=0)
+    readout = nodes.numbers("C_and_D", np.concatenate([form.C, form.D])[np.newaxis])
+    output = nodes.add("Gemm", [readout, z, nodes.numbers("c", [[form.constant]])], "output")
+    matrix = np.concatenate([form.A - np.eye(n), form.B], axis=1)
+    change = nodes.add("MatMul", [nodes.numbers("A_and_B", matrix), z], "change")
+    following, lost = added(nodes, x, change, f"{nodes.prefix}remainder" if keeps else None)
+    carried = {"state": following} | ({} if lost is None else {"remainder": lost})
+    graph = nodes.graph(
+        "one_step",
+        [*(nodes.value(name, [n, "batch"]) for name in carried), nodes.value("x", [form.n_inputs, "batch"])],
+        [
+            *(nodes.value(name.removeprefix(nodes.prefix), [n, "batch"]) for name in carried.values()),
+            nodes.value(output.removeprefix(nodes.prefix), [1, "batch"]),
+        ],
+    )
+    return Body(graph=graph, held=False)
