@@ -1,17 +1,47 @@
 r"""Levenberg-Marquardt with Bayesian regularisation, put together from its seams.
 
-The penalised loss over :math:`\beta` is :math:`F(\theta) = \frac12\|e(\theta)\|^2 +
-\frac12(\theta-\mu)^T\Lambda(\theta-\mu)` with :math:`\Lambda = \mathrm{diag}(\alpha/\beta)`. At each iteration
+With residuals :math:`e(\theta)` (weighted, in scaled numbers), prior centre :math:`\mu` and precisions :math:`\alpha`
+and :math:`\beta` (``prior``), what is minimised is the negative logarithm of the posterior over :math:`\beta`,
 
-1. the **provider** linearises the residuals: :math:`g = J^T e + \Lambda(\theta - \mu)`, :math:`H = J^T J + \Lambda`;
-2. the **damping** gives :math:`D`, and the step solves :math:`(H + \lambda D)\,\delta = -g`;
-3. the step is taken if the loss falls by a fair part of :math:`-(g^T\delta + \frac12\delta^T H\delta)`, what the
-   linearisation promised; otherwise the damping grows and step 2 is repeated at the price of one free run;
-4. once the fit has settled, the **evidence** moves :math:`\alpha` and :math:`\beta` (``regularisation.py``);
-5. the **termination** decides whether to go on.
+.. math::
+    F(\theta) = \tfrac12\|e(\theta)\|^2 + \tfrac12(\theta-\mu)^T\Lambda(\theta-\mu),
+    \qquad \Lambda = \mathrm{diag}(\alpha/\beta) \quad (\text{``ridge``}),
 
-Limits: finds a local minimum; one dense :math:`p \times p` factorisation a step, so for networks of some
-thousand parameters at most.
+the first term being ``at.loss`` and the second ``prior.penalty``. Linearising :math:`e(\theta + \delta) \approx e +
+J\delta` gives the model
+
+.. math::
+    F(\theta + \delta) \approx F(\theta) + g^T\delta + \tfrac12\delta^T H\delta, \qquad
+    g = J^T e + \Lambda(\theta - \mu), \qquad H = J^T J + \Lambda .
+
+It is trusted near :math:`\theta` only. Minimising it over :math:`\|D^{1/2}\delta\| \le \Delta` leads to
+
+.. math:: (H + \lambda D)\,\delta = -g, \qquad D = \mathrm{diag}(\text{``damping.scale``}),
+
+with a :math:`\lambda \ge 0` that goes with :math:`\Delta` (Moré 1978, lemma 2.1): a trust region whose radius is
+steered through :math:`\lambda` (``damping.factor``) by the gain ratio
+
+.. math:: \rho = \frac{F(\theta) - F(\theta + \delta)}{-(g^T\delta + \frac12\delta^T H\delta)}
+
+(``gain`` over ``promised``). An iteration is
+
+1. the **provider** linearises the residuals: :math:`J^T e` and :math:`J^T J`;
+2. the **damping** raises :math:`D` to the diagonal of :math:`H`;
+3. the **linear solve** gives :math:`\delta`, by Cholesky of :math:`R(H + \lambda D)R` with :math:`R =
+   \mathrm{diag}(H)^{-1/2}`, so that rounding does not see the parameters' units;
+4. the step is taken if :math:`\rho >` ``MIN_GAIN``, and :math:`\lambda` becomes the smaller the better the promise was
+   kept, at least a third of itself; otherwise :math:`\lambda` grows, each time twice as fast (Nielsen 1999), and step 3
+   is repeated at the price of one run over the records;
+5. from ``evidence_after`` on, the **evidence** moves :math:`\alpha` and :math:`\beta` (``regularisation.py``);
+6. the **termination** decides whether to go on: no improvement of ``at.loss`` over some iterations, no step that helps
+   at any damping, or a limit.
+
+Since the evidence moves :math:`F` itself, progress is judged by ``at.loss`` alone, and :math:`F` may rise from one
+iteration to the next.
+
+Limits: finds a local minimum, a different one from each start; at a minimum with large residuals convergence is linear,
+for want of second derivatives; one dense :math:`p \times p` factorisation a step, so for networks of some thousand
+parameters at most.
 """
 
 from __future__ import annotations

@@ -1,4 +1,38 @@
-"""Providers: where residuals and Jacobians come from. Open and closed loop differ here and nowhere else."""
+r"""Providers: where residuals and Jacobians come from. Open and closed loop differ here and nowhere else.
+
+Record :math:`r` has inputs ``u``, measured outputs ``target`` and weights :math:`w_t` (``root_weights`` squared; zero
+where a sample is masked), all in scaled numbers. With :math:`x_t` the lagged inputs and outputs at step :math:`t`, the
+model's output is
+
+.. math::
+    \hat y_t(\theta) = f(x_t; \theta), \qquad e_t = \hat y_t - \text{target}_t, \qquad
+    E(\theta) = \tfrac12 \sum_r \sum_t w_t e_t^2.
+
+What stands in :math:`x_t` for the past outputs is all that tells the loops apart. Let :math:`s_t = k \lfloor t / k
+\rfloor` be the first step of the window of ``horizon`` :math:`k` in which :math:`t` lies; the output at lag :math:`l` is
+
+.. math::
+    x_{t,l} = \begin{cases} \hat y_{t-l} & t - l \ge s_t \\ \text{measured}_{t-l} & t - l < s_t \end{cases}
+    \qquad\Rightarrow\qquad
+    J_t = \frac{d \hat y_t}{d\theta} = \frac{\partial f}{\partial\theta}
+      + \sum_{l:\, t - l \ge s_t} c_{t,l} J_{t-l}, \qquad c_{t,l} = \frac{\partial f}{\partial x_{t,l}}.
+
+With :math:`k = 1` no past output is the model's own: the open loop, whose rows do not depend on each other. With
+:math:`k` as long as the record only the history is measured: the closed loop, the free run. Each record starts from its
+own ``history``, so that records are never concatenated. The rows :math:`J_t` are exact (``sysid/kernels/recursion.py``
+runs the recursion and derives it for the network); none of them is kept beyond its block of ``BLOCK`` rows, because a
+Gauss-Newton method needs
+
+.. math:: \text{gradient} = \sum_t w_t e_t J_t, \qquad \text{gauss\_newton} = \sum_t w_t J_t^T J_t
+
+and no more. Their cost is :math:`N p (1 + n_l)` multiply-adds for the rows, of :math:`n_l` output lags, and
+:math:`N p^2` for the products, which dominate from some ten parameters on.
+
+Limits: the second derivatives :math:`\sum w_t e_t\, d^2 \hat y_t / d\theta^2` are left out, as in every Gauss-Newton
+method, which is right where the residuals are small or change sign often. A free run that is unstable has rows that
+grow without bound (:attr:`Linearisation.finite`; outputs are clipped, and a clipped sample has a zero row). Over a
+horizon, and one step ahead, a masked sample does not count, but is still the measured past of the samples after it.
+"""
 
 from __future__ import annotations
 
