@@ -1,0 +1,142 @@
+"""Annotators: states along traces, figures state by state, and samples that weigh by their state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError, TraceError
+from sysid.estimation.provider import Experiment
+from sysid.ingest import load_dataset
+from sysid.models import Mapping, Start
+from sysid.reporting.results import read_results
+from sysid.traces import Channel, Role, Trace, TraceSet
+from sysid.validation import CaseResult, Evaluation
+from sysid.validation.metrics import figures
+from sysid.workbench.annotation import annotated_set, by_state, find_annotator, weighted
+from sysid.workbench.cli import run_cli
+from sysid.workbench.config import read_pipeline
+from sysid.workbench.pipeline import run_pipeline
+
+U = Channel(name="u", unit="V")
+BRAKE = """\
+name: brake
+data: abdx-combined
+mapping: BP+AR+ER -> BC
+rest: {BC: 0}
+fits: [{name: ARX, structure: {kind: ARX, na: 1, nb: [2, 2, 2], nk: [0, 0, 0]}}]
+export: null
+annotate: {by: brake-states, weights: {emergency: 4}}
+"""
+
+
+class Halves:
+    """Says low and high."""
+
+    channel, labels = "HALF", ("low", "high", "never")
+
+    def __call__(self, trace: Trace) -> Trace:
+        half = (trace["u"] > 0.0).astype(np.float64)
+        return Trace(
+            name=trace.name,
+            sample_time=trace.sample_time,
+            channels=(*trace.channels, Channel(name=self.channel, unit="1")),
+            values=np.column_stack([trace.values, half]),
+            usable=trace.usable,
+        )
+
+
+def trace_set() -> TraceSet:
+    values = np.array([[-1.0], [1.0], [1.0], [1.0]])
+    return TraceSet(name="set", traces=(Trace(name="a", sample_time=1.0, channels=(U,), values=values),))
+
+
+def test_figures_are_split_by_state_and_add_up() -> None:
+    traces = annotated_set(trace_set(), Halves())
+    target, output = np.zeros(4), np.array([2.0, 1.0, 1.0, 1.0])
+    whole = figures(target, output, "V")
+    case = CaseResult(
+        case="a", role=Role.TEST, free_run=whole, one_step=whole, run_time_s=1.0, time=np.arange(4.0), target=target,
+        simulated=output, predicted=output,
+    )  # fmt: skip
+    split = by_state(Evaluation(cases={"a": case}), traces, Halves(), Start()).cases["a"]
+    assert split.by_state is not None
+    assert {name: (one.mse, share) for name, (one, share) in split.by_state.items()} == {
+        "low": (4.0, 0.25),
+        "high": (1.0, 0.75),
+    }
+    assert sum(one.mse * share for one, share in split.by_state.values()) == whole.mse
+    assert split.to_dict()["by_state"]["low"]["share"] == 0.25
+
+
+def test_samples_weigh_by_their_state_and_one_on_average() -> None:
+    trace = weighted(annotated_set(trace_set(), Halves())["a"], Halves(), {"low": 5.0})
+    assert trace.weights is not None
+    np.testing.assert_allclose(trace.weights, np.array([5.0, 1.0, 1.0, 1.0]) / 2.0)
+    loss = Experiment.from_trace(trace, Mapping.parse("u -> HALF"), Start(), 0.0)
+    np.testing.assert_array_equal(loss.weights, trace.weights)
+    assert trace.digest != annotated_set(trace_set(), Halves())["a"].digest
+
+
+@pytest.mark.parametrize("weights", [{"middle": 1.0}, {"low": -1.0}, {"low": 0.0, "high": 0.0}])
+def test_weights_that_mean_nothing_are_refused(weights: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=r"weights|no sample"):
+        weighted(annotated_set(trace_set(), Halves())["a"], Halves(), weights)
+
+
+@pytest.mark.parametrize("weights", [np.ones(3), np.array([1.0, 1.0, -1.0, 1.0]), np.full(4, np.nan)])
+def test_weights_that_do_not_fit_a_trace_are_refused(weights: np.ndarray) -> None:
+    with pytest.raises(TraceError, match="weights do not match"):
+        Trace(name="a", sample_time=1.0, channels=(U,), values=np.zeros((4, 1)), weights=weights)
+
+
+def test_a_misspelt_annotator_is_named() -> None:
+    with pytest.raises(ConfigError, match="did you mean brake-states"):
+        find_annotator("brake-state", where="here")
+
+
+def test_a_pipeline_reports_by_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "brake.yaml"
+    file.write_text(BRAKE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):  # The second time from what is stored.
+        run_pipeline(read_pipeline(file), tmp_path / "run", command="sysid run brake")
+    case = read_results(tmp_path / "run").fits[0].cases["VAL05"]
+    assert case.by_state is not None
+    assert {"release", "emergency"} <= set(case.by_state)
+    assert sum(one.share for one in case.by_state.values()) == pytest.approx(1.0)
+    assert sum(one.share * one.mse for one in case.by_state.values()) == pytest.approx(case.free_run.mse)
+    assert "Error by state" in (tmp_path / "run" / "report" / "index.html").read_text(encoding="utf-8")
+
+
+def test_weights_move_the_error_to_where_they_are_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = []
+    for weight in (1, 50):
+        file = tmp_path / "brake.yaml"
+        file.write_text(BRAKE.replace("emergency: 4", f"emergency: {weight}"), encoding="utf-8")
+        results = run_pipeline(read_pipeline(file), tmp_path / f"run{weight}", command="sysid run brake")
+        states = results.fits[0].cases["EST01"].by_state
+        assert states is not None
+        found.append(states)
+    assert found[1]["emergency"].mse < found[0]["emergency"].mse
+    assert found[1]["release"].mse > found[0]["release"].mse
+
+
+def test_a_data_set_is_annotated_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "states"
+    assert run_cli(["ingest", "abdx-combined", "--annotate", "brake-states", "--out", str(out)]) == 0
+    assert "emergency" in capsys.readouterr().out
+    traces = load_dataset(out / "dataset.yaml")
+    assert set(np.unique(traces["VAL05"]["STATE"])) <= set(range(7))
+    np.testing.assert_array_equal(traces["VAL05"]["BC"], load_dataset("abdx-combined")["VAL05"]["BC"])
+    assert run_cli(["ingest", "abdx-combined", "--annotate", "brake-states", "--out", str(out)]) == 2
+
+
+def test_a_file_alone_cannot_be_annotated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("t [s],u [V]\n0,1\n1,1\n", encoding="utf-8")
+    assert run_cli(["ingest", str(file), "--annotate", "brake-states"]) == 2
+    assert "--propose" in capsys.readouterr().err
