@@ -9,7 +9,7 @@ model's output is
     E(\theta) = \tfrac12 \sum_r \sum_t w_t e_t^2.
 
 What stands in :math:`x_t` for the past outputs is all that tells the loops apart. Let :math:`s_t = k \lfloor t / k
-\rfloor` be the first step of the window of ``horizon`` :math:`k` in which :math:`t` lies; the output at lag :math:`l` is
+\rfloor` be the first step of the window of ``horizon`` :math:`k` that :math:`t` lies in; the output at lag :math:`l` is
 
 .. math::
     x_{t,l} = \begin{cases} \hat y_{t-l} & t - l \ge s_t \\ \text{measured}_{t-l} & t - l < s_t \end{cases}
@@ -39,6 +39,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +111,7 @@ class Linearisation:
         loss: :math:`\frac12 \sum w e^2` in scaled numbers.
         gradient: :math:`J^T W e` with :math:`e = \hat y - y`, shape ``(n_parameters,)``.
         gauss_newton: :math:`J^T W J`, shape ``(n_parameters, n_parameters)``.
-        correlation_time: Samples after which the residuals count as new information, at least 1 (see
+        correlation_time: Counted samples after which the residuals count as new information, at least 1 (see
             :func:`correlation_time`).
     """
 
@@ -154,6 +155,11 @@ class AbstractProvider(ABC):
         """
 
 
+ScaledRecord: TypeAlias = tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None
+]
+
+
 @dataclass(frozen=True, eq=False)
 class _Record:
     """An experiment in scaled numbers.
@@ -188,19 +194,27 @@ class RecursionProvider(AbstractProvider):
         closed: Free run if true, one step ahead otherwise.
         horizon: Samples after which a free run begins anew from measured output; ``None`` for the whole record. Every
             sample is then predicted between 1 and ``horizon`` steps ahead.
+        stride: Every so-manieth sample of a record counts.
     """
 
     template: Recursion
     experiments: tuple[Experiment, ...]
     closed: bool
     horizon: int | None = None
+    stride: int = 1
     n_samples: int = field(init=False)
     _records: tuple[_Record, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "experiments", tuple(self.experiments))
-        object.__setattr__(self, "n_samples", sum(e.n_counted for e in self.experiments))
         object.__setattr__(self, "_records", tuple(self._record(e) for e in self.experiments))
+        counted = [
+            len(r.target[:: self.stride])
+            if r.root_weights is None
+            else np.count_nonzero(r.root_weights[:: self.stride])
+            for r in self._records
+        ]
+        object.__setattr__(self, "n_samples", int(sum(counted)))
 
     def _record(self, experiment: Experiment) -> _Record:
         u, measured = self.template.extended(experiment.inputs, experiment.history)
@@ -215,6 +229,11 @@ class RecursionProvider(AbstractProvider):
             return 1
         return len(record.target) if self.horizon is None else self.horizon
 
+    @property
+    def scaled_records(self) -> tuple[ScaledRecord, ...]:
+        """Of each record: scaled inputs and output with their history, target, square roots of the weights or none."""
+        return tuple((r.u, r.y, r.target, r.root_weights) for r in self._records)
+
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
         total = 0.0
@@ -226,6 +245,7 @@ class RecursionProvider(AbstractProvider):
             else:
                 residual = self._pass(record, theta).out - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
+            residual = residual[:: self.stride]
             total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
 
@@ -239,12 +259,16 @@ class RecursionProvider(AbstractProvider):
             passed = self._pass(record, theta)
             residual = passed.out - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
-            correlated += len(residual) * correlation_time(residual)
-            loss += 0.5 * float(residual @ residual)
+            correlated += len(residual) * max(1.0, correlation_time(residual) / self.stride)
+            counted = residual[:: self.stride]
+            loss += 0.5 * float(counted @ counted)
             for first, block in self._blocks(record, theta, passed):
                 rows = slice(first, first + len(block))
                 weighted = block if record.root_weights is None else block * record.root_weights[rows, None]
-                gradient += weighted.T @ residual[rows]
+                some = slice(-first % self.stride, None, self.stride)
+                # A copy only where rows are left out: products of strided arrays are not done by BLAS.
+                weighted = weighted if self.stride == 1 else np.ascontiguousarray(weighted[some])
+                gradient += weighted.T @ residual[rows][some]
                 # NumPy sees that both factors are one array and calls syrk, half the flops of a general product; unlike
                 # SciPy's wrapper of it, it lets the other starts' threads run meanwhile.
                 matrix += weighted.T @ weighted

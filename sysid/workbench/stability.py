@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from pydantic import BaseModel, Field
 
+from sysid.errors import TraceError
 from sysid.estimation import FitResult, Status
 from sysid.models import AbstractModel, Mapping
 from sysid.traces import Trace
@@ -70,7 +71,10 @@ class StabilityCheck:
         if config.count == 0:
             return cls(config=config, sequences=None)
         if not declared:
-            return cls(config=config, sequences=Excursions.of(estimation, inputs, outputs))
+            try:
+                return cls(config=config, sequences=Excursions.of(estimation, inputs, outputs))
+            except TraceError:  # too short to make sequences from, which is no reason not to fit
+                return cls(config=config, sequences=None)
         sequences = TraceSequences(
             inputs=inputs,
             outputs=outputs,

@@ -50,6 +50,12 @@ def epoch(samples: int, neurons: int) -> tuple[RecursionProvider, np.ndarray]:
     return RecursionProvider(template=template, experiments=(record,), closed=True), theta
 
 
+def epoch_ms(samples: int, neurons: int) -> float:
+    """Milliseconds of one epoch."""
+    provider, theta = epoch(samples, neurons)
+    return least_ms(lambda: provider.linearise(theta))
+
+
 def operations(samples: int, parameters: int, neurons: int) -> float:
     """Floating-point operations of an epoch that cannot be saved."""
     return samples * (parameters * (parameters + 1.0) + 2.0 * parameters * 2 + 2.0 * neurons * 7)
@@ -70,7 +76,7 @@ def main() -> None:
     square = np.random.default_rng(2).standard_normal((1500, 1500))
     rate = 2 * 1500**3 / least_ms(lambda: square @ square) / 1e6
     sizes = [len(epoch(10, neurons)[1]) for neurons in NEURONS]
-    table = np.array([[least_ms(lambda e=epoch(n, k): e[0].linearise(e[1])) for n in SAMPLES] for k in NEURONS])
+    table = np.array([[epoch_ms(n, k) for n in SAMPLES] for k in NEURONS])
     print(f"matrix product of this machine, one thread: {rate:.0f} Gflop/s")
     print("\nmilliseconds an epoch\n| parameters | " + " | ".join(f"{n:,}" for n in SAMPLES) + " samples | exponent |")
     print("|---|" + "---|" * (len(SAMPLES) + 1))
