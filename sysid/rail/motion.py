@@ -14,8 +14,8 @@ from sysid.rail.track import TrackProfile
 from sysid.rail.train import Train
 
 CURVE_RESISTANCE = 6.85
-"""Curve resistance in N per kg times radius in m: 0.8 lb per short ton and degree of curve (AREMA Manual, 16-2),
-a degree being a radius of 1,746.4 m: 0.8 * 4.448 / 907.18 * 1746.4."""
+"""Curve resistance in N per kg times radius in m: 0.8 lb per short ton and degree of curve, as the American Railway
+Engineering Association recommends, a degree being a radius of 1,746.4 m: 0.8 * 4.448 / 907.18 * 1746.4."""
 
 STEP = 1e-2
 """Step in s (ours): half of it changes the peak forces of a braked loaded train by less than half a percent."""

@@ -29,7 +29,8 @@ class TailSettings:
         emergency_delay: Time in s from the order to the open valve: at most 1 s (49 CFR 232.405).
         service_area: In m2 (ours: 5 mm across; a service rate at the end of a long train).
         service_delay: Time in s from a service order to the valve (ours).
-        minimum_reduction: Of a minimum application in psi (ours: that of the 26-L brake valve is 6 to 8 psi).
+        minimum_reduction: Of a minimum application in psi (ours: the 26-L brake valve's is 6 to 8 psi by the
+            description of the San Diego Railroad Museum).
         refusal: Fall of the tail's pipe in psi since an order's time stamp that makes the order void (ours: the
             reporting step of 49 CFR 232.403).
 

@@ -54,14 +54,16 @@ class Davis:
 
 
 def modified_davis(mass: float, axles: int, *, drag: float = 0.07) -> Davis:
-    """The modified Davis equation of the American Railway Engineering Association (1970).
+    """The modified Davis equation of Committee 16 of the American Railway Engineering Association.
 
-    ``R = 0.6 W + 20 n + 0.01 W V + K V^2`` with R in lb, W in short tons, n axles, V in mph.
+    ``R = 0.6 W + 20 n + 0.01 W V + K V^2`` with R in lb, W in short tons, n axles, V in mph, as A. A. Trani prints it
+    (per ton) in "Rail Resistance Equations", Virginia Tech CEE 3604. K is 0.07 for conventional equipment, 0.0935 for
+    containers and 0.16 for trailers on flat wagons.
 
     Args:
         mass: Of the vehicle in kg.
         axles: Their number.
-        drag: K, in lb per mph2: 0.07 for conventional equipment, 0.16 for containers on flat wagons.
+        drag: K, in lb per mph2.
 
     Returns:
         The resistance in SI.
@@ -83,8 +85,7 @@ def modified_davis(mass: float, axles: int, *, drag: float = 0.07) -> Davis:
 class Shoe:
     """Friction of a brake shoe that falls with speed: ``base (v + reference) / (slope v + reference)``.
 
-    The form is Karwatzki's (1950); 150 km/h and a slope of 2 are those of high-friction composition shoes in the
-    Chinese traction code TB/T 1407. The friction at rest is ours.
+    Form and numbers are ours, of the size of a composition shoe's.
 
     Args:
         base: Coefficient at rest.
