@@ -18,6 +18,7 @@ from sysid.estimation.checkpoint import Checkpoint
 from sysid.estimation.growing import grown
 from sysid.estimation.initialise import Layout
 from sysid.estimation.posterior import calibrate, laplace
+from sysid.estimation.prelude import StepSamples
 from sysid.estimation.provider import Experiment, RecursionProvider, experiments_of
 from sysid.estimation.regression import lagged
 from sysid.estimation.result import FitResult, Loop, Status
@@ -74,8 +75,14 @@ def fit_narx(
     experiments = (*experiments, *_offset(experiments, mapping, training))
     template = _template(traces[0], mapping, network, experiments, rest)
     layout = Layout(lags=network.lags(len(mapping.inputs)), neurons=network.neurons, linear=network.feedthrough)
-    to_plain = _basis(training, template, experiments, layout).to_plain(layout)
-    inner = RecursionProvider(template=template.recursion, experiments=experiments, closed=training.loop is Loop.CLOSED)
+    basis = _basis(training, template, experiments, layout)
+    to_plain = basis.to_plain(layout)
+    inner = RecursionProvider(
+        template=template.recursion,
+        experiments=experiments,
+        closed=training.loop is Loop.CLOSED,
+        stride=training.stride,
+    )
     race = starts.Race(
         training=training,
         layout=layout,
@@ -87,6 +94,7 @@ def fit_narx(
         initial=_initial_parameters(initial, template, layout, to_plain, training.seed),
         on_progress=on_progress,
         resume=resume,
+        prelude=_prelude(training, template, experiments, layout, basis),
         curriculum=[RebasedProvider(inner=replace(inner, horizon=k), to_plain=to_plain) for k in training.curriculum],
     )
     candidates = starts.run(race)
@@ -96,11 +104,30 @@ def fit_narx(
     records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     records += [(t.columns(mapping.inputs), None) for t in selection]
     status = raced_status(chosen, candidates, records, interrupted=race.stop.is_set())
-    posterior = laplace(chosen.solution.state, chosen.model, to_plain, experiments, 1 + len(training.offsets))
+    posterior = laplace(
+        chosen.solution.state,
+        chosen.model,
+        to_plain,
+        experiments,
+        copies=1 + len(training.offsets),
+        stride=training.stride,
+    )
     if posterior is not None:
         posterior = calibrate(posterior, chosen.model, experiments_of(selection, mapping, start, rest))
     fit = raced_result(choice, candidates, training, status, time.perf_counter() - began)
     return replace(fit, posterior=posterior)
+
+
+def _prelude(
+    training: Training,
+    template: NARXModel,
+    experiments: Sequence[Experiment],
+    layout: Layout,
+    basis: RegressorBasis,
+) -> StepSamples | None:
+    if not training.prelude or not layout.linear or not layout.neurons:
+        return None
+    return StepSamples.of(template, experiments, layout, basis, samples=training.prelude, seed=training.seed)
 
 
 def _offset(experiments: Sequence[Experiment], mapping: Mapping, training: Training) -> list[Experiment]:

@@ -151,7 +151,13 @@ class Posterior:
 
 
 def laplace(
-    state: State, model: AbstractModel, to_plain: NDArray[np.float64], experiments: Sequence[Experiment], copies: int
+    state: State,
+    model: AbstractModel,
+    to_plain: NDArray[np.float64],
+    experiments: Sequence[Experiment],
+    *,
+    copies: int,
+    stride: int = 1,
 ) -> Posterior | None:
     """The posterior at the end of a fit.
 
@@ -161,6 +167,7 @@ def laplace(
         to_plain: From parameters in the basis to the model's, shape ``(n_parameters, n_directions)``.
         experiments: The records that were fitted.
         copies: How often each record is among them.
+        stride: Every so-manieth sample counted.
 
     Returns:
         The posterior, not calibrated; ``None`` where the evidence was never computed, or the model is no recursion.
@@ -172,7 +179,7 @@ def laplace(
     M = (state.prior.beta / copies) * state.at.gauss_newton * root[:, None] * root[None, :]
     M[np.diag_indices_from(M)] += 1.0
     counted = sum(e.n_counted for e in experiments)
-    paid = copies * evidence.correlation_time * evidence.total_effective_parameters
+    paid = copies * stride * evidence.correlation_time * evidence.total_effective_parameters
     left = max(1.0 - paid / counted, LEAST_NOISE_SHARE)
     variances = {}
     for loop in Loop:

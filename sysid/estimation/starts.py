@@ -22,6 +22,7 @@ from threadpoolctl import threadpool_limits
 from sysid.estimation.checkpoint import Checkpoint
 from sysid.estimation.initialise import AbstractLayout
 from sysid.estimation.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
+from sysid.estimation.prelude import StepSamples
 from sysid.estimation.provider import AbstractProvider
 from sysid.estimation.regularisation import Prior
 from sysid.estimation.result import Loop, Status
@@ -60,6 +61,7 @@ class Race:
         initial: Plain parameters of the first start; ``None`` for a random one.
         on_progress: Called after every iteration, from the threads that train.
         resume: Where the first start was put aside; ``None`` to begin it.
+        prelude: Where a random start is drawn and trained one step ahead before anything else; ``None`` for none.
         curriculum: Providers over shorter horizons, which a random start is trained on first, in this order.
     """
 
@@ -73,6 +75,7 @@ class Race:
     initial: NDArray[np.float64] | None
     on_progress: Callable[[FitProgress], None]
     resume: Checkpoint | None = None
+    prelude: StepSamples | None = None
     curriculum: Sequence[AbstractProvider] = ()
     stop: threading.Event = field(default_factory=threading.Event)
     iterations: dict[int, int] = field(default_factory=dict)
@@ -264,6 +267,8 @@ def _advance(race: Race, number: int, before: Candidate | None, share: float, se
         solution = engine.resume(race.provider, race.resume.state(race.provider, prior))
     elif before is None:
         seed, theta, centre = _begin(race, number)
+        if race.prelude is not None and seed is not None:
+            theta = _prelude(race, race.prelude, number, seed, centre)
         for provider in race.curriculum:
             first = replace(engine, termination=Termination(max_iterations=training.curriculum_iterations))
             first = replace(first, on_iteration=lambda _: None)
@@ -275,6 +280,38 @@ def _advance(race: Race, number: int, before: Candidate | None, share: float, se
         return before
     model = race.model(solution.theta)
     return Candidate(number=number, seed=seed, solution=solution, model=model, score=_score(race, model))
+
+
+def _prelude(
+    race: Race, prelude: StepSamples, number: int, seed: int, centre: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A random start after its prelude."""
+    training = race.training
+    scale = race.template.scaling.output_scale**2
+
+    def report(entry: Iteration) -> None:
+        race.on_progress(
+            FitProgress(
+                stage=f"prelude {entry.iteration} of {training.prelude_iterations}",
+                start=number + 1,
+                starts=training.starts,
+                iteration=0,  # the free run's, which have not begun
+                max_iterations=training.max_iterations,
+                mse=entry.mse * scale,
+                elapsed_s=entry.elapsed_s,
+                fraction=min(1.0, sum(race.iterations.values()) / planned_iterations(training)),
+            )
+        )
+
+    engine = LevenbergMarquardt(
+        termination=Termination(
+            max_iterations=training.prelude_iterations, tolerance=training.tolerance, patience=training.patience
+        ),
+        on_iteration=report,
+        should_stop=race.stop.is_set,
+    )
+    theta = prelude.draw(np.random.default_rng(seed), centre)
+    return engine.minimise(prelude, theta, _first_prior(race, prelude, theta, centre)).theta
 
 
 def _first_prior(

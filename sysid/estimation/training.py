@@ -33,6 +33,11 @@ class Training:
             sensor may be off.
         regularisation: ``None`` lets the evidence weigh the weights' sizes against the residuals, group by group. A
             number is that weight, the same for all and never changed: 0 is plain Levenberg-Marquardt (``trainlm``).
+        prelude: Samples on which a random start is trained one step ahead before the free run (``prelude.py``): cheap
+            iterations that find what switches where. 0 for none.
+        prelude_iterations: Iterations of the prelude.
+        stride: Every so-manieth sample counts in the loss. Residuals of a free run are correlated over tens of samples:
+            a few of them say nearly as much as all, and the price of the normal equations falls with them.
         curriculum: Horizons in samples over which a closed-loop start is trained before the whole record, such as
             ``[1, 20, 200]``: after each horizon the free run begins anew from measured output.
         curriculum_iterations: Iterations of each horizon; they come before those of ``max_iterations``.
@@ -50,6 +55,9 @@ class Training:
     basis: str = "levels and rates"
     offsets: tuple[Mapping[str, float], ...] = ()
     regularisation: float | None = None
+    prelude: int = 0
+    prelude_iterations: int = 300
+    stride: int = 1
     curriculum: tuple[int, ...] = ()
     curriculum_iterations: int = 20
 
@@ -74,9 +82,19 @@ class Training:
                 got=f"{list(self.curriculum)} for the {self.loop.value} loop",
                 remedy="write for example curriculum: [1, 20, 200] beside loop: closed",
             )
-        for name in ("max_iterations", "patience", "starts", "workers", "curriculum_iterations"):
+        for name in (
+            "max_iterations",
+            "patience",
+            "starts",
+            "workers",
+            "curriculum_iterations",
+            "prelude_iterations",
+            "stride",
+        ):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
+        if self.prelude < 0:
+            raise ConfigError("prelude is too small", where="prelude", expected="0 or more", got=self.prelude)
         if self.regularisation is not None and not 0.0 <= self.regularisation < float("inf"):
             raise ConfigError(
                 "not a regularisation",

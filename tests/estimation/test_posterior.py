@@ -78,7 +78,7 @@ def state(alpha: float, beta: float, gauss_newton: np.ndarray) -> State:
 @pytest.mark.parametrize("copies", [1, 3], ids=["each record once", "each record three times"])
 def test_the_covariance_is_the_inverse_of_the_curvature_in_the_basis_of_training(copies):
     J, P = RNG.standard_normal((40, 23)), np.eye(23) + 0.1 * RNG.standard_normal((23, 23))
-    found = laplace(state(0.7, 2.5, J.T @ J), model(), P, (experiment(),), copies)
+    found = laplace(state(0.7, 2.5, J.T @ J), model(), P, (experiment(),), copies=copies)
     expected = P @ np.linalg.inv(2.5 / copies * J.T @ J + 0.7 * np.eye(23)) @ P.T
     assert_allclose(found.covariance, expected, rtol=1e-9, atol=1e-12)
 
@@ -86,13 +86,13 @@ def test_the_covariance_is_the_inverse_of_the_curvature_in_the_basis_of_training
 def test_where_the_data_say_nothing_the_prior_stands():
     J = np.zeros((10, 23))
     J[:, :4] = 1e9  # so that rounding outweighs everything else
-    found = laplace(state(0.5, 1e6, J.T @ J), model(), np.eye(23), (experiment(),), 1)
+    found = laplace(state(0.5, 1e6, J.T @ J), model(), np.eye(23), (experiment(),), copies=1)
     assert np.isfinite(found.factor).all()
     assert_allclose(np.diag(found.covariance)[4:], 2.0, rtol=1e-6)
 
 
 def test_the_noise_is_the_residual_with_the_parameters_paid_for():
-    found = laplace(state(1.0, 1.0, np.eye(23)), model(), np.eye(23), (experiment(),), 1)
+    found = laplace(state(1.0, 1.0, np.eye(23)), model(), np.eye(23), (experiment(),), copies=1)
     e = experiment()
     free = np.mean((model().simulate(e.inputs, e.history) - e.output) ** 2)
     step = np.mean((model().predict(e.inputs, e.output, e.history) - e.output) ** 2)
@@ -102,7 +102,7 @@ def test_the_noise_is_the_residual_with_the_parameters_paid_for():
 
 def test_without_evidence_there_is_no_posterior():
     before = replace(state(1.0, 1.0, np.eye(23)), evidence=None)
-    assert laplace(before, model(), np.eye(23), (experiment(),), 1) is None
+    assert laplace(before, model(), np.eye(23), (experiment(),), copies=1) is None
 
 
 def test_the_spread_makes_the_interval_hold_what_it_should_on_the_records_it_was_found_on():
