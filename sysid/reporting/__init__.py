@@ -6,7 +6,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sysid.reporting.against import compare_runs as compare_runs
+    from sysid.reporting.against_page import write_comparison as write_comparison
     from sysid.reporting.figures import case_figure as case_figure
+    from sysid.reporting.pdf import write_pdf as write_pdf
+    from sysid.reporting.publication import publish_run as publish_run
     from sysid.reporting.published import PublishedFigure as PublishedFigure
     from sysid.reporting.published import PublishedTable as PublishedTable
     from sysid.reporting.published import published_names as published_names
@@ -27,12 +31,16 @@ _HOME = {
     "PublishedTable": "published",
     "Results": "results",
     "case_figure": "figures",
+    "compare_runs": "against",
     "parse_results": "results",
+    "publish_run": "publication",
     "published_names": "published",
     "read_published": "published",
     "read_results": "results",
     "read_signals": "signals",
     "results_json_schema": "results",
+    "write_comparison": "against_page",
+    "write_pdf": "pdf",
     "write_report": "report",
     "write_results": "results",
 }

@@ -108,9 +108,8 @@ def amplitude_section(fit: FitRecord, signals: Dict[str, CaseSignals]) -> Sectio
         note="Bands of equal width. A mean error far from zero says that the model reads too high or too low there.",
     )
     title = f"{fit.name}: error by level of {output}"
-    drawing = picture(
-        amplitude_figure(found, label=output, unit=unit), title, "Errors of the free run by level of the target, logarithmic.", "amplitude"
-    )
+    words = "Errors of the free run by level of the target, logarithmic."
+    drawing = picture(amplitude_figure(found, label=output, unit=unit), title, words, "amplitude")
     parts: tuple[Part, ...] = (table, drawing)
     return Section(anchor="amplitude", title="Error by amplitude", parts=parts)
 

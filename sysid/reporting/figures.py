@@ -21,6 +21,7 @@ from sysid.reporting.thinning import distinct_points, thin
 
 _COLUMNS = 450
 _FREE_RUN: dict[str, Any] = {"color": PALETTE[0], "linestyle": DASHES[1], "linewidth": 1.5}
+_OTHER_RUN: dict[str, Any] = {"color": PALETTE[1], "linestyle": DASHES[2], "linewidth": 1.5}
 _ONE_STEP: dict[str, Any] = {"color": PALETTE[1], "linestyle": DASHES[2], "linewidth": 1.5}
 
 
@@ -49,6 +50,8 @@ def case_figure(
     unit: str,
     predicted: NDArray[np.float64] | None = None,
     interval: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    other: NDArray[np.float64] | None = None,
+    names: tuple[str, str] = ("free run", "other free run"),
     columns: int = 450,
 ) -> Figure:
     """One model on one case: target and free run over time, and the error below.
@@ -63,6 +66,8 @@ def case_figure(
         predicted: One step ahead, shape ``(n_samples,)``; left out if not given.
         interval: Lower and upper end of the free run's 95 % interval, drawn around the error's zero; left out if not
             given.
+        other: Free run of another model, shape ``(n_samples,)``; left out if not given.
+        names: What the free run, and the other one, are called.
         columns: How finely lines are drawn: up to four points in each of so many columns.
 
     Returns:
@@ -78,7 +83,10 @@ def case_figure(
         if predicted is not None:
             _line(above, time, predicted, columns, **_ONE_STEP, label="one step ahead")
             _line(below, time, predicted - target, columns, **_ONE_STEP)
-        _line(above, time, simulated, columns, **_FREE_RUN, label="free run")
+        if other is not None:
+            _line(above, time, other, columns, **_OTHER_RUN, label=names[1])
+            _line(below, time, other - target, columns, **{**_OTHER_RUN, "linewidth": 1.0})
+        _line(above, time, simulated, columns, **_FREE_RUN, label=names[0])
         if interval is not None:
             _band(below, time, simulated - interval[1], simulated - interval[0], columns)
         _line(below, time, simulated - target, columns, color=PALETTE[0], linewidth=1.0)

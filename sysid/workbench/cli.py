@@ -232,11 +232,25 @@ def promote(
 @app.command(epilog="Example: sysid report runs/service-brake")
 def report(
     run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    against: Annotated[Path | None, typer.Option(help="Folder of another run: report this one against it.")] = None,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Print it as PDF too; needs Chromium, Chrome or Edge.")] = False,
 ) -> None:
-    """Write the report of a run again, from its stored results; nothing is fitted."""
+    """Write the report of a run again, or against another run, from stored results; nothing is fitted."""
     from sysid.workbench.commands.report import report_command
 
-    report_command(run_folder)
+    report_command(run_folder, against=against, pdf=pdf)
+
+
+@app.command(epilog="Example: sysid publish runs/service-brake")
+def publish(
+    run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    name: Annotated[str | None, typer.Option("--as", help="Name of the report; the pipeline's by default.")] = None,
+    into: Annotated[Path, typer.Option(help="Folder of the published reports.")] = Path("reports"),
+) -> None:
+    """Publish a run's report: a page of text and a few figures, small enough to be kept under version control."""
+    from sysid.workbench.commands.publish import publish_command
+
+    publish_command(run_folder, name=name, into=into)
 
 
 @app.command(epilog="Example: sysid ui")

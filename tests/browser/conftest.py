@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -40,21 +40,21 @@ def page(browser, request: pytest.FixtureRequest) -> Iterator[object]:
     """A fresh page that accepts downloads, as wide as a desk's screen."""
     context = browser.new_context(viewport={"width": 1600, "height": 1000}, accept_downloads=True)
     # The whole suite may run beside it on two cores.
-    context.set_default_timeout(30_000)
+    context.set_default_timeout(90_000)
     yield context.new_page()
     context.close()
 
 
 @pytest.fixture
-def picture(page, request: pytest.FixtureRequest):
+def picture(page, request: pytest.FixtureRequest) -> Callable[..., Path]:
     """Keeps what the page shows under a name, in ``build/browser/<test>/``."""
     folder = FOLDER / request.node.name
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
 
-    def take(name: str, *, full: bool = False) -> Path:
+    def take(name: str, *, of: object = page) -> Path:
         path = folder / f"{name}.png"
-        page.screenshot(path=path, full_page=full)
+        of.screenshot(path=path)
         return path
 
     return take

@@ -1,4 +1,4 @@
-"""``sysid report``: the report of stored results."""
+"""``sysid report``: the report of stored results, or of one run against another."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from pathlib import Path
 from sysid.workbench.commands.run import console
 
 
-def report_command(run_folder: Path) -> None:
+def report_command(run_folder: Path, *, against: Path | None, pdf: bool) -> None:
     """Write a run's report.
 
     Args:
         run_folder: The run folder.
+        against: The folder of a run that it is compared with; ``None`` reports the run alone.
+        pdf: Whether to print it as PDF too.
 
     Raises:
-        ConfigError: If the folder holds no results.
+        ConfigError: If a folder holds no results, the runs have nothing in common, or nothing can print.
     """
-    from sysid.reporting.report import write_report
+    from sysid.reporting import write_comparison, write_pdf, write_report
 
-    console().print(f"Report: {write_report(run_folder)}", soft_wrap=True)
+    page = write_report(run_folder) if against is None else write_comparison(run_folder, against)
+    console().print(f"Report: {page}", soft_wrap=True)
+    if pdf:
+        console().print(f"PDF:    {write_pdf(page, page.with_suffix('.pdf'))}", soft_wrap=True)
