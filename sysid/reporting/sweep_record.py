@@ -127,6 +127,7 @@ class SweepRecord(_Record):
     method: str
     loop: str = ""
     points: int = Field(description="Points of the grid, whether all were tried or not.")
+    ranges: dict[str, list[Any]] = Field(default={}, description="By field, every value that it can take.")
     objectives: list[str]
     choose_by: str
     choose_on: str

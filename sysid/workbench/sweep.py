@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import optuna
-from optuna.distributions import BaseDistribution, CategoricalDistribution
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.trial import TrialState, create_trial
 
 from sysid.errors import ConfigError
@@ -198,11 +198,7 @@ def _finished(trial: Trial, record: SweepRecord) -> optuna.trial.FrozenTrial:
     values = [record.figure(trial, name) for name in record.objectives]
     good = trial.in_full and all(math.isfinite(value) for value in values)
     params = {name: _plain(value) for name, value in trial.values.items()}
-    distributions: dict[str, BaseDistribution] = {}
-    for name, value in params.items():
-        distributions[name] = CategoricalDistribution(
-            sorted({_plain(other.values[name]) for other in record.trials if name in other.values} | {value}, key=repr)
-        )
+    distributions = {name: _distribution([*record.ranges.get(name, []), trial.values[name]]) for name in params}
     attributes = {KEY: trial.key, "label": trial.label, "status": trial.status}
     return create_trial(
         state=TrialState.COMPLETE if good else TrialState.FAIL,
@@ -211,6 +207,16 @@ def _finished(trial: Trial, record: SweepRecord) -> optuna.trial.FrozenTrial:
         distributions=distributions,
         user_attrs=attributes,
     )
+
+
+def _distribution(values: Sequence[Any]) -> BaseDistribution:
+    """How Optuna describes a range; it takes one description of a field in all trials of a study."""
+    plain = list(dict.fromkeys(_plain(value) for value in values))
+    if all(isinstance(value, int) and not isinstance(value, bool) for value in plain):
+        return IntDistribution(min(plain), max(plain))
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in plain):
+        return FloatDistribution(min(plain), max(plain))
+    return CategoricalDistribution(plain)
 
 
 def _plain(value: Any) -> Any:

@@ -213,16 +213,17 @@ class Driver:
             else:
                 done[key] = self._note(job, stored, fresh=False)
         followers: dict[str, list[Job]] = {}
-        ready: list[tuple[float, int, Job]] = []
+        ready: list[tuple[bool, float, int, Job]] = []
+        waited_for = {job.after for job in missing.values()}
         for order, job in enumerate(missing.values()):
             if job.after in missing:
                 followers.setdefault(str(job.after), []).append(job)
             else:
-                heapq.heappush(ready, (-job.cost, order, job))
+                heapq.heappush(ready, (job.key not in waited_for, -job.cost, order, job))
         busy = 0
         while ready or busy:
             while ready and self.workers.free > 0:
-                job = heapq.heappop(ready)[2]
+                job = heapq.heappop(ready)[3]
                 self.workers.submit(job, None if job.after is None else self.store.read(job.after))
                 busy += 1
             for job, outcome in self.workers.finished():
@@ -231,8 +232,8 @@ class Driver:
                 self.store.write(outcome)
                 self.clock.keep()
                 done[job.key] = self._note(job, outcome, fresh=True)
-                for order, follower in enumerate(followers.pop(job.key, [])):
-                    heapq.heappush(ready, (-follower.cost, order, follower))
+                for follower in followers.pop(job.key, []):
+                    heapq.heappush(ready, (follower.key not in waited_for, -follower.cost, follower.number, follower))
             self._progress.show()
         return done
 

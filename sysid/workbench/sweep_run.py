@@ -324,6 +324,7 @@ class _Run:
             method=config.method.name,
             loop=str(config.training.get("loop", "")),
             points=n_points,
+            ranges=_ranges(self.config.space()),
             objectives=list(config.objectives),
             choose_by=choose.by,
             choose_on=choose.on,
@@ -345,3 +346,13 @@ class _Run:
             publish(record, url)
         except Exception as error:  # noqa: BLE001 - a database can fail in any way, and the sweep is on disk
             self.tell(events.Warned(text=f"not written to the Optuna store ({type(error).__name__}: {error})"))
+
+
+def _ranges(space: Space) -> dict[str, list[Any]]:
+    """Every value that a field can take, over all structures that have it."""
+    found: dict[str, list[Any]] = {}
+    for alternative in space.alternatives:
+        for dimension in alternative.dimensions:
+            known = found.setdefault(dimension.name, [])
+            known += [value for value in dimension.values if value not in known]
+    return found
