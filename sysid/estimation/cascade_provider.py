@@ -27,6 +27,10 @@ BLOCK = 256
 """Rows of each output's Jacobian that are alive at a time: 256 rows of 1,500 parameters for four outputs are 12 MB."""
 
 
+GATHERED = 1024
+"""Rows that are gathered before they are squared: adding a matrix of 1,500 by 1,500 costs as much as some 500 rows."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Record:
     """One trace: every channel in a first run, and its level at rest; the targets at the samples that count.
@@ -257,12 +261,20 @@ class CascadeProvider(AbstractProvider):
         values, passed = self._pass(program, record, keep=True)
         residual = self._residual(record, values)
         gradient, matrix = np.zeros(n), np.zeros((n, n))
+        waiting: list[list[NDArray[np.float64]]] = [[] for _ in self.errors]
+        first = 0
         for rows, blocks in self._blocks(program, record, passed, n):
-            for j, block in enumerate(blocks):
-                reach = block.shape[1]
-                weighted = block if record.root_weights is None else block * record.root_weights[rows, None]
-                gradient[:reach] += weighted.T @ residual[rows, j]
+            for held, block in zip(waiting, blocks, strict=True):
+                held.append(block if record.root_weights is None else block * record.root_weights[rows, None])
+            if rows.stop - first < GATHERED and rows.stop < len(record.rows):
+                continue
+            for j, held in enumerate(waiting):
+                weighted = np.concatenate(held)
+                reach = weighted.shape[1]
+                gradient[:reach] += weighted.T @ residual[first : rows.stop, j]
                 matrix[:reach, :reach] += weighted.T @ weighted
+                held.clear()
+            first = rows.stop
         return gradient, matrix, residual
 
     def _blocks(
