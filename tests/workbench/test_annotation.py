@@ -19,6 +19,7 @@ from sysid.workbench.annotation import annotated_set, by_state, find_annotator, 
 from sysid.workbench.cli import run_cli
 from sysid.workbench.config import read_pipeline
 from sysid.workbench.pipeline import run_pipeline
+from sysid.workbench.record import read_scores
 
 U = Channel(name="u", unit="V")
 BRAKE = """\
@@ -101,17 +102,21 @@ def test_a_pipeline_reports_by_state(tmp_path: Path, monkeypatch: pytest.MonkeyP
     file = tmp_path / "brake.yaml"
     file.write_text(BRAKE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    for _ in range(2):  # The second time from what is stored.
-        run_pipeline(read_pipeline(file), tmp_path / "run", command="sysid run brake")
+    run_pipeline(read_pipeline(file), tmp_path / "run", command="sysid run brake")
     case = read_results(tmp_path / "run").fits[0].cases["VAL05"]
     assert case.by_state is not None
     assert {"release", "emergency"} <= set(case.by_state)
     assert sum(one.share for one in case.by_state.values()) == pytest.approx(1.0)
     assert sum(one.share * one.mse for one in case.by_state.values()) == pytest.approx(case.free_run.mse)
+    stored = read_scores(tmp_path / "run" / "fits" / "arx").evaluation.cases["VAL05"].by_state
+    assert stored is not None
+    assert {name: one.mse for name, (one, _) in stored.items()} == {n: one.mse for n, one in case.by_state.items()}
     assert "Error by state" in (tmp_path / "run" / "report" / "index.html").read_text(encoding="utf-8")
 
 
-def test_weights_move_the_error_to_where_they_are_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_weights_move_the_error_to_where_they_are_small(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quick_report: None
+) -> None:
     monkeypatch.chdir(tmp_path)
     found = []
     for weight in (1, 50):

@@ -140,7 +140,9 @@ def test_it_stands_in_the_report_of_the_run_that_was_judged(place: Path, judge: 
     assert read_results(place / "runs" / "first").fits
 
 
-def test_nothing_is_done_twice_and_nothing_new_has_no_new_date(place: Path, judge: OvershootJudge) -> None:
+def test_nothing_is_done_twice_and_nothing_new_has_no_new_date(
+    place: Path, judge: OvershootJudge, quick_report: None
+) -> None:
     first = judged(place)
     assert judge.done == ["1", "2"]
     assert judged(place)["created"] == first["created"]
@@ -149,9 +151,7 @@ def test_nothing_is_done_twice_and_nothing_new_has_no_new_date(place: Path, judg
     assert judge.done == ["1", "2"] * 2
 
 
-def test_another_option_is_another_step_and_what_a_killed_run_finished_is_kept(
-    place: Path, judge: OvershootJudge, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_killed_run_finished_is_kept(place: Path, judge: OvershootJudge, quick_report: None) -> None:
     steps = OvershootJudge.steps
 
     def broken(self: OvershootJudge, options: Options, subjects: Mapping[str, Sequence[Any]]) -> list[Step]:
@@ -162,18 +162,16 @@ def test_another_option_is_another_step_and_what_a_killed_run_finished_is_kept(
 
         return [first, Step(second.name, second.terms, killed)]
 
-    monkeypatch.setattr(OvershootJudge, "steps", broken)
-    with pytest.raises(KeyboardInterrupt):
-        judged(place)
-    monkeypatch.undo()
-    monkeypatch.setattr(runner, "find_judge", lambda *_, **__: judge)
-    monkeypatch.chdir(place)
-    judge.done.clear()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(OvershootJudge, "steps", broken)
+        with pytest.raises(KeyboardInterrupt):
+            judged(place)
+    assert judge.done == ["1"]
     judged(place)
-    assert judge.done == ["2"]
+    assert judge.done == ["1", "2"]
 
 
-def test_figures_are_tracked_once_for_what_was_judged(place: Path, judge: OvershootJudge) -> None:
+def test_figures_are_tracked_once_for_what_was_judged(place: Path, judge: OvershootJudge, quick_report: None) -> None:
     for _ in range(2):
         judged(place, tracking=True)
     client = connect(f"sqlite:///{place / 'mlflow.db'}")
@@ -197,7 +195,9 @@ def test_figures_are_tracked_once_for_what_was_judged(place: Path, judge: Oversh
         ("run: first, fit: ARX", "model: level", "not the address of a registered model"),
     ],
 )
-def test_what_cannot_be_judged_is_named(place: Path, judge: OvershootJudge, old: str, new: str, message: str) -> None:
+def test_what_cannot_be_judged_is_named(
+    place: Path, judge: OvershootJudge, quick_report: None, old: str, new: str, message: str
+) -> None:
     (place / "pipelines" / "jump.yaml").write_text(PIPELINE.replace(old, new), encoding="utf-8")
     with pytest.raises(ConfigError, match=message):
         judged(place)
