@@ -195,7 +195,7 @@ def test_figures_are_tracked_once_for_what_was_judged(place: Path, judge: Oversh
         ("run: first, fit: ARX", "model: level", "not the address of a registered model"),
     ],
 )
-def test_what_cannot_be_judged_is_named(
+def test_what_cannot_be_judged_is_named(  # noqa: PLR0917 - parameters and fixtures
     place: Path, judge: OvershootJudge, quick_report: None, old: str, new: str, message: str
 ) -> None:
     (place / "pipelines" / "jump.yaml").write_text(PIPELINE.replace(old, new), encoding="utf-8")
