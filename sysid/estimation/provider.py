@@ -39,7 +39,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,11 +154,6 @@ class AbstractProvider(ABC):
         """
 
 
-ScaledRecord: TypeAlias = tuple[
-    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None
-]
-
-
 @dataclass(frozen=True, eq=False)
 class _Record:
     """An experiment in scaled numbers.
@@ -228,11 +222,6 @@ class RecursionProvider(AbstractProvider):
         if not self.closed:
             return 1
         return len(record.target) if self.horizon is None else self.horizon
-
-    @property
-    def scaled_records(self) -> tuple[ScaledRecord, ...]:
-        """Of each record: scaled inputs and output with their history, target, square roots of the weights or none."""
-        return tuple((r.u, r.y, r.target, r.root_weights) for r in self._records)
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""

@@ -1,0 +1,205 @@
+"""Time to the same free-run error: jax-sysid, fastcan and pyrenn beside this project, in one run.
+
+    python -m tests.benchmarks peers [--cap=300] [--only=tank]
+
+The peers live in an environment of their own under the cache folder, which the first run makes (some 700 MB); they are
+no dependencies of the project. Two problems, the same lags and neurons for all: a synthetic tank behind a valve, 2,000
+samples, 2 lags, 10 neurons; and BP+AR -> BC on EST01 of the data set abdx-service, 20,000 samples, 2 lags, 20 neurons
+(fastcan: polynomials over the same lags). Every tool sees scaled signals at rest before the first sample; errors are
+those of the free run over the training record, none of unseen data.
+
+Times are processor times, one thread each, so that a machine with other work gives the same answer. A peer gets the
+cap at most. Two comparisons: the time to an error that was fixed beforehand (the tank: 3.6 % of the output's standard
+deviation; the cylinder: 7e-3 psi^2), and the time in which ours undercuts the peer's best, beside the time that this
+took the peer. Ours is the median over three seeds, the preparation of the fit included; a seed that never gets there
+counts as infinite. Imports count for nobody. Our kernels are compiled once per installation, jax's functions in each
+process: that difference is part of what is measured, and of the order of some seconds.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+from sysid.estimation import FitProgress, Training, fit_narx
+from sysid.ingest import load_dataset
+from sysid.models import NARX, Mapping
+from sysid.traces import Channel, Trace
+
+PINNED = ("jax-sysid==1.1.0", "fastcan==0.6.0", "pyrenn==0.1")
+WORKER = Path(__file__).with_name("_peers_worker.py")
+TOOLS = ("jax-sysid", "fastcan, degree 2", "fastcan, degree 3", "pyrenn")
+SEEDS = (0, 1, 2)
+PATIENCE = 8.0
+"""Wall time that a peer is given, in units of its cap and two minutes: the machine may have other work."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """A record, and what the tools share."""
+
+    name: str
+    trace: Trace
+    mapping: Mapping
+    rest_output: float
+    lags: int
+    neurons: int
+    target: float
+    """Mean squared error fixed beforehand, in the output's unit squared."""
+
+    @property
+    def scale(self) -> float:
+        return float(np.ptp(self.trace[self.mapping.output]) / 2.0)
+
+    def store(self, folder: Path) -> Path:
+        """What the peers read: deviations from rest, in half ranges."""
+        u, y = self.trace.columns(self.mapping.inputs), self.trace[self.mapping.output]
+        path = folder / "problem.npz"
+        span = np.ptp(u, axis=0) / 2.0
+        np.savez(path, u=(u - u[0]) / span, y=(y - self.rest_output) / self.scale, lags=self.lags, neurons=self.neurons)
+        return path
+
+
+def environment() -> Path:
+    """The peers' Python, made if it is not there."""
+    folder = Path.home() / ".cache" / "sysid" / ("peers-" + "-".join(p.replace("==", "-") for p in PINNED))
+    python = folder / "bin" / "python"
+    if not (folder / "complete").exists():
+        print(f"making {folder} with {', '.join(PINNED)}", flush=True)
+        subprocess.run([sys.executable, "-m", "venv", "--clear", str(folder)], check=True)
+        subprocess.run([str(python), "-m", "pip", "install", "-q", *PINNED], check=True)
+        (folder / "complete").touch()
+    return python
+
+
+def tank() -> Problem:
+    """An equal-percentage valve with a dead band fills a tank, which gravity empties and which overflows."""
+    rng = np.random.default_rng(0)
+    valve = np.repeat(rng.uniform(0.0, 1.0, 100), 20)
+    valve[:20] = 0.0
+    flow = np.where(valve > 0.1, 30.0 ** (valve - 1.0), 0.0)
+    level, y = 0.0, np.empty(2000)
+    for t in range(2000):
+        y[t] = level + 0.002 * rng.standard_normal()
+        level = float(np.clip(level + 0.05 * (1.2 * flow[t] - np.sqrt(level)), 0.0, 0.8))
+    channels = (Channel(name="valve", unit="1"), Channel(name="level", unit="m"))
+    trace = Trace(name="tank", sample_time=0.1, channels=channels, values=np.column_stack([valve, y]))
+    return Problem(
+        name="tank, 2,000 samples",
+        trace=trace,
+        mapping=Mapping.parse("valve -> level"),
+        rest_output=0.0,
+        lags=2,
+        neurons=10,
+        target=float((0.036 * y.std()) ** 2),
+    )
+
+
+def cylinder() -> Problem:
+    """BP+AR -> BC on EST01."""
+    trace = load_dataset("abdx-service", cases=["EST01"])["EST01"]
+    return Problem(
+        name="BP+AR -> BC on EST01, 20,000 samples",
+        trace=trace,
+        mapping=Mapping.parse("BP+AR -> BC"),
+        rest_output=0.0,
+        lags=2,
+        neurons=20,
+        target=7e-3,
+    )
+
+
+def peer(python: Path, tool: str, problem: Path, cap: float) -> tuple[np.ndarray, np.ndarray]:
+    """A peer's learning curve: seconds and scaled errors; empty where it gave none."""
+    command = [str(python), str(WORKER), tool, str(problem), str(cap)]
+    nothing = np.empty(0), np.empty(0)
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE * (cap + 120.0))
+    except subprocess.TimeoutExpired:
+        print(f"  {tool}: no answer within {PATIENCE * (cap + 120.0):g} s of wall time", flush=True)
+        return nothing
+    if done.returncode:
+        print(f"  {tool} failed: {done.stderr.strip()[-2000:]}", flush=True)
+        return nothing
+    points = np.array(json.loads(done.stdout.strip().splitlines()[-1]))
+    return (points[:, 0], points[:, 1]) if len(points) else nothing
+
+
+def own(problem: Problem, cap: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Seconds since the call and mse in the output's unit squared, one learning curve a seed."""
+    network = NARX(input_delays=problem.lags, output_delays=problem.lags, neurons=problem.neurons)
+
+    def curve(seed: int, iterations: int) -> tuple[np.ndarray, np.ndarray]:
+        points: list[tuple[float, float]] = []
+        began = time.process_time()
+
+        def watch(progress: FitProgress) -> None:
+            points.append((time.process_time() - began, progress.mse))
+            if points[-1][0] > cap:
+                raise KeyboardInterrupt  # ends the fit, not the program
+
+        training = Training(seed=seed, max_iterations=iterations, workers=1)
+        fit_narx(
+            [problem.trace], problem.mapping, network, training, rest_output=problem.rest_output, on_progress=watch
+        )
+        return np.array(points)[:, 0], np.array(points)[:, 1]
+
+    curve(0, 2)  # loads the compiled kernels
+    return [curve(seed, 2000) for seed in SEEDS]
+
+
+def reached(curve: tuple[np.ndarray, np.ndarray], error: float) -> float:
+    """Seconds until the error is undercut; infinite if it never is."""
+    seconds, errors = curve
+    return float(seconds[np.argmax(errors <= error)]) if (errors <= error).any() else np.inf
+
+
+def compare(problem: Problem, python: Path, cap: float, folder: Path) -> None:
+    """All tools on one problem."""
+    unit = f"{problem.trace.channel(problem.mapping.output).unit}^2"
+    print(f"{problem.name}; {problem.lags} lags, {problem.neurons} neurons; cap {cap:g} s a peer", flush=True)
+    curves = own(problem, min(cap, 60.0))
+    for curve, seed in zip(curves, SEEDS, strict=True):
+        print(
+            f"  ours, seed {seed}: {problem.target:.3g} {unit} in {reached(curve, problem.target):.2f} s; best "
+            f"{curve[1].min():.3g} within {curve[0][-1]:.1f} s",
+            flush=True,
+        )
+    ours = statistics.median(reached(curve, problem.target) for curve in curves)
+    stored = problem.store(folder)
+    for tool in TOOLS:
+        seconds, errors = peer(python, tool, stored, cap)
+        if not len(errors):
+            continue
+        errors = errors * problem.scale**2
+        theirs, best = reached((seconds, errors), problem.target), float(errors.min())
+        at_best = reached((seconds, errors), best)
+        undercut = statistics.median(reached(curve, best) for curve in curves)
+        ratio = f"{theirs / ours:.1f} x" if np.isfinite(theirs) else f"more than {cap / ours:.1f} x"
+        print(
+            f"  {tool}: {problem.target:.3g} {unit} in {theirs:.1f} s, ours {ours:.2f} s: {ratio}; its best {best:.3g} "
+            f"in {at_best:.1f} s, ours undercuts that in {undercut:.2f} s: {at_best / undercut:.1f} x",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    options = dict(argument[2:].split("=") for argument in sys.argv if argument.startswith("--") and "=" in argument)
+    limit, wanted = float(options.get("cap", 300.0)), options.get("only", "tank,cylinder").split(",")
+    interpreter = environment()
+    with tempfile.TemporaryDirectory() as scratch:
+        for make in (tank, cylinder):
+            if make.__name__ in wanted:
+                compare(make(), interpreter, limit, Path(scratch))
