@@ -6,40 +6,20 @@ from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, TraceError
-from sysid.kernels import cascade as kernel
-from sysid.models.base import AbstractModel
-from sysid.models.cascade_program import Limit, Part, program_of
+from sysid.models.cascade_program import Limit, Part
 from sysid.models.cascade_run import CascadeRun
-from sysid.models.history import History
+from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
 from sysid.models.wiring import Ends, Member, Wiring
 from sysid.traces import Trace
 
 Level = float | str
 """A value at rest in the channel's unit, or the input whose first sample it is."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Stage:
-    """Members that run in one pass over the samples.
-
-    Args:
-        ends: Their inputs and outputs.
-        depth: Past samples that they read.
-        program: Their tables; ``None`` for a model with a state of its own, which is run by itself.
-        model: That model.
-    """
-
-    ends: tuple[Ends, ...]
-    depth: int
-    program: kernel.Program | None = None
-    model: AbstractModel | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -162,33 +142,20 @@ class Cascade:
             ConfigError: If its outputs are not those of one member.
         """
         outputs = set(Ends.of(model).outputs)
-        kept = tuple(other for other in self.models if set(Ends.of(other).outputs) != outputs)
-        if len(kept) != len(self.models) - 1:
+        same = [set(Ends.of(other).outputs) == outputs for other in self.models]
+        if not any(same):
             raise ConfigError(
                 "no member to replace",
                 expected=f"the outputs of one of {', '.join(str(other.mapping) for other in self.models)}",
                 got=str(model.mapping),
             )
-        return replace(self, models=(*kept, model))
+        models = tuple(model if yes else other for other, yes in zip(self.models, same, strict=True))
+        return replace(self, models=models)
 
     @cached_property
-    def stages(self) -> tuple[Stage, ...]:
-        """Runs of members that the compiled pass takes together, and models with a state of their own between them."""
-        channels = self.wiring.channels
-        parts = [(model, Ends.of(model), Part.of(model)) for model in self.models]
-        stages: list[Stage] = []
-        for compiled, run in groupby(parts, key=lambda entry: entry[2] is not None):
-            together = list(run)
-            ends = tuple(end for _, end, _ in together)
-            if compiled:
-                lowered = [part for _, _, part in together if part is not None]
-                program = program_of(lowered, ends, channels, self.limits)
-                depth = max(part.lags.depth for part in lowered)
-                stages.append(Stage(ends=ends, depth=depth, program=program))
-            else:
-                alone = [model for model, _, _ in together if isinstance(model, AbstractModel)]
-                stages += [Stage(ends=(Ends.of(model),), depth=0, model=model) for model in alone]
-        return tuple(stages)
+    def stages(self) -> tuple[CompiledStage | ModelStage, ...]:
+        """Members that the compiled pass takes together, and models with a state of their own between them."""
+        return stages_of(self.models, self.wiring.channels, self.limits)
 
     def levels(self, first: NDArray[np.float64], rest: Dict[str, Level] | None = None) -> NDArray[np.float64]:
         """Every channel before the first sample.
@@ -352,40 +319,8 @@ class Cascade:
         levels = self.levels(inputs[0], rest)
         at = 0
         for stage in self.stages:
-            count = sum(len(end.outputs) for end in stage.ends)
-            columns = slice(at, at + count)
-            if stage.program is not None:
-                z = np.empty((stage.depth + len(inputs), len(stage.program.column_channel)))
-                kernel.run(stage.program, stage.depth, levels, values, z, _NOTHING, held[:, columns])
-            elif stage.model is not None:
-                self._alone(stage.model, levels, values, held[:, columns])
-            at += count
-
-    def _alone(
-        self,
-        model: AbstractModel,
-        levels: NDArray[np.float64],
-        values: NDArray[np.float64],
-        held: NDArray[np.int8],
-    ) -> None:
-        """Run a model with a state of its own; a limit holds its output and leaves its state."""
-        channels = self.wiring.channels
-        sources, name = [channels.index(one) for one in model.mapping.inputs], model.mapping.output
-        column = channels.index(name)
-        history = History.at_rest(inputs=levels[sources], output=float(levels[column]))
-        output = model.simulate(values[:, sources], history)
-        limit = self.limits.get(name, Limit())
-        held[:] = kernel.FREE
-        for side, constant, channel, sign in (
-            (limit.high, kernel.HIGH, kernel.HIGH_CHANNEL, 1.0),
-            (limit.low, kernel.LOW, kernel.LOW_CHANNEL, -1.0),
-        ):
-            if side is not None:
-                bound = values[:, channels.index(side)] if isinstance(side, str) else np.full(len(values), side)
-                beyond = sign * output > sign * bound
-                output = np.where(beyond, bound, output)
-                held[beyond, 0] = channel if isinstance(side, str) else constant
-        values[:, column] = output
+            stage.run(levels, values, held[:, at : at + stage.n_outputs])
+            at += stage.n_outputs
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the cascade again, as JSON values."""
@@ -395,9 +330,6 @@ class Cascade:
             "rest": dict(self.rest),
             "limits": {name: limit.to_dict() for name, limit in self.limits.items()},
         }
-
-
-_NOTHING = np.empty((0, 0))
 
 
 def _check_circles(models: Sequence[Member], wiring: Wiring) -> None:

@@ -13,6 +13,7 @@ from sysid.errors import ConfigError
 from sysid.kernels import cascade_lanes as kernel
 from sysid.models.cascade import Cascade, Level
 from sysid.models.cascade_run import CascadeRun
+from sysid.models.cascade_stages import CompiledStage
 
 MAX_LANES = 32
 """Records in lockstep at most: their past must stay in the second-level cache."""
@@ -44,8 +45,8 @@ def simulate_records(
     """
     inputs = cascade.checked(inputs, 3)
     n, workers = len(inputs), max(1, workers)
-    alone = len(cascade.stages) > 1 or cascade.stages[0].program is None
-    if alone or n < MIN_LANES * workers:
+    stage = cascade.stages[0]
+    if len(cascade.stages) > 1 or not isinstance(stage, CompiledStage) or n < MIN_LANES * workers:
         return simulate_family([cascade] * n, inputs, rest=rest, workers=workers)
     values, held = cascade.empty(*inputs.shape[:2])
     values[..., : len(cascade.inputs)] = inputs
@@ -53,7 +54,6 @@ def simulate_records(
     # As many groups as a multiple of the workers, so that all end together.
     groups = workers * -(-n // (workers * MAX_LANES))
     ends = [round(n * i / groups) for i in range(groups + 1)]
-    stage = cascade.stages[0]
 
     def work(group: int) -> None:
         own = slice(ends[group], ends[group + 1])

@@ -1,0 +1,113 @@
+"""The passes in which a cascade runs: recursions together, models with a state of their own between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.kernels import cascade as kernel
+from sysid.models.base import AbstractModel
+from sysid.models.cascade_program import Limit, Part, program_of
+from sysid.models.history import History
+from sysid.models.wiring import Ends, Member
+
+_NOTHING = np.empty((0, 0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CompiledStage:
+    """Recursions that run in one compiled pass over the samples.
+
+    Args:
+        n_outputs: How many channels it writes.
+        depth: Past samples that it reads.
+        program: Its members.
+    """
+
+    n_outputs: int
+    depth: int
+    program: kernel.Program
+
+    def run(self, levels: NDArray[np.float64], values: NDArray[np.float64], held: NDArray[np.int8]) -> None:
+        """Run over one record.
+
+        Args:
+            levels: Every channel before the first sample, shape ``(n_channels,)``.
+            values: Every channel, shape ``(n_samples, n_channels)``; the stage's outputs are written.
+            held: What held its outputs, shape ``(n_samples, n_outputs)``, written.
+        """
+        z = np.empty((self.depth + len(values), len(self.program.column_channel)))
+        kernel.run(self.program, self.depth, levels, values, z, _NOTHING, held)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelStage:
+    """A model with a state of its own; a limit holds its output and leaves its state.
+
+    Args:
+        model: The model.
+        channels: Columns of the arrays that it reads and writes.
+        limit: Of its output.
+    """
+
+    model: AbstractModel
+    channels: tuple[str, ...]
+    limit: Limit
+    n_outputs: int = 1
+
+    def run(self, levels: NDArray[np.float64], values: NDArray[np.float64], held: NDArray[np.int8]) -> None:
+        """Run over one record; as for :class:`CompiledStage`."""
+        sources = [self.channels.index(name) for name in self.model.mapping.inputs]
+        column = self.channels.index(self.model.mapping.output)
+        history = History.at_rest(inputs=levels[sources], output=float(levels[column]))
+        output = self.model.simulate(values[:, sources], history)
+        held[:] = kernel.FREE
+        for side, constant, channel, sign in (
+            (self.limit.high, kernel.HIGH, kernel.HIGH_CHANNEL, 1.0),
+            (self.limit.low, kernel.LOW, kernel.LOW_CHANNEL, -1.0),
+        ):
+            if side is not None:
+                named = isinstance(side, str)
+                bound = values[:, self.channels.index(side)] if isinstance(side, str) else np.full(len(values), side)
+                beyond = sign * output > sign * bound
+                output = np.where(beyond, bound, output)
+                held[beyond, 0] = channel if named else constant
+        values[:, column] = output
+
+
+def stages_of(
+    models: Sequence[Member], channels: tuple[str, ...], limits: Dict[str, Limit]
+) -> tuple[CompiledStage | ModelStage, ...]:
+    """The stages of some members.
+
+    Args:
+        models: In the order in which they run.
+        channels: Columns of the arrays that they read and write.
+        limits: Limits by output.
+
+    Returns:
+        As few stages as there can be.
+    """
+    stages: list[CompiledStage | ModelStage] = []
+    lowered = [(model, Part.of(model)) for model in models]
+    for compiled, together in groupby(lowered, key=lambda entry: entry[1] is not None):
+        run = list(together)
+        if compiled:
+            parts, ends = [part for _, part in run if part is not None], [Ends.of(model) for model, _ in run]
+            stages.append(
+                CompiledStage(
+                    n_outputs=sum(len(end.outputs) for end in ends),
+                    depth=max(part.lags.depth for part in parts),
+                    program=program_of(parts, ends, channels, limits),
+                )
+            )
+        else:
+            for model in (model for model, _ in run if isinstance(model, AbstractModel)):
+                limit = limits.get(model.mapping.output, Limit())
+                stages.append(ModelStage(model=model, channels=channels, limit=limit))
+    return tuple(stages)
