@@ -27,7 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "airbrake": set(),
     "estimation": {"models", "kernels"},
     "validation": {"estimation", "models", "kernels"},
-    "export": {"validation", "estimation", "models", "kernels"},
+    "export": {"validation", "estimation", "models", "kernels", "ingest"},
     "reporting": {"validation", "export", "estimation", "models"},
     "rail": {"airbrake", "validation", "estimation", "models", "kernels", "ingest"},
     "workbench": {"reporting", "validation", "export", "estimation", "models", "kernels", "ingest"},

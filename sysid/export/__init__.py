@@ -4,12 +4,14 @@ torch, onnx and onnxruntime are imported when a file is written or run, not here
 """
 
 from sysid.export.bundle import Bundle, BundleFile, export_bundle, zip_bundle
+from sysid.export.command_table import CommandTable, read_command
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run
 from sysid.export.exporters import EXPORTERS, exporter
 from sysid.export.flags import Flag, expected_flags
 from sysid.export.layout import DelayLine, StateLayout
 from sysid.export.parity import Parity, ParityCase, check_parity, parity_cases, random_cases
 from sysid.export.reading import read_bundle
+from sysid.export.simulation import Simulation, simulate_bundle
 from sysid.export.surrogate import Port, Stage, Surrogate
 
 __all__ = [
@@ -17,6 +19,7 @@ __all__ = [
     "AbstractExporter",
     "Bundle",
     "BundleFile",
+    "CommandTable",
     "DelayLine",
     "ExportedFile",
     "Flag",
@@ -25,6 +28,7 @@ __all__ = [
     "ParityCase",
     "Port",
     "Run",
+    "Simulation",
     "Stage",
     "StateLayout",
     "Surrogate",
@@ -35,5 +39,7 @@ __all__ = [
     "parity_cases",
     "random_cases",
     "read_bundle",
+    "read_command",
+    "simulate_bundle",
     "zip_bundle",
 ]

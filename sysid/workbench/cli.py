@@ -191,17 +191,29 @@ def ingest(
 
 @app.command(epilog="Example: sysid simulate runs/service-brake/bundle new.csv --out simulated.csv")
 def simulate(
-    bundle: Annotated[Path, typer.Argument(help="Folder of an exported model.")],
-    inputs: Annotated[Path, typer.Argument(help="File with the model's input channels.")],
-    out: Annotated[Path, typer.Option(help="File to write, .csv or .parquet: time, inputs and simulated output.")],
+    bundle: Annotated[Path, typer.Argument(help="Folder or zip of an exported model or cascade.")],
+    inputs: Annotated[Path | None, typer.Argument(help="File with the input channels at every sample.")] = None,
+    *,
+    out: Annotated[Path, typer.Option(help="File to write, .csv or .parquet: time, inputs and simulated outputs.")],
+    command: Annotated[
+        Path | None,
+        typer.Option(
+            help="In place of INPUTS: a table of a few rows, each held to the next one's time. CSV, JSON, YAML."
+        ),
+    ] = None,
+    time_unit: Annotated[str | None, typer.Option(help="Unit of the command's times, as s or ds.")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of the command's values, as psi or kPa.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Picture to draw, .png, .svg or .pdf; beside OUT by default for a command.")
+    ] = None,
     initial: Annotated[
-        float | None, typer.Option(help="Output before the first sample; the model's value at rest by default.")
+        float | None, typer.Option(help="Output before the first sample; its declared level by default.")
     ] = None,
 ) -> None:
-    """Run an exported model on a file of inputs, fed with nothing but its own past output."""
+    """Run an exported model or cascade on a file of inputs or a command, fed with nothing but its own past."""
     from sysid.workbench.commands.simulate import simulate_command
 
-    simulate_command(bundle, inputs, out, initial=initial)
+    simulate_command(bundle, inputs, out, initial=initial, command=command, time_unit=time_unit, unit=unit, plot=plot)
 
 
 @app.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')

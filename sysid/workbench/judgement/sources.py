@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.errors import ConfigError
+from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
-from sysid.models import AbstractModel
+from sysid.models import AbstractModel, Cascade
 from sysid.reporting.results import read_results
 from sysid.workbench.judgement.config import PartConfig
 from sysid.workbench.record import read_fit
@@ -59,7 +60,7 @@ def find_model(part: PartConfig, *, workspace: Path, fetch: Fetch) -> Found:
         return _of_bundle((workspace / part.bundle).resolve(), part.bundle)
     address = str(part.model)
     folder, run_id = fetch(address)
-    return Found(model=read_bundle(folder).model, said=address, tracked_as=run_id)
+    return Found(model=_single(read_bundle(folder)), said=address, tracked_as=run_id)
 
 
 def _of_run(part: PartConfig, workspace: Path) -> Found:
@@ -110,7 +111,20 @@ def _of_bundle(folder: Path, given: str) -> Found:
         if name in slugs and read_fit(store.fit(slugs[name])).model.to_dict() == bundle.model.to_dict():
             key, run_folder = _key(store, f"scores-{slugs[name]}"), store.path
     said = f"bundle {given}" + (f", fit {name}" if name else "")
-    return Found(model=bundle.model, said=said, run_folder=run_folder, fit_key=key)
+    return Found(model=_single(bundle), said=said, run_folder=run_folder, fit_key=key)
+
+
+def _single(bundle: Bundle) -> AbstractModel:
+    """The model of a bundle that holds one; a whole cascade stands nowhere that a part is asked for."""
+    if isinstance(bundle.model, Cascade):
+        raise ConfigError(
+            "the bundle holds a whole cascade",
+            where=str(bundle.folder),
+            expected="a bundle of a single model",
+            got=str(bundle.metadata["mapping"]),
+            remedy="name the bundle of the model that is to stand here",
+        )
+    return bundle.model
 
 
 def _key(store: RunFolder, step: str) -> str | None:

@@ -1,0 +1,68 @@
+"""A bundle run over inputs or a command, and what is said of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.export import Flag, export_bundle, simulate_bundle
+from sysid.traces import Channel, Trace
+from sysid.units import Reference
+
+
+@pytest.fixture(scope="module")
+def whole(limited, command, tmp_path_factory):
+    return export_bundle(limited, command, tmp_path_factory.mktemp("s") / "b", formats=[])
+
+
+@pytest.fixture(scope="module")
+def single(fit, traces, start, tmp_path_factory):
+    return export_bundle(fit, traces, tmp_path_factory.mktemp("s") / "b", start=start, formats=[])
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "full.csv"
+    path.write_text("time [ds],STP [kPa],FLOW [psi]\n0,482.6,10\n100,344.7,20\n300,0,0\n")
+    return path
+
+
+def test_a_command_gives_every_channel_of_the_cascade(whole, limited, file):
+    for given in (whole, whole.folder, str(whole.folder)):
+        found = simulate_bundle(given, file)
+        u = found.trace.columns(limited.inputs)
+        assert (len(found.trace), found.inputs, found.outputs) == (300, limited.inputs, limited.outputs)
+        np.testing.assert_allclose(u[:, 0], np.repeat([482.6, 344.7], [100, 200]) / 6.894757293168361)
+        np.testing.assert_array_equal(found.trace.columns(limited.outputs), limited.simulate(u).values[:, 2:])
+
+
+def test_limits_and_ranges_are_reported(whole, file):
+    found = simulate_bundle(whole, file)
+    assert (found.flags & Flag.AT_LIMIT).any()
+    assert any(
+        sentence.endswith("an output is held at a limit that was declared for it") for sentence in found.sentences
+    )
+    assert len(found.trace) == len(found.flags)
+
+
+def test_a_trace_gives_what_the_model_gives(single, fit, traces):
+    found = simulate_bundle(single, traces["VAL01"])
+    np.testing.assert_array_equal(found.trace["BC"], fit.model.simulate(traces["VAL01"].columns(("BP", "AR"))))
+
+
+def test_the_output_may_begin_elsewhere(single, traces):
+    found = simulate_bundle(single, traces["VAL01"], initial=30.0)
+    assert found.trace["BC"][0] != simulate_bundle(single, traces["VAL01"]).trace["BC"][0]
+
+
+def test_several_outputs_have_no_single_beginning(whole, file):
+    with pytest.raises(ConfigError, match="cannot all begin"):
+        simulate_bundle(whole, file, initial=1.0)
+
+
+def test_another_sample_time_is_refused(single):
+    channels = tuple(Channel(name=name, unit="psi", reference=Reference.GAUGE) for name in ("BP", "AR"))
+    trace = Trace(name="fast", sample_time=0.01, channels=channels, values=np.ones((5, 2)))
+    with pytest.raises(ConfigError, match="another sample time"):
+        simulate_bundle(single, trace)
