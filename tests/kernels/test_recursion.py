@@ -1,9 +1,12 @@
 """The compiled recursion against finite differences, NumPy and its own formula."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import njit
 from numpy.testing import assert_allclose
 
 from sysid.estimation.provider import BLOCK, Experiment, RecursionProvider
@@ -175,3 +178,12 @@ def test_tanh_over_the_line_and_of_what_is_not_a_number():
     assert special[:2].tolist() == [1.0, -1.0]
     assert np.isnan(special[2])
     assert special[3] == 0.0
+
+
+def test_tanh_is_vectorised():
+    # What decides it is easily lost without a trace: a rule for division by zero once kept the loop scalar.
+    options = {key: tanh_in_place.targetoptions[key] for key in ("nogil", "fastmath", "error_model")}
+    compiled = njit(**options)(tanh_in_place.py_func)
+    compiled(np.zeros(8))
+    (code,) = compiled.inspect_llvm().values()
+    assert re.search(r"fdiv[^\n]*<\d+ x double>", code)
