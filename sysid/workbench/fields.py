@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, create_model
 
 from sysid.errors import ConfigError
-from sysid.estimation import Training
+from sysid.estimation import JointTraining, Training
 from sysid.export.exporters import EXPORTERS
 from sysid.models import (
     ARX,
     NARX,
     AbstractStructure,
     Mapping,
+    NeuralStateSpace,
     Start,
     StartKind,
     TransferFunction,
@@ -30,7 +31,7 @@ STRICT = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 """A field that is not known is an error; nothing changes once it is read."""
 
 STRUCTURES: dict[str, type[AbstractStructure]] = {
-    structure.kind: structure for structure in (ARX, NARX, TransferFunction)
+    structure.kind: structure for structure in (ARX, NARX, NeuralStateSpace, TransferFunction)
 }
 """Structures that a pipeline can fit; their fields are those of the classes."""
 
@@ -197,6 +198,10 @@ if TYPE_CHECKING:
     class TrainingConfig(BaseModel):
         """Options of a network's training, field by field those of :class:`sysid.estimation.Training`."""
 
+    class JointConfig(BaseModel):
+        """Options of a cascade's training, field by field those of :class:`sysid.estimation.JointTraining`."""
+
 else:
     # The fields are read off the dataclass: an option added to the training appears in the YAML by itself.
     TrainingConfig = create_model("TrainingConfig", __config__=STRICT, **_fields_of(Training))
+    JointConfig = create_model("JointConfig", __config__=STRICT, **_fields_of(JointTraining))

@@ -79,6 +79,10 @@ FOUND: dict[str, Kind] = {
 
 KINDS: dict[str, Kind] = {
     DEFAULT: Kind(config="sysid.workbench.config:PipelineConfig", runner="sysid.workbench.commands.run:run_fits"),
+    "assembly": Kind(
+        config="sysid.workbench.assembly.config:AssemblyConfig",
+        runner="sysid.workbench.assembly.runner:run_assembly",
+    ),
     "sweep": Kind(
         config="sysid.workbench.sweep_config:SweepConfig", runner="sysid.workbench.commands.sweep:run_sweep_request"
     ),

@@ -1,0 +1,238 @@
+"""The YAML of an assembly: its members, how they are trained and chosen, and what leaves the workbench."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field, model_validator
+
+from sysid.errors import ConfigError
+from sysid.estimation import JointTraining, Training
+from sysid.models import NARX
+from sysid.workbench.config import ExportConfig
+from sysid.workbench.fields import STRICT, JointConfig, MappingField, StructureField, TrainingConfig, as_field_error
+from sysid.workbench.naming import slug
+from sysid.yaml_files import FieldError
+
+
+class MemberConfig(BaseModel):
+    """One member, used in one place or in several.
+
+    Args:
+        mapping: Inputs and output, such as ``BP+AR -> BC``; in the first place as they are.
+        structure: What is fitted, with its ``kind``.
+        training: How a network is trained.
+        rest: The output at rest, in its unit.
+        places: Suffixes of the channel names, one for each place where the member stands: ``["", "10"]`` puts it at
+            ``BP -> AR`` and ``BP10 -> AR10``. It is fitted on traces of all its places.
+        shared: Inputs that have the same name in every place.
+        candidates: Fits from different seeds, among which the whole chooses.
+        traces: Estimation traces that it is fitted on, the first so many; all by default.
+    """
+
+    model_config = STRICT
+
+    mapping: MappingField
+    structure: StructureField
+    training: TrainingConfig | None = None
+    rest: float
+    places: tuple[str, ...] = ("",)
+    shared: tuple[str, ...] = ()
+    candidates: int = Field(default=1, ge=1)
+    traces: int | None = Field(default=None, ge=1)
+
+    @property
+    def slug(self) -> str:
+        """Name of its folder."""
+        return slug(str(self.mapping))
+
+    @model_validator(mode="after")
+    def _check(self) -> MemberConfig:
+        if not isinstance(self.structure, NARX):
+            raise FieldError(
+                f"{self.mapping} is {self.structure.kind}",
+                expected="NARX; 0 neurons make it linear",
+                got=self.structure.kind,
+                remedy="write structure: {kind: NARX, ...}",
+            )
+        try:
+            self.structure.lags(len(self.mapping.inputs))
+            self.training_options(seed=0)
+        except ConfigError as error:
+            raise as_field_error(error) from error
+        return self
+
+    def training_options(self, seed: int) -> Training:
+        """The options of the training, with a seed where none is named.
+
+        Args:
+            seed: The seed.
+
+        Returns:
+            The options.
+        """
+        given = {} if self.training is None else {n: getattr(self.training, n) for n in self.training.model_fields_set}
+        return Training(**{"seed": seed, **given})
+
+
+class RetrainConfig(BaseModel):
+    """Members that are trained again on what the others really put out.
+
+    Args:
+        members: Their outputs, in the order of the training.
+        max_iterations: Of each training.
+        rounds: How often all of them are gone through.
+    """
+
+    model_config = STRICT
+
+    members: tuple[str, ...] = Field(min_length=1)
+    max_iterations: int = Field(default=60, ge=1)
+    rounds: int = Field(default=1, ge=1)
+
+
+class TogetherConfig(BaseModel):
+    """Members that are trained end to end, for the free run of the whole.
+
+    Args:
+        members: Outputs of the members that are trained; all by default.
+        targets: The error of each output that counts as one, in its unit.
+        training: How.
+        traces: Estimation traces used, the first so many; all by default.
+    """
+
+    model_config = STRICT
+
+    members: tuple[str, ...] | None = None
+    targets: dict[str, float] = Field(min_length=1)
+    training: JointConfig = Field(default_factory=JointConfig)
+    traces: int | None = Field(default=None, ge=1)
+
+    def training_options(self, seed: int) -> JointTraining:
+        """The options of the training, with a seed where none is named.
+
+        Args:
+            seed: The seed.
+
+        Returns:
+            The options.
+        """
+        given = {name: getattr(self.training, name) for name in self.training.model_fields_set}
+        return JointTraining(**{"seed": seed, **given})
+
+
+class LimitConfig(BaseModel):
+    """Values between which an output is held: a number in its unit, or the name of a channel."""
+
+    model_config = STRICT
+
+    low: float | str | None = None
+    high: float | str | None = None
+
+
+class StressConfig(BaseModel):
+    """Random sequences of the reference, on which the whole has to hold.
+
+    Args:
+        data: Data set with the sequences.
+        output: Output that is judged.
+        within: Root mean square error in its unit that a sequence should stay under.
+    """
+
+    model_config = STRICT
+
+    data: str
+    output: str
+    within: float = Field(gt=0.0)
+
+
+class PublishedConfig(BaseModel):
+    """Published figures of an output, beside ours.
+
+    Args:
+        source: Where they stand.
+        mse: By case, in the output's unit squared.
+        target: Share of the published figure that is aimed at.
+    """
+
+    model_config = STRICT
+
+    source: str
+    mse: dict[str, float]
+    target: float = Field(default=1.0, gt=0.0)
+
+
+class AssemblyConfig(BaseModel):
+    """A pipeline of kind ``assembly``.
+
+    Args:
+        kind: ``assembly``.
+        name: Name of the run folder; letters, digits, dots, dashes and underscores.
+        description: What it is for.
+        data: Data set whose cases are scored; they need the inputs of the whole and the outputs that are scored.
+        training: Data set with the traces that are fitted, and those that choose (role ``selection``).
+        outputs: Outputs that are scored.
+        choose_on: Outputs whose error on the selection traces chooses; those that are scored by default.
+        definitions: Anything, to be repeated by YAML's anchors; not read.
+        members: The members.
+        rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
+        limits: Limits of outputs.
+        retrain: Members to train again on what the others put out.
+        together: Training end to end.
+        stress: Random sequences on which the whole has to hold.
+        published: Published figures by output.
+        seed: Seed of everything random.
+        export: What leaves the workbench; ``null`` for nothing.
+    """
+
+    model_config = STRICT
+
+    kind: Literal["assembly"]
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    description: str = ""
+    data: str
+    training: str
+    outputs: tuple[str, ...] = Field(min_length=1)
+    choose_on: tuple[str, ...] = ()
+    definitions: dict[str, Any] = Field(default_factory=dict)
+    members: tuple[MemberConfig, ...] = Field(min_length=1)
+    rest: dict[str, float | str] = Field(default_factory=dict)
+    limits: dict[str, LimitConfig] = Field(default_factory=dict)
+    retrain: RetrainConfig | None = None
+    together: TogetherConfig | None = None
+    stress: StressConfig | None = None
+    published: dict[str, PublishedConfig] = Field(default_factory=dict)
+    seed: int = Field(default=0, ge=0)
+    export: ExportConfig | None = ExportConfig(formats=("onnx", "c"))
+
+    @model_validator(mode="after")
+    def _check_outputs(self) -> AssemblyConfig:
+        bases = [member.mapping.output for member in self.members]
+        written = [f"{member.mapping.output}{place}" for member in self.members for place in member.places]
+        if len(set(written)) < len(written):
+            raise FieldError(
+                "two members write one channel",
+                expected="each channel written by one member in one place",
+                got=", ".join(sorted(name for name in set(written) if written.count(name) > 1)),
+                remedy="correct the mapping or the places",
+            )
+        asked = {
+            "outputs": self.outputs,
+            "choose_on": self.choose_on,
+            "limits": tuple(self.limits),
+            "published": tuple(self.published),
+            "stress": (self.stress.output,) if self.stress else (),
+            "together, targets": tuple(self.together.targets) if self.together else (),
+        }
+        named = {"retrain, members": self.retrain.members if self.retrain else ()}
+        for known, places in ((written, asked), (bases, named)):
+            for where, names in places.items():
+                strangers = [name for name in names if name not in known]
+                if strangers:
+                    raise FieldError(
+                        f"{where} names {', '.join(strangers)}, which no member writes",
+                        expected=f"some of {', '.join(known)}",
+                        got=", ".join(names),
+                        remedy="correct the name, or add a member",
+                    )
+        return self

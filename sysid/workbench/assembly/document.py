@@ -1,0 +1,156 @@
+"""What came of an assembly, as the tables, charts and sentences of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sysid.models import Cascade
+from sysid.reporting.thinning import thin
+from sysid.traces import Trace
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.stress import Stress
+
+COLUMNS = 300
+"""Width of the charts in points: enough for the eye, and a page of some hundred kilobytes."""
+
+Scores = Mapping[str, Mapping[str, float]]
+"""Mean squared error of the free run of the whole by output and case, in the output's unit squared."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """What came of a run.
+
+    Args:
+        whole: The assembly of the chosen stage.
+        stages: Scores by stage, in their order.
+        selection: Score of each stage on the selection traces.
+        chosen: The stage that was chosen.
+        notes: Sentences on how it came about.
+        timing: Seconds of a free run of the whole by case.
+        cases: The cases.
+        stressed: What came of the random sequences.
+    """
+
+    whole: Cascade
+    stages: Mapping[str, Scores]
+    selection: Mapping[str, float]
+    chosen: str
+    notes: Sequence[str]
+    timing: Mapping[str, float]
+    cases: Sequence[Trace]
+    stressed: Stress | None
+
+
+def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
+    """All of it, as :class:`sysid.reporting.judgement.JudgementRecord` has it.
+
+    Args:
+        config: The pipeline.
+        found: What came of the run.
+
+    Returns:
+        JSON values.
+    """
+    whole = found.whole
+    tables = [_stage_table(config, name, found) for name in config.outputs]
+    if found.stressed is not None:
+        tables.append(_stress_table(found.stressed))
+    tables.append(_time_table(found.timing, found.cases))
+    return {
+        "title": "The assembly",
+        "headline": _headline(config, found.stages[found.chosen], found.chosen),
+        "sentences": [
+            f"The whole has {len(whole.models)} models and {whole.n_parameters} parameters; it reads "
+            f"{', '.join(whole.inputs)} and nothing else.",
+            f"The stage was chosen by the error of the whole on the selection traces "
+            f"({found.selection[found.chosen]:.3g}, a geometric mean over traces and outputs).",
+            *found.notes,
+        ],
+        "tables": tables,
+        "charts": [_chart(whole, trace, name) for name in config.outputs for trace in found.cases],
+        "metrics": {
+            stage: {f"{output}/{case}/mse": value for output, by in scores.items() for case, value in by.items()}
+            for stage, scores in found.stages.items()
+        },
+    }
+
+
+def _headline(config: AssemblyConfig, scores: Scores, chosen: str) -> str:
+    parts = []
+    for output in config.outputs:
+        worst = max(scores[output], key=lambda case: scores[output][case])
+        parts.append(f"{output} at worst {scores[output][worst]:.3g} ({worst})")
+    return f"From the command alone, {chosen}: mean squared error of {'; '.join(parts)}."
+
+
+def _stage_table(config: AssemblyConfig, output: str, found: Outcome) -> dict[str, Any]:
+    cases = [trace.name for trace in found.cases]
+    rows: list[list[Any]] = [
+        [
+            f"{stage} (chosen)" if stage == found.chosen else stage,
+            *(scores[output][case] for case in cases),
+            found.selection[stage],
+        ]
+        for stage, scores in found.stages.items()
+    ]
+    published = config.published.get(output)
+    if published is not None:
+        rows.append([published.source, *(published.mse.get(case) for case in cases), None])
+        aimed = [_share(published.mse.get(case), published.target) for case in cases]
+        rows.append([f"aimed at: {published.target:g} of it", *aimed, None])
+    return {
+        "caption": f"{output}: mean squared error of the free run of the whole",
+        "head": [["Stage", ""], *([case, ""] for case in cases), ["Selection", "geometric mean"]],
+        "rows": rows,
+        "note": "From the inputs of the whole alone, in the output's unit squared. No case had a say in any choice.",
+    }
+
+
+def _share(value: float | None, target: float) -> float | None:
+    return None if value is None else value * target
+
+
+def _stress_table(found: Stress) -> dict[str, Any]:
+    rows: list[list[Any]] = [
+        [f"{100.0 * q:g} % of the sequences at most", value] for q, value in found.quantiles.items()
+    ]
+    rows.append([f"share of sequences under {found.limit:g}", found.within])
+    rows.append(["sequences that diverged", float(found.lost)])
+    rows += [[f"worst: {name}", value] for name, value in found.worst]
+    return {
+        "caption": f"{found.output} on {found.sequences} random sequences of the reference",
+        "head": [["", ""], ["Root mean square error", "in its unit"]],
+        "rows": rows,
+        "note": "A sequence diverged if a network was held at its bound, far outside what it was trained on.",
+    }
+
+
+def _time_table(timing: Mapping[str, float], cases: Sequence[Trace]) -> dict[str, Any]:
+    lengths = {trace.name: len(trace) * trace.sample_time for trace in cases}
+    return {
+        "caption": "Run time of the whole, compiled, on one core",
+        "head": [["Case", ""], ["Length", "s"], ["Run", "ms"], ["Per simulated second", "µs"]],
+        "rows": [[case, lengths[case], 1e3 * t, 1e6 * t / lengths[case]] for case, t in timing.items()],
+        "note": "Median of five runs after one that is not counted.",
+    }
+
+
+def _chart(whole: Cascade, trace: Trace, output: str) -> dict[str, Any]:
+    run = whole.simulate_trace(trace)
+    lines = []
+    for name, values in (("reference", trace[output]), ("assembly", run[output])):
+        kept = thin(trace.time, np.asarray(values), COLUMNS)
+        lines.append({"name": name, "x": kept[0].tolist(), "y": kept[1].tolist(), "target": name == "reference"})
+    unit = trace.channel(output).unit
+    return {
+        "title": f"{output}, {trace.name}",
+        "caption": f"{output} of {trace.name}: the reference, and the whole from its inputs alone.",
+        "x": "time (s)",
+        "y": f"{output} ({unit})",
+        "lines": lines,
+    }

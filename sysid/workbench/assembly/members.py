@@ -1,0 +1,159 @@
+"""Members: where each stands, on which traces it is fitted, and how it is put in its places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from sysid.models import Cascade, Ends, Limit, Mapping, NARXModel
+from sysid.traces import Trace
+from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+
+Members = dict[str, NARXModel]
+"""The fitted members by the output of their first place."""
+
+
+def placed_name(member: MemberConfig, channel: str, place: str) -> str:
+    """Name of a member's channel in one of its places.
+
+    Args:
+        member: The member.
+        channel: The channel in the first place.
+        place: The place's suffix.
+
+    Returns:
+        The channel there.
+    """
+    return channel if channel in member.shared else f"{channel}{place}"
+
+
+def placed(member: MemberConfig, model: NARXModel, place: str) -> NARXModel:
+    """A member's model in one of its places.
+
+    Args:
+        member: The member.
+        model: Its model, in the first place's names.
+        place: The place's suffix.
+
+    Returns:
+        The same model over that place's channels.
+    """
+    inputs = tuple(placed_name(member, name, place) for name in member.mapping.inputs)
+    return replace(model, mapping=Mapping(inputs=inputs, output=placed_name(member, member.mapping.output, place)))
+
+
+def assembled(config: AssemblyConfig, models: Members, *, without: str | None = None) -> Cascade:
+    """All members in all their places, wired.
+
+    Args:
+        config: The pipeline.
+        models: Their models.
+        without: Output of a member that is left out: whoever reads it then reads what was measured.
+
+    Returns:
+        The cascade.
+
+    Raises:
+        ConfigError: If they cannot be wired.
+    """
+    wired = [
+        placed(member, models[member.mapping.output], place)
+        for member in config.members
+        if member.mapping.output != without
+        for place in member.places
+    ]
+    outputs = {model.mapping.output for model in wired}
+    read = {name for model in wired for name in model.mapping.inputs}
+    rest = {name: level for name, level in config.rest.items() if name in outputs | read}
+    limits = {name: Limit(low=one.low, high=one.high) for name, one in config.limits.items() if name in outputs}
+    return Cascade(models=tuple(wired), rest=rest, limits=limits)
+
+
+def own_traces(member: MemberConfig, traces: Sequence[Trace]) -> list[Trace]:
+    """What a member is fitted on: trace after trace, each in one of its places in turn.
+
+    Args:
+        member: The member.
+        traces: Traces of the whole.
+
+    Returns:
+        As many traces, with the member's channels under the names of its first place.
+    """
+    return [in_place(member, trace, member.places[i % len(member.places)]) for i, trace in enumerate(traces)]
+
+
+def in_place(member: MemberConfig, trace: Trace, place: str) -> Trace:
+    """A trace as a member sees it in one of its places.
+
+    Args:
+        member: The member.
+        trace: A trace of the whole.
+        place: The place's suffix.
+
+    Returns:
+        Its channels under the names of the first place.
+    """
+    names = (*member.mapping.inputs, member.mapping.output)
+    there = [placed_name(member, name, place) for name in names]
+    channels = tuple(replace(trace.channel(old), name=new) for old, new in zip(there, names, strict=True))
+    return Trace(
+        name=f"{trace.name} {place}".strip(),
+        sample_time=trace.sample_time,
+        channels=channels,
+        values=trace.columns(there),
+        usable=trace.usable,
+        provenance=trace.provenance,
+    )
+
+
+def simulated_inputs(cascade: Cascade, traces: Sequence[Trace]) -> list[Trace]:
+    """Traces in which every channel that a cascade writes holds its free run.
+
+    Args:
+        cascade: The cascade, without the member that is to be retrained: its channels stay as measured.
+        traces: Measured traces.
+
+    Returns:
+        As many traces, with the same channels.
+    """
+
+    def one(trace: Trace) -> Trace:
+        run = cascade.simulate_trace(trace)
+        values = np.array(trace.values)
+        for column, name in enumerate(trace.channel_names):
+            if name in cascade.outputs:
+                values[:, column] = run[name]
+        said = (*trace.provenance, "what the other members put out stands for what was measured")
+        return replace(trace, values=values, provenance=said)
+
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(one, traces))
+
+
+def whole_score(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str]) -> float:
+    """How well the whole does on some traces.
+
+    Args:
+        cascade: The whole.
+        traces: The traces.
+        outputs: Outputs that count.
+
+    Returns:
+        Geometric mean over traces and outputs of the mean squared error of the free run.
+    """
+
+    def one(trace: Trace) -> list[float]:
+        run, counted = cascade.simulate_trace(trace), trace.usable_samples
+        return [float(np.mean((run[name] - trace[name])[counted] ** 2)) for name in outputs]
+
+    with ThreadPoolExecutor(2) as pool:
+        errors = np.array(list(pool.map(one, traces)))
+    return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+
+
+def written(cascade: Cascade) -> list[str]:
+    """Each member's mapping and structure, one sentence for members that differ in their place alone."""
+    return [f"{'+'.join(Ends.of(model).outputs)}: {model.structure.label}" for model in cascade.models]

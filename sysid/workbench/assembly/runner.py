@@ -1,0 +1,375 @@
+"""A run of an assembly: every fit and every stage on disk before it is announced, and found again."""
+
+from __future__ import annotations
+
+import shlex
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sysid.content import content_folders
+from sysid.errors import ConfigError
+from sysid.estimation import CascadeFit, FitProgress, FitResult
+from sysid.models import Cascade, cascade_from_dict
+from sysid.reporting.judgement import parse_judgement
+from sysid.reporting.judgement_report import (
+    JudgementResults,
+    SceneRecord,
+    SubjectRecord,
+    write_judgement_results,
+)
+from sysid.traces import Role, Trace, TraceSet
+from sysid.validation import evaluate_cascade
+from sysid.workbench import events
+from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.document import Outcome, document
+from sysid.workbench.assembly.members import Members, assembled, whole_score, written
+from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
+from sysid.workbench.assembly.stress import stress
+from sysid.workbench.environment import environment
+from sysid.workbench.kinds import RunRequest
+from sysid.workbench.record import is_final, read_fit, write_fit
+from sysid.workbench.store import RunFolder, code_digest, digest, read_json, strict, write_bytes, write_json
+from sysid.yaml_files import check, read_yaml
+
+ALONE, CHOSEN, RETRAINED, TOGETHER = "each alone", "chosen together", "retrained", "trained end to end"
+
+
+def run_assembly(request: RunRequest) -> int:
+    """Run a pipeline of kind ``assembly``.
+
+    Args:
+        request: What was asked.
+
+    Returns:
+        Exit code 0.
+
+    Raises:
+        UserError: If the pipeline or its data cannot be used.
+    """
+    from sysid.workbench.commands.run import console
+    from sysid.workbench.screen import LogFile, Screen
+
+    config = check(AssemblyConfig, read_yaml(request.path), where=request.path)
+    folder = (request.out or Path("runs") / config.name).resolve()
+    command = shlex.join(["sysid", "run", request.typed, *(["--out", str(request.out)] if request.out else [])])
+    target = console()
+    screen, log = Screen(target), LogFile()
+    log.write_to(folder, command)
+    run = _Run(
+        config=config,
+        text=request.path.read_bytes(),
+        beside=request.path.parent,
+        store=RunFolder(path=folder),
+        command=command,
+        fresh=request.fresh,
+        watchers=(screen, log),
+    )
+    try:
+        with run.store.locked():
+            results, page = run.all()
+    finally:
+        screen.close()
+    target.print()
+    target.print(results.judgement.headline, soft_wrap=True)
+    target.print(f"Report:  {page}\nResults: {run.store.results}", soft_wrap=True)
+    return 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Run:
+    """One run: what its steps have in common."""
+
+    config: AssemblyConfig
+    text: bytes
+    beside: Path
+    store: RunFolder
+    command: str
+    fresh: bool
+    watchers: Sequence[events.Watcher]
+    notes: list[str] = field(default_factory=list)
+    stages: dict[str, Cascade] = field(default_factory=dict)
+    """The whole after each stage."""
+
+    def all(self) -> tuple[JudgementResults, Path]:
+        """Every step, in order; the results and the page."""
+        write_bytes(self.store.path / "pipeline.yaml", self.text)
+        write_json(self.store.path / "environment.json", environment())
+        cases = self._load(self.config.data)
+        training = self._load(self.config.training)
+        estimation, selection = training.with_role(Role.ESTIMATION), training.with_role(Role.SELECTION)
+        if not estimation or not selection:
+            raise ConfigError(
+                "the training data lack a role",
+                where=f"data set {training.name}",
+                expected="cases with role: estimation, and cases with role: selection",
+                got=", ".join(f"{name}: {role.value}" for name, role in training.roles.items()),
+                remedy="give some cases that role in the data set's dataset.yaml",
+            )
+        models, key = self._members(estimation, selection)
+        models, key = self._retrained(models, key, estimation, selection)
+        self._together(models, key, estimation, selection)
+        results = self._results(cases, selection)
+        return results, self._report()
+
+    def _tell(self, event: events.Event) -> None:
+        for watch in self.watchers:
+            watch(event)
+
+    def _load(self, name: str) -> TraceSet:
+        from sysid.ingest import load_dataset
+
+        step, local = f"Loading {name}", self.beside / name
+        self._tell(events.StepStarted(step=step))
+        loaded = load_dataset(
+            local if local.exists() else name,
+            search=(self.beside.parent / "datasets", *content_folders("datasets")),
+            progress=lambda case, index, count: self._tell(
+                events.StepProgress(step=step, fraction=index / count, detail=f"{case} ({index + 1} of {count})")
+            ),
+        )
+        self._tell(events.StepDone(step=step, stored=False, detail=f"{len(loaded)} traces"))
+        return loaded
+
+    def _fit(
+        self,
+        name: str,
+        title: str,
+        terms: Mapping[str, Any],
+        work: Callable[[Callable[[FitProgress], None]], FitResult],
+    ) -> tuple[FitResult, str]:
+        """A fit that is stored under what it depends on; and that key."""
+        key = digest(strict({"code": code_digest("estimation", "models", "kernels"), "terms": dict(terms)}))
+        folder = self.store.fit(name)
+        self._tell(events.StepStarted(step=title))
+        stored = not self.fresh and self.store.is_done(f"fit-{name}", key)
+        if stored:
+            fit = read_fit(folder)
+        else:
+            fit = work(self._reporter(title))
+            files = write_fit(folder, fit)
+            if is_final(fit):
+                self.store.mark_done(f"fit-{name}", key, files)
+        self._tell(events.StepDone(step=title, stored=stored, detail=f"{fit.train_time_s:.1f} s, {fit.status.value}"))
+        return fit, key
+
+    def _reporter(self, step: str) -> Callable[[FitProgress], None]:
+        def report(entry: FitProgress) -> None:
+            detail = f"start {entry.start} of {entry.starts}, {entry.stage}, iteration {entry.iteration}"
+            self._tell(events.StepProgress(step=step, fraction=entry.fraction, detail=f"{detail}, mse {entry.mse:.3g}"))
+
+        return report
+
+    def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
+        """Every member's candidates; the best of each alone, and those that are best together."""
+        candidates, alone, keys = {}, {}, []
+        data = [trace.digest for trace in (*estimation, *selection)]
+        for member in self.config.members:
+            fits = []
+            for number in range(member.candidates):
+                seed = self.config.seed + 1000 * number
+                fit, key = self._fit(
+                    f"{member.slug}-{number}",
+                    f"Fitting {member.mapping}, candidate {number + 1} of {member.candidates}",
+                    {"member": member.model_dump(mode="json", exclude={"candidates"}), "seed": seed, "data": data},
+                    partial(fit_member, member, estimation, selection, seed=seed),
+                )
+                fits.append(model_of(fit))
+                keys.append(key)
+            candidates[member.mapping.output] = fits
+            alone[member.mapping.output] = int(np.argmin([self._alone(member, fit, selection) for fit in fits]))
+        self.stages[ALONE] = assembled(self.config, {name: models[alone[name]] for name, models in candidates.items()})
+        if max(map(len, candidates.values())) > 1:
+            step = "Choosing the members by the error of the whole"
+            self._tell(events.StepStarted(step=step))
+            choice = choose_together(
+                self.config,
+                candidates,
+                alone,
+                selection,
+                report=lambda text: self._tell(events.StepProgress(step=step, fraction=None, detail=text)),
+            )
+            self._tell(
+                events.StepDone(step=step, stored=False, detail=f"{choice.tried} wholes, best {choice.score:.3g}")
+            )
+            changed = [name for name in alone if choice.members[name] != alone[name]]
+            self.notes.append(
+                f"Of {choice.tried} wholes tried, the best has another {', '.join(changed)} than the best alone."
+                if changed
+                else f"Of {choice.tried} wholes tried, none beats the one of the members that are best alone."
+            )
+            alone = choice.members
+            self.stages[CHOSEN] = assembled(
+                self.config, {name: models[alone[name]] for name, models in candidates.items()}
+            )
+        return {name: models[alone[name]] for name, models in candidates.items()}, digest(strict([keys, alone]))
+
+    def _alone(self, member: MemberConfig, model: Any, selection: Sequence[Trace]) -> float:
+        from sysid.workbench.assembly.members import own_traces
+
+        errors = [
+            float(np.mean((model.simulate(t.columns(model.mapping.inputs)) - t[model.mapping.output]) ** 2))
+            for t in own_traces(member, selection)
+        ]
+        return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+
+    def _retrained(
+        self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]
+    ) -> tuple[Members, str]:
+        asked = self.config.retrain
+        if asked is None:
+            return models, key
+        outputs = self.config.choose_on or self.config.outputs
+        best = whole_score(assembled(self.config, models), selection, outputs)
+        members = {member.mapping.output: member for member in self.config.members}
+        for number in range(asked.rounds):
+            for name in asked.members:
+                member = members[name]
+                fit, key = self._fit(
+                    f"{member.slug}-retrained-{number}",
+                    f"Retraining {member.mapping} on what the others put out, round {number + 1}",
+                    {"before": key, "member": name, "iterations": asked.max_iterations},
+                    partial(
+                        retrain,
+                        self.config,
+                        member,
+                        models,
+                        estimation=estimation,
+                        selection=selection,
+                        max_iterations=asked.max_iterations,
+                    ),
+                )
+                changed = {**models, name: model_of(fit)}
+                score = whole_score(assembled(self.config, changed), selection, outputs)
+                verdict = "kept" if score < best else "not kept"
+                self.notes.append(
+                    f"{name} retrained on what the others put out (round {number + 1}): the whole's error on the "
+                    f"selection traces goes from {best:.3g} to {score:.3g}; {verdict}."
+                )
+                if score < best:
+                    models, best = changed, score
+        self.stages[RETRAINED] = assembled(self.config, models)
+        return models, key
+
+    def _together(self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
+        if self.config.together is None:
+            return
+        step = "Training end to end"
+        name = "together"
+        terms = {
+            "code": code_digest("estimation", "models", "kernels"),
+            "before": key,
+            "together": self.config.together.model_dump(mode="json"),
+            "start": assembled(self.config, models).to_dict(),
+        }
+        whole_key, file = digest(strict(terms)), self.store.path / "together.json"
+        self._tell(events.StepStarted(step=step))
+        stored = not self.fresh and self.store.is_done(name, whole_key)
+        if stored:
+            fit = CascadeFit.from_dict(read_json(file))
+        else:
+            fit = train_together(
+                self.config, assembled(self.config, models), estimation, selection, self._reporter(step)
+            )
+            write_json(file, fit.to_dict())
+            self.store.mark_done(name, whole_key, [file])
+        self._tell(events.StepDone(step=step, stored=stored, detail=f"{fit.train_time_s:.1f} s, {fit.status.value}"))
+        self.notes.extend(fit.notes)
+        self.stages[TOGETHER] = fit.model
+
+    def _results(self, cases: TraceSet, selection: Sequence[Trace]) -> JudgementResults:
+        config = self.config
+        outputs = config.choose_on or config.outputs
+        scores, timing, chosen_by = {}, {}, {}
+        for stage, cascade in self.stages.items():
+            evaluation = evaluate_cascade(cascade, cases, outputs=config.outputs)
+            scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
+            timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
+            chosen_by[stage] = whole_score(cascade, selection, outputs)
+        chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
+        whole = self.stages[chosen]
+        write_json(self.store.path / "assembly.json", whole.to_dict())
+        stressed = None
+        if config.stress is not None:
+            step, sequences = "Running the whole on random sequences", self._load(config.stress.data)
+            self._tell(events.StepStarted(step=step))
+            stressed = stress(whole, tuple(sequences), config.stress.output, config.stress.within)
+            detail = f"{stressed.lost} of {stressed.sequences} diverged, {100 * stressed.within:.3g} % within"
+            self._tell(events.StepDone(step=step, stored=False, detail=detail))
+        self._export(whole, cases, evaluate_cascade(whole, cases))
+        said = document(
+            config,
+            Outcome(
+                whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.notes,
+                timing=timing[chosen], cases=tuple(cases), stressed=stressed,
+            ),
+        )  # fmt: skip
+        results = JudgementResults(
+            kind=config.kind,
+            pipeline=config.name,
+            description=config.description,
+            command=self.command,
+            created=time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+            environment=dict(environment()),
+            seed=config.seed,
+            data=SceneRecord(name=cases.name),
+            subjects=[SubjectRecord(name=stage, parts=written(cascade)) for stage, cascade in self.stages.items()],
+            judgement=parse_judgement(strict(said), where="assembly"),
+        )
+        write_judgement_results(self.store.path, results)
+        return results
+
+    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any) -> None:
+        from sysid.export import export_bundle
+
+        asked, step = self.config.export, "Exporting the assembly"
+        if asked is None:
+            return
+        self._tell(events.StepStarted(step=step))
+        provenance = {"pipeline": self.config.name, "command": self.command}
+        bundle = export_bundle(
+            whole, cases, self.store.path / "bundle", formats=asked.formats, tolerance=asked.tolerance,
+            metrics=evaluation, provenance=provenance,
+        )  # fmt: skip
+        worst = max((entry.largest_difference for entry in bundle.files), default=0.0)
+        self._tell(
+            events.StepDone(step=step, stored=False, detail=f"{len(bundle.files)} files, at most {worst:.1e} off")
+        )
+
+    def _report(self) -> Path:
+        from sysid.reporting.report import write_report
+
+        step = "Writing the report"
+        self._tell(events.StepStarted(step=step))
+        page = write_report(self.store.path)
+        self._tell(events.StepDone(step=step, stored=False, detail=str(page)))
+        return page
+
+
+def read_assembly(folder: Path) -> Cascade:
+    """The assembly that a run chose.
+
+    Args:
+        folder: Its run folder.
+
+    Returns:
+        The cascade.
+
+    Raises:
+        ConfigError: If the run has not come so far.
+    """
+    file = Path(folder) / "assembly.json"
+    if not file.is_file():
+        raise ConfigError(
+            "the run has no assembly",
+            where=folder,
+            expected="assembly.json, which a finished run of kind assembly leaves",
+            got="no such file",
+            remedy="let the pipeline finish: sysid run NAME",
+        )
+    return cascade_from_dict(read_json(file))

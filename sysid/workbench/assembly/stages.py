@@ -1,0 +1,198 @@
+"""The stages of an assembly's training: functions of members and traces that give members, and touch no folder.
+
+Each stage begins from the members of the one before, and the whole is scored after each, so that one sees what it
+brought: members that are good alone, the choice by the error of the whole, retraining on what really comes from
+upstream, and training end to end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from sysid.estimation import CascadeFit, FitProgress, FitResult, fit_cascade, fit_narx
+from sysid.estimation.result import Status
+from sysid.models import NARX, Cascade, NARXModel
+from sysid.traces import Trace
+from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.members import Members, assembled, own_traces, simulated_inputs, whole_score
+
+Report = Callable[[FitProgress], None]
+SWEEPS = 3
+"""How often the choice goes through all members at most; it mostly settles in the second."""
+
+
+def fit_member(
+    member: MemberConfig,
+    traces: Sequence[Trace],
+    selection: Sequence[Trace],
+    report: Report,
+    *,
+    seed: int,
+    initial: FitResult | None = None,
+    max_iterations: int | None = None,
+) -> FitResult:
+    """Fit one member alone.
+
+    Args:
+        member: The member.
+        traces: Traces of the whole to fit.
+        selection: Traces of the whole that choose between its starts.
+        report: Told after every iteration.
+        seed: Of its first start.
+        initial: A fit to start from instead.
+        max_iterations: Iterations, where they are not those of the member's training.
+
+    Returns:
+        The fit, over the names of its first place.
+    """
+    training = member.training_options(seed)
+    if max_iterations is not None:
+        training = replace(training, max_iterations=max_iterations, starts=1, prelude=0)
+    structure = member.structure
+    if not isinstance(structure, NARX):
+        raise TypeError(f"{member.mapping} is no NARX")  # refused when the YAML was read
+    return fit_narx(
+        own_traces(member, traces[: member.traces]),
+        member.mapping,
+        structure,
+        training,
+        rest_output=member.rest,
+        selection=own_traces(member, selection),
+        initial=initial,
+        on_progress=report,
+    )
+
+
+def model_of(fit: FitResult) -> NARXModel:
+    """The network of a member's fit."""
+    if not isinstance(fit.model, NARXModel):
+        raise TypeError(f"{fit.model.mapping} is no NARX")
+    return fit.model
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """Which candidate of each member the whole does best with.
+
+    Args:
+        members: Position of the candidate by the member's output.
+        score: Of the whole, on the selection traces.
+        tried: How many wholes were run.
+    """
+
+    members: dict[str, int]
+    score: float
+    tried: int
+
+
+def choose_together(
+    config: AssemblyConfig,
+    candidates: Mapping[str, Sequence[NARXModel]],
+    alone: Mapping[str, int],
+    selection: Sequence[Trace],
+    *,
+    report: Callable[[str], None] = lambda _: None,
+) -> Choice:
+    """Choose the members by the error of the whole, one member at a time until none changes.
+
+    Args:
+        config: The pipeline.
+        candidates: Models by the member's output.
+        alone: Where the search starts: the best of each by itself.
+        selection: Traces that choose.
+        report: Told what is being tried.
+
+    Returns:
+        The choice; never worse on the selection traces than the start.
+    """
+    outputs = config.choose_on or config.outputs
+    chosen, tried = dict(alone), 1
+    best = whole_score(_with(config, candidates, chosen), selection, outputs)
+    for _ in range(SWEEPS):
+        before = dict(chosen)
+        for name, models in candidates.items():
+            for index in range(len(models)):
+                if index == chosen[name]:
+                    continue
+                report(f"{name}, candidate {index + 1} of {len(models)}, best {best:.3g}")
+                tried += 1
+                score = whole_score(_with(config, candidates, {**chosen, name: index}), selection, outputs)
+                if score < best:
+                    best, chosen = score, {**chosen, name: index}
+        if chosen == before:
+            break
+    return Choice(members=chosen, score=best, tried=tried)
+
+
+def _with(config: AssemblyConfig, candidates: Mapping[str, Sequence[NARXModel]], chosen: Mapping[str, int]) -> Cascade:
+    return assembled(config, {name: models[chosen[name]] for name, models in candidates.items()})
+
+
+def retrain(
+    config: AssemblyConfig,
+    member: MemberConfig,
+    models: Members,
+    report: Report,
+    *,
+    estimation: Sequence[Trace],
+    selection: Sequence[Trace],
+    max_iterations: int,
+) -> FitResult:
+    """Train one member again, from where it stands, on the free run of all others.
+
+    Args:
+        config: The pipeline.
+        member: The member.
+        models: All members.
+        report: Told after every iteration.
+        estimation: Traces to fit.
+        selection: Traces that choose, likewise with what the others put out.
+        max_iterations: Of the training.
+
+    Returns:
+        The fit.
+    """
+    name = member.mapping.output
+    others = assembled(config, models, without=name)
+    start = FitResult(
+        model=models[name], status=Status.MAX_ITERATIONS, loop=member.training_options(0).loop, history={},
+        train_time_s=0.0, seed=0,
+    )  # fmt: skip
+    return fit_member(
+        member, simulated_inputs(others, estimation[: member.traces]), simulated_inputs(others, selection), report,
+        seed=config.seed, initial=start, max_iterations=max_iterations,
+    )  # fmt: skip
+
+
+def train_together(
+    config: AssemblyConfig, cascade: Cascade, estimation: Sequence[Trace], selection: Sequence[Trace], report: Report
+) -> CascadeFit:
+    """Train end to end, for the free run of the whole.
+
+    Args:
+        config: The pipeline, with ``together``.
+        cascade: Where it starts.
+        estimation: Traces to fit.
+        selection: Traces that choose among the states on the way.
+        report: Told after every iteration.
+
+    Returns:
+        The fit; a member that stood in several places may now differ between them.
+    """
+    asked = config.together
+    if asked is None:
+        raise TypeError("the pipeline trains nothing together")
+    trained = None
+    if asked.members is not None:
+        places = {member.mapping.output: member.places for member in config.members}
+        trained = [f"{name}{place}" for name in asked.members for place in places[name]]
+    return fit_cascade(
+        cascade,
+        estimation[: asked.traces],
+        targets=asked.targets,
+        trained=trained,
+        training=asked.training_options(config.seed),
+        selection=selection,
+        on_progress=report,
+    )

@@ -1,0 +1,75 @@
+"""The whole on many random sequences, against the reference: does it diverge, and how large are its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid.models import Cascade
+from sysid.traces import Trace
+
+QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
+WORST = 10
+"""Sequences that are kept for their plots."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stress:
+    """What came of it.
+
+    Args:
+        output: Output that was judged.
+        sequences: How many were run.
+        lost: How many were held by a network's bound, or left all numbers.
+        quantiles: Root mean square error of a sequence, by quantile over the sequences, in the output's unit.
+        within: The share of sequences under the limit.
+        limit: The limit, in the output's unit.
+        worst: Names of the sequences with the largest errors, the worst first, and their errors.
+    """
+
+    output: str
+    sequences: int
+    lost: int
+    quantiles: dict[float, float]
+    within: float
+    limit: float
+    worst: tuple[tuple[str, float], ...]
+
+
+def stress(
+    cascade: Cascade,
+    traces: Sequence[Trace],
+    output: str,
+    limit: float,
+    report: Callable[[int], None] = lambda _: None,
+) -> Stress:
+    """Run a cascade over sequences of the reference.
+
+    Args:
+        cascade: The whole.
+        traces: The sequences, with the inputs of the whole and the output.
+        output: Output that is judged.
+        limit: Root mean square error that a sequence should stay under, in its unit.
+        report: Told how many are done.
+
+    Returns:
+        What came of it.
+    """
+    errors, lost = np.empty(len(traces)), 0
+    for i, trace in enumerate(traces):
+        run = cascade.simulate_trace(trace)
+        errors[i] = np.sqrt(np.mean((run[output] - trace[output]) ** 2))
+        lost += any(one.lost > 0 for one in run.activity.values()) or not np.isfinite(errors[i])
+        report(i + 1)
+    order = np.argsort(-np.nan_to_num(errors, nan=np.inf))
+    return Stress(
+        output=output,
+        sequences=len(traces),
+        lost=int(lost),
+        quantiles={q: float(np.quantile(errors, q)) for q in QUANTILES},
+        within=float(np.mean(errors < limit)),
+        limit=limit,
+        worst=tuple((traces[i].name, float(errors[i])) for i in order[:WORST]),
+    )
