@@ -39,7 +39,8 @@ class Training:
         stride: Every so-manieth sample counts in the loss. Residuals of a free run are correlated over tens of samples:
             a few of them say nearly as much as all, and the price of the normal equations falls with them.
         curriculum: Horizons in samples over which a closed-loop start is trained before the whole record, such as
-            ``[1, 20, 200]``: after each horizon the free run begins anew from measured output.
+            ``[1, 20, 200]``: after each horizon the free run begins anew from measured output. It helps the typical
+            start more than the best of many (``docs/choosing-lags.md`` has the figures).
         curriculum_iterations: Iterations of each horizon; they come before those of ``max_iterations``.
     """
 
