@@ -10,6 +10,9 @@
 ``kernel``          the compiled step; ``reference`` is the same step written plainly
 ``brake``           the brake as a port: reference physics or recorded traces
 ``surrogate``       the brake as a port: fitted models for every car (``kernel_bank`` runs them)
+``cascade_brake``   the brake as a port: a whole assembly from the handle to the cylinder
+``port``            from fitted models to a brake, by their channels
+``equalising``      the equalising reservoir that a handle makes
 ``drive``           a driver, a train and a brake, sample by sample
 ``terrain``         correlation of the track with patterns over the train (US 9,120,493)
 ``features``        crests and sags: where they begin, how severe they are
@@ -24,8 +27,12 @@
 ``tail_unit``       its valve, telemetry and self-test; trains braked from both ends
 ``annotate``        states of the brake along any trace; errors and weights by state
 ``cycles``          what a driver does with the handle on a hilly line
-``scenarios``       runs by which a brake is judged, and their figures
+``stop_cycles``     what the deceleration controller does with it
+``cycle_maker``     both as data sets: pipelines of kind ``drive-cycles``
+``valve_traces``    traces of single valves anywhere in a train
+``scenarios``       runs by which a brake is judged, and their figures; ``scenario_catalogue`` has them
 ``judge``           a brake against the reference; how large an error may be
+``consequence``     the judge of pipelines of that kind; ``consequence_tables`` says what it found
 ==================  ==============================================================================
 
 Import from the modules: they are kept apart so that nothing compiles before it is needed.

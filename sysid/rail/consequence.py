@@ -21,7 +21,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.variant import VARIANTS
 from sysid.content import content_folders
 from sysid.errors import ConfigError, SysidError
-from sysid.models import AbstractModel
+from sysid.models import AbstractModel, Cascade
 from sysid.rail.brake import ReferenceBrake
 from sysid.rail.consequence_tables import consequence_document
 from sysid.rail.constants import KMH
@@ -84,7 +84,7 @@ class PartOptions(BaseModel):
     node: int | None = Field(default=None, ge=3)
 
 
-Subjects = Mapping[str, Sequence[tuple[AbstractModel, Mapping[str, Any]]]]
+Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade, Mapping[str, Any]]]]
 """Models to judge, by the name of what they are together, each with what was said of it."""
 
 

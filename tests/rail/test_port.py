@@ -5,7 +5,8 @@ import pytest
 
 from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
-from sysid.models import ARX, ARXModel, Mapping
+from sysid.models import ARX, ARXModel, Cascade, Limit, Mapping
+from sysid.rail.cascade_brake import CascadeBrake
 from sysid.rail.port import Part, brake_of, ordered, placed
 from sysid.rail.surrogate import SurrogateBrake, ValveSurrogateBrake
 from sysid.rail.tail_unit import TwoEndedBrake
@@ -92,3 +93,58 @@ def test_a_chain_from_the_handle_gives_what_a_two_way_device_reads() -> None:
     brake = TwoEndedBrake(brake_of(parts(pipe, model("BP -> BC", gain=-2.5)), TRAIN)())
     brake.advance(np.repeat([90.0, 70.0, 90.0], [50, 200, 100]))
     assert brake.log
+
+
+# --- whole assemblies
+
+
+def whole(pole: float = 0.5) -> Cascade:
+    models = (model("STP -> BP", rest=90.0, pole=pole), model("BP -> AR", rest=90.0), CYLINDER)
+    return Cascade(models=models, limits={"BC": Limit(low=0.0, high=40.0)})
+
+
+@pytest.mark.parametrize("pieces", [1, 7, 50, 400], ids=lambda n: f"in pieces of {n}")
+def test_a_cascade_in_pieces_is_its_free_run(pieces: int) -> None:
+    """Moves of the handle in and between the pieces: what was run ahead is thrown away where it does not hold."""
+    handle = np.repeat([90.0, 80.0, 64.0, 90.0, 70.0], [33, 200, 30, 900, 37])
+    brake = brake_of([Part(model=whole())], TRAIN)()
+    assert isinstance(brake, CascadeBrake)
+    parts = [brake.advance(handle[k : k + pieces]).cylinders for k in range(0, len(handle), pieces)]
+    free = whole().simulate(handle[:, None])["BC"]
+    np.testing.assert_array_equal(np.concatenate(parts)[:, 1:], np.repeat(free[:, None], 8, axis=1) * PSI_IN_PA)
+    assert free.max() == 40.0
+
+
+def test_each_car_takes_the_cascade_nearest_to_it() -> None:
+    brake = brake_of([Part(model=whole(0.5), node=3), Part(model=whole(0.99), node=9)], TRAIN)()
+    last = brake.advance(np.full(30, 80.0))
+    assert last.cylinders[-1, 1] > 2.0 * last.cylinders[-1, -1]
+    assert last.head_pipe is not None
+    assert last.tail_pipe is not None
+    assert last.head_pipe[-1] < last.tail_pipe[-1]
+
+
+def test_a_cascade_from_the_pipe_on_stands_on_the_reference_s_pipe() -> None:
+    valve = Cascade(models=(RESERVOIR, CYLINDER))
+    assert isinstance(brake_of([Part(model=valve)], TRAIN)(), ValveSurrogateBrake)
+    held = Cascade(models=(RESERVOIR, CYLINDER), limits={"BC": Limit(low=0.0)})
+    with pytest.raises(ConfigError, match="limits"):
+        brake_of([Part(model=held)], TRAIN)
+
+
+def test_a_cascade_that_knows_no_open_tail_says_so() -> None:
+    with pytest.raises(ConfigError, match="open tail"):
+        brake_of([Part(model=whole())], TRAIN)().advance(np.full(3, 90.0), tail_vent=1e-4)
+
+
+def test_a_cascade_beside_a_model_is_refused() -> None:
+    with pytest.raises(ConfigError, match="beside single models"):
+        brake_of([Part(model=whole(), node=3), Part(model=PIPE, node=9)], TRAIN)
+
+
+def test_a_cascade_is_charged_whatever_the_handle_does_first() -> None:
+    """A level that is the handle's first sample in a free run is the running pressure in a train."""
+    charged = Cascade(models=(model("STP -> BP", pole=0.9), model("BP -> BC", gain=-2.5)), rest={"BP": "STP"})
+    output = brake_of([Part(model=charged)], TRAIN)().advance(np.full(3, 64.2))
+    assert output.head_pipe is not None
+    assert output.head_pipe[0] > 80.0 * PSI_IN_PA

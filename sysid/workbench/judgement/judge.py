@@ -13,13 +13,13 @@ from typing import Any, Protocol
 from pydantic import BaseModel
 
 from sysid.errors import ConfigError
-from sysid.models import AbstractModel
+from sysid.models import AbstractModel, Cascade
 from sysid.workbench.kept_steps import Step
 
 GROUP = "sysid.judges"
 
-Subjects = Mapping[str, Sequence[tuple[AbstractModel, Mapping[str, Any]]]]
-"""Models by the name of what they are together, each with the options that its pipeline gives it."""
+Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade, Mapping[str, Any]]]]
+"""Models and cascades by the name of what they are together, each with the options that its pipeline gives it."""
 
 
 class Judge(Protocol):

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.errors import ConfigError
-from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.models import AbstractModel, Cascade
 from sysid.reporting.results import read_results
@@ -32,7 +31,7 @@ class Found:
         tracked_as: Run of the tracking store, where that is known.
     """
 
-    model: AbstractModel
+    model: AbstractModel | Cascade
     said: str
     run_folder: Path | None = None
     fit_key: str | None = None
@@ -60,7 +59,7 @@ def find_model(part: PartConfig, *, workspace: Path, fetch: Fetch) -> Found:
         return _of_bundle((workspace / part.bundle).resolve(), part.bundle)
     address = str(part.model)
     folder, run_id = fetch(address)
-    return Found(model=_single(read_bundle(folder)), said=address, tracked_as=run_id)
+    return Found(model=read_bundle(folder).model, said=address, tracked_as=run_id)
 
 
 def _of_run(part: PartConfig, workspace: Path) -> Found:
@@ -102,29 +101,23 @@ def _of_run(part: PartConfig, workspace: Path) -> Found:
 
 def _of_bundle(folder: Path, given: str) -> Found:
     bundle = read_bundle(folder)
-    store = RunFolder(path=folder.parent)
     made_from = bundle.metadata.get("provenance", {})
     name = made_from.get("fit") if isinstance(made_from, dict) else None
-    key, run_folder = None, None
-    if name is not None and store.results.is_file():
-        slugs = {fit.name: fit.slug for fit in read_results(store.path).fits}
-        if name in slugs and read_fit(store.fit(slugs[name])).model.to_dict() == bundle.model.to_dict():
-            key, run_folder = _key(store, f"scores-{slugs[name]}"), store.path
+    store = RunFolder(path=folder.parent)
+    key = _key_of_fit(store, str(name), bundle.model) if name is not None else None
     said = f"bundle {given}" + (f", fit {name}" if name else "")
-    return Found(model=_single(bundle), said=said, run_folder=run_folder, fit_key=key)
+    return Found(model=bundle.model, said=said, run_folder=store.path if key else None, fit_key=key)
 
 
-def _single(bundle: Bundle) -> AbstractModel:
-    """The model of a bundle that holds one; a whole cascade stands nowhere that a part is asked for."""
-    if isinstance(bundle.model, Cascade):
-        raise ConfigError(
-            "the bundle holds a whole cascade",
-            where=str(bundle.folder),
-            expected="a bundle of a single model",
-            got=str(bundle.metadata["mapping"]),
-            remedy="name the bundle of the model that is to stand here",
-        )
-    return bundle.model
+def _key_of_fit(store: RunFolder, name: str, model: AbstractModel | Cascade) -> str | None:
+    """The key of the fit that a bundle was exported from; ``None`` where the run beside it has it not, or no longer."""
+    try:
+        slugs = {fit.name: fit.slug for fit in read_results(store.path).fits}
+        same = name in slugs and read_fit(store.fit(slugs[name])).model.to_dict() == model.to_dict()
+    except (ConfigError, OSError):
+        # A bundle that lies anywhere: nothing is known of a run.
+        return None
+    return _key(store, f"scores-{slugs[name]}") if same else None
 
 
 def _key(store: RunFolder, step: str) -> str | None:
