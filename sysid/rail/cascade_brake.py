@@ -91,7 +91,7 @@ class CascadeBrake(AbstractBrake):
         columns = {COMMAND: self._assumed[:, 0], TAIL_VENT: self._assumed[:, 1]}
         self._runs = []
         for one in self._distinct:
-            # At rest the handle is in its running position, whatever its first sample is, and so is all that rests there.
+            # At rest the handle is in its running position, whatever its first sample is, and so is what rests with it.
             followers = [name for name, level in one.rest.items() if level == COMMAND]
             rest = dict.fromkeys([COMMAND, *followers], self.consist.running_pressure)
             run = one.simulate(np.column_stack([columns[name] for name in one.inputs]), rest=rest)

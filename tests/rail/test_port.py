@@ -144,7 +144,9 @@ def test_a_cascade_beside_a_model_is_refused() -> None:
 
 def test_a_cascade_is_charged_whatever_the_handle_does_first() -> None:
     """A level that is the handle's first sample in a free run is the running pressure in a train."""
-    charged = Cascade(models=(model("STP -> BP", pole=0.9), model("BP -> BC", gain=-2.5)), rest={"BP": "STP"})
+    charged = Cascade(
+        models=(model("STP -> BP", rest=90.0, pole=0.9), model("BP -> BC", gain=-2.5)), rest={"BP": "STP"}
+    )
     output = brake_of([Part(model=charged)], TRAIN)().advance(np.full(3, 64.2))
     assert output.head_pipe is not None
     assert output.head_pipe[0] > 80.0 * PSI_IN_PA
