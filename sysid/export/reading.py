@@ -151,8 +151,8 @@ def _read_manifest(content: _AbstractContent) -> dict[str, Any]:
 
 
 def _model(manifest: dict[str, Any], content: _AbstractContent) -> AbstractModel | Cascade:
-    stored = manifest["model"]
     try:
+        stored = manifest["model"]
         if stored["structure"].get("kind") == Cascade.kind:
             return cascade_from_dict(stored)
         model = model_from_dict(stored)

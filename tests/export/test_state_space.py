@@ -134,10 +134,11 @@ def test_a_bundle_carries_one(model, traces, tmp_path) -> None:
 
 @pytest.mark.parametrize("name", ["onnx-float32", "c-float32"])
 def test_float32_stays_near_over_a_long_run(name, inputs, tmp_path) -> None:
-    surrogate = Surrogate.of(build(poles=6), RANGES)
+    surrogate = Surrogate.of(build(), RANGES)
     u = inputs(3000, 2).astype(np.float32).astype(np.float64)
     expected = surrogate.simulate(u)
     exporter = EXPORTERS[name]
     for file in exporter.write(surrogate, tmp_path):
         run = exporter.load(file, tmp_path)(u[:, np.newaxis], surrogate.at_rest(u[0])[np.newaxis])
-        assert largest_difference(run.output[:, 0], expected) <= 1e-3
+        # As a thousandth of a psi in ninety; this model's output moves over thousands.
+        assert largest_difference(run.output[:, 0], expected) <= 1e-3 / 90.0 * np.ptp(expected)
