@@ -1,0 +1,78 @@
+"""Two tanks that feed each other, as a data set of CSV files and an assembly over it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROLES = {"A": "estimation", "B": "estimation", "S": "selection", "V": "validation"}
+
+PIPELINE = """\
+kind: assembly
+name: tanks
+data: tanks
+training: tanks
+outputs: [upper, lower]
+seed: 3
+limits:
+  lower: {low: 0}
+definitions:
+  short: &short {loop: closed, prelude: 400, prelude_iterations: 30, max_iterations: 10, workers: 1}
+members:
+  - mapping: pump+lower -> upper
+    structure: {kind: NARX, input_delays: [[0, 1], [1]], output_delays: 1, neurons: 3}
+    rest: 0
+    candidates: 2
+    training: *short
+  - mapping: upper -> lower
+    structure: {kind: NARX, input_delays: [0], output_delays: 1, neurons: 3}
+    rest: 0
+    training: *short
+retrain: {members: [lower], max_iterations: 5}
+together:
+  targets: {upper: 0.1, lower: 0.1}
+  training: {max_iterations: 4, stride: 2, looks: 2}
+stress: {data: tanks, output: lower, within: 0.5}
+published:
+  lower: {source: Table 1, target: 0.5, mse: {V: 0.4}}
+export: null
+"""
+
+
+def levels(pump: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The upper tank drains into the lower one, and the less the fuller that is."""
+    upper, lower = np.zeros(len(pump)), np.zeros(len(pump))
+    for t in range(1, len(pump)):
+        down = 0.15 * np.sqrt(max(upper[t - 1] - 0.3 * lower[t - 1], 0.0))
+        upper[t] = upper[t - 1] + 0.1 * pump[t] - down
+        lower[t] = lower[t - 1] + down - 0.08 * lower[t - 1]
+    return upper, lower
+
+
+def write_tanks(folder: Path) -> None:
+    """The data set."""
+    folder.mkdir(parents=True)
+    cases = []
+    for seed, (name, role) in enumerate(ROLES.items()):
+        pump = np.repeat(np.random.default_rng(seed).uniform(0.0, 2.0, 15), 20)
+        pump[:5] = 0.0
+        rows = np.column_stack([np.arange(len(pump)) * 1.0, pump, *levels(pump)])
+        np.savetxt(
+            folder / f"{name}.csv", rows, delimiter=",", header="time [s],pump [cm],upper [cm],lower [cm]", comments=""
+        )
+        cases.append(f"  {name}: {{role: {role}, file: {name}.csv}}")
+    channels = "\n".join(f"  - {{name: {name}, unit: cm}}" for name in ("pump", "upper", "lower"))
+    text = f"name: tanks\nsample_time: 1\nchannels:\n{channels}\nsource: {{files: {{}}}}\ncases:\n" + "\n".join(cases)
+    (folder / "dataset.yaml").write_text(text + "\n", encoding="utf-8")
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A workspace with both, the current folder."""
+    write_tanks(tmp_path / "datasets" / "tanks")
+    (tmp_path / "pipelines").mkdir()
+    (tmp_path / "pipelines" / "tanks.yaml").write_text(PIPELINE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

@@ -1,0 +1,131 @@
+"""Members: put in their places, fitted on traces of all of them, left out where others are to be heard."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from sysid.errors import ConfigError
+from sysid.models import Mapping
+from sysid.traces import Channel, Trace
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.members import assembled, in_place, own_traces, simulated_inputs, whole_score
+from sysid.workbench.assembly.stages import choose_together
+from sysid.workbench.assembly.stress import stress
+from sysid.yaml_files import check, parse_yaml
+from tests.models.cascades import network
+from tests.workbench.assembly.conftest import PIPELINE
+
+TWO_PLACES = """\
+kind: assembly
+name: train
+data: cases
+training: excitation
+outputs: [BP, AR]
+members:
+  - {mapping: STP -> BP, structure: {kind: NARX, input_delays: [0, 1, 3], output_delays: 2, neurons: 3}, rest: 90}
+  - {mapping: STP -> BP9, structure: {kind: NARX, input_delays: [0, 1, 3], output_delays: 2, neurons: 3}, rest: 90}
+  - mapping: BP+STP -> AR
+    structure: {kind: NARX, input_delays: [0, 1, 3], output_delays: 2, neurons: 3}
+    rest: 90
+    places: ["", "9"]
+    shared: [STP]
+rest: {BP: STP, AR: STP}
+limits: {AR: {high: BP}}
+"""
+
+
+def config(text: str = TWO_PLACES) -> AssemblyConfig:
+    return check(AssemblyConfig, parse_yaml(text, where="text"), where="text")
+
+
+def models():
+    return {
+        "BP": network("STP -> BP", seed=1),
+        "BP9": replace(network("STP -> BP", seed=2), mapping=Mapping.parse("STP -> BP9")),
+        "AR": network("BP+STP -> AR", seed=3),
+    }
+
+
+def trace(n: int = 120, seed: int = 0) -> Trace:
+    rng = np.random.default_rng(seed)
+    names = ("STP", "BP", "AR", "BP9", "AR9")
+    values = rng.uniform(60.0, 90.0, (n, len(names)))
+    values[:, 0] = np.repeat(rng.uniform(64.0, 90.0, n // 20), 20)
+    return Trace(
+        name="T", sample_time=0.1, channels=tuple(Channel(name=one, unit="psi") for one in names), values=values
+    )
+
+
+def test_a_member_stands_in_all_its_places():
+    whole = assembled(config(), models())
+    assert set(whole.outputs) == {"BP", "AR", "BP9", "AR9"}
+    assert whole.inputs == ("STP",)
+    assert whole.member("AR9").mapping.inputs == ("BP9", "STP")
+    assert_array_equal(whole.member("AR9").theta, whole.member("AR").theta)
+    assert whole.limits["AR"].high == "BP"
+
+
+def test_traces_of_a_member_go_through_its_places_in_turn():
+    member = config().members[2]
+    first, second, third = own_traces(member, [trace(seed=s) for s in range(3)])
+    assert first.channel_names == second.channel_names == ("BP", "STP", "AR")
+    assert_array_equal(first["BP"], trace(seed=0)["BP"])
+    assert_array_equal(second["BP"], trace(seed=1)["BP9"])
+    assert_array_equal(second["STP"], trace(seed=1)["STP"])
+    assert_array_equal(third["AR"], trace(seed=2)["AR"])
+    assert_array_equal(in_place(member, trace(), "9")["AR"], trace()["AR9"])
+
+
+def test_who_reads_a_member_that_is_left_out_reads_what_was_measured():
+    others = assembled(config(), models(), without="BP")
+    assert others.inputs == ("STP", "BP")
+    assert others.limits["AR"].high == "BP"
+    (changed,) = simulated_inputs(others, [trace()])
+    assert_array_equal(changed["BP"], trace()["BP"])
+    assert_allclose(changed["BP9"], others.simulate_trace(trace())["BP9"])
+
+
+def test_the_whole_chooses_the_candidate_that_it_does_best_with():
+    good, whole = models(), assembled(config(), models())
+    run = whole.simulate_trace(trace())
+    names = trace().channel_names
+    values = np.column_stack([run[name] for name in names])
+    truth = Trace(name="truth", sample_time=0.1, channels=trace().channels, values=values)
+    candidates = {name: [network("STP -> BP", seed=9), good[name]] if name == "BP" else [good[name]] for name in good}
+    choice = choose_together(config(), candidates, dict.fromkeys(good, 0), [truth])
+    assert choice.members == {"BP": 1, "BP9": 0, "AR": 0}
+    assert choice.score == whole_score(whole, [truth], ("BP", "AR"))
+
+
+def test_stress_counts_what_is_lost_and_names_the_worst():
+    whole = assembled(config(), models())
+    sequences = [trace(seed=s) for s in range(12)]
+    found = stress(whole, sequences, "AR", limit=1e6)
+    errors = [np.sqrt(np.mean((whole.simulate_trace(t)["AR"] - t["AR"]) ** 2)) for t in sequences]
+    assert found.sequences == 12
+    assert found.within == 1.0
+    assert found.quantiles[1.0] == pytest.approx(max(errors))
+    assert found.worst[0][1] == pytest.approx(max(errors))
+    assert len(found.worst) == 10
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        pytest.param("outputs: [upper, lower]", "outputs: [uper]", "which no member writes", id="a stranger scored"),
+        pytest.param("members: [lower]", "members: [pump]", "which no member writes", id="a stranger retrained"),
+        pytest.param("upper -> lower", "pump -> upper", "two members write one channel", id="a channel twice"),
+        pytest.param(
+            "{kind: NARX, input_delays: [0], output_delays: 1, neurons: 3}", "{kind: ARX, na: 1, nb: [1], nk: [1]}",
+            "is ARX", id="a linear kind",
+        ),
+    ],
+)  # fmt: skip
+def test_an_assembly_that_cannot_be_is_refused(old, new, match):
+    assert old in PIPELINE
+    with pytest.raises(ConfigError, match=match):
+        config(PIPELINE.replace(old, new))

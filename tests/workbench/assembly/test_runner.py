@@ -1,0 +1,77 @@
+"""An assembly end to end: its stages beside each other, what is stored, what a second run does again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.reporting.judgement_report import read_judgement_results
+from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.kinds import RunRequest, kind_of
+from tests.workbench.assembly.conftest import levels
+
+
+def run(workspace: Path, *, fresh: bool = False) -> int:
+    file = workspace / "pipelines" / "tanks.yaml"
+    return run_assembly(RunRequest(path=file, typed="tanks", fresh=fresh, tracking=False))
+
+
+def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert kind_of(workspace / "pipelines" / "tanks.yaml") == "assembly"
+    assert run(workspace) == 0
+    folder = workspace / "runs" / "tanks"
+    results = read_judgement_results(folder)
+    assert results is not None
+    stages = [subject.name for subject in results.subjects]
+    assert stages == ["each alone", "chosen together", "retrained", "trained end to end"]
+    upper, lower, stress, timing = results.judgement.tables
+    assert [row[0] for row in lower.rows if str(row[0]).removesuffix(" (chosen)") in stages] == [
+        row[0] for row in upper.rows
+    ]
+    assert lower.rows[-2:] == [
+        ["Table 1", None, None, None, 0.4, None],
+        ["aimed at: 0.5 of it", None, None, None, 0.2, None],
+    ]
+    assert any("diverged" in str(row[0]) for row in stress.rows)
+    assert len(timing.rows) == 4
+    # What the table says is what the stored assembly does.
+    whole = read_assembly(folder)
+    pump = np.repeat(np.random.default_rng(3).uniform(0.0, 2.0, 15), 20)
+    pump[:5] = 0.0
+    error = np.mean((whole.simulate(pump[:, None])["lower"] - levels(pump)[1]) ** 2)
+    chosen = next(row for row in lower.rows if str(row[0]).endswith("(chosen)"))
+    assert error == pytest.approx(chosen[4], rel=1e-6)
+    assert (folder / "report" / "index.html").is_file()
+    assert "From the command alone" in capsys.readouterr().out
+
+    stamps = {file: file.stat().st_mtime_ns for file in folder.rglob("fit.json")}
+    assert len(stamps) == 4
+    assert run(workspace) == 0
+    assert {file: file.stat().st_mtime_ns for file in folder.rglob("fit.json")} == stamps, "nothing is fitted again"
+    again = read_judgement_results(folder)
+    assert again is not None
+    assert again.judgement.tables[1] == lower
+
+
+def test_the_chosen_stage_is_the_best_on_the_selection_traces(workspace: Path) -> None:
+    run(workspace)
+    results = json.loads((workspace / "runs" / "tanks" / "results.json").read_text(encoding="utf-8"))
+    rows = [row for row in results["judgement"]["tables"][0]["rows"] if row[-1] is not None]
+    best = min(rows, key=lambda row: row[-1])
+    assert best[0].endswith("(chosen)")
+
+
+def test_training_data_without_selection_are_refused(workspace: Path) -> None:
+    file = workspace / "datasets" / "tanks" / "dataset.yaml"
+    file.write_text(file.read_text(encoding="utf-8").replace("role: selection", "role: validation"), encoding="utf-8")
+    with pytest.raises(ConfigError, match="lack a role"):
+        run(workspace)
+
+
+def test_a_run_that_has_not_come_so_far_has_no_assembly(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="has no assembly"):
+        read_assembly(tmp_path)
