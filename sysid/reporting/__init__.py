@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from sysid.reporting.figures import case_figure as case_figure
     from sysid.reporting.pdf import write_pdf as write_pdf
     from sysid.reporting.publication import publish_run as publish_run
+    from sysid.reporting.publication import publish_text as publish_text
     from sysid.reporting.published import PublishedFigure as PublishedFigure
     from sysid.reporting.published import PublishedTable as PublishedTable
     from sysid.reporting.published import published_names as published_names
@@ -34,6 +35,7 @@ _HOME = {
     "compare_runs": "against",
     "parse_results": "results",
     "publish_run": "publication",
+    "publish_text": "publication",
     "published_names": "published",
     "read_published": "published",
     "read_results": "results",

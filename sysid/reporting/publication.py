@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as Dict
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.reporting.comparison import with_published
 from sysid.reporting.document import Document, build_document
@@ -58,12 +60,52 @@ def publish_run(run_folder: Path, into: Path, *, name: str | None = None, worksp
     with tempfile.TemporaryDirectory(dir=into, prefix=f".{chosen}-") as scratch:
         draft = Path(scratch) / chosen
         draft.mkdir()
-        text = _page(document, chosen, f"sysid publish {run_folder} --as {chosen}", draft)
+        text = _page(document, results, chosen, f"sysid publish {run_folder} --as {chosen}", draft)
         (draft / PAGE).write_text(text, encoding="utf-8", newline="\n")
         if target.exists():
             target.rename(Path(scratch) / "before")
         draft.rename(target)
     return target / PAGE
+
+
+def publish_text(
+    name: str, into: Path, *, parts: Dict[str, str], commands: Sequence[str], created: str, environment: Dict[str, Any]
+) -> Path:
+    """Publish what commands have printed, such as benchmarks, with what they were run on.
+
+    Args:
+        name: Name of the report.
+        into: Folder of the published reports.
+        parts: What was printed, by heading.
+        commands: The commands that print it again.
+        created: When it was printed, ISO 8601.
+        environment: The machine and the packages, as in ``environment.json``.
+
+    Returns:
+        The page.
+
+    Raises:
+        ConfigError: If there is another page of that name that is not ours.
+    """
+    _refuse_others(into / name)
+    known = dict(facts(dict(environment)))
+    rows = {"run": "<br>".join(f"`{command}`" for command in commands), "date": readable(created), **_machine(known)}
+    lines = [MARK, f"# {name}", "", "| | |", "|---|---|", *(f"| {key} | {text} |" for key, text in rows.items())]
+    for heading, text in parts.items():
+        lines += ["", f"## {heading}", "", "```text", text.rstrip("\n"), "```"]
+    page = into / name / PAGE
+    with replacing(page) as draft:
+        draft.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    return page
+
+
+def _machine(environment: Dict[str, str]) -> dict[str, str]:
+    packages = filter(None, (f"sysid {environment.get('sysid', '?')}", environment.get("packages", "")))
+    return {
+        "commit": environment.get("commit", "not recorded"),
+        "machine": f"{environment.get('cpu', 'not recorded')}, {environment.get('cores', '?')} cores",
+        "versions": ", ".join(packages),
+    }
 
 
 def _refuse_others(target: Path) -> None:
@@ -79,8 +121,7 @@ def _refuse_others(target: Path) -> None:
     )
 
 
-def _page(document: Document, name: str, command: str, folder: Path) -> str:
-    results = document.results
+def _page(document: Document, results: Results, name: str, command: str, folder: Path) -> str:
     lines = [MARK, f"# {name}", "", results.description, ""]
     lines += [f"**{_arrow(document.verdict.headline)}**", ""]
     lines += [f"- **{word}.** {_arrow(sentence)}" for word, sentence in document.verdict.points]
@@ -95,17 +136,12 @@ def _page(document: Document, name: str, command: str, folder: Path) -> str:
 
 
 def _provenance(results: Results, command: str) -> list[str]:
-    environment = dict(facts(results.environment))
     rows = {
         "run": f"`{results.command}`",
         "published": f"`{command}`",
         "date": readable(results.created),
-        "commit": environment.get("commit", "not recorded"),
         "seed": str(results.seed),
-        "machine": f"{environment.get('cpu', 'not recorded')}, {environment.get('cores', '?')} cores",
-        "versions": ", ".join(
-            text for text in (f"sysid {environment.get('sysid', '?')}", environment.get("packages", "")) if text
-        ),
+        **_machine(dict(facts(results.environment))),
         "data": f"{results.data.name}, SHA-256 {results.data.digest}",
     }
     return ["| | |", "|---|---|", *(f"| {key} | {_escape(text)} |" for key, text in rows.items()), ""]

@@ -1,10 +1,15 @@
-"""``make bench``: which benchmarks there are; ``python -m tests.benchmarks training rail`` runs the named ones."""
+"""``make bench``: which benchmarks there are; ``python -m tests.benchmarks training rail`` runs the named ones.
+
+``--publish=NAME`` writes what they print to ``reports/NAME`` too, with the commit, the machine and the date.
+"""
 
 from __future__ import annotations
 
 import ast
 import runpy
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -30,5 +35,33 @@ def main(names: list[str]) -> int:
     return 0
 
 
+def publish(report: str, names: list[str]) -> int:
+    """Run the named benchmarks one after the other, each in a process of its own, and publish what they print."""
+    from sysid.reporting import publish_text
+    from sysid.workbench.environment import environment
+
+    printed, commands = {}, []
+    for name in names:
+        words = [sys.executable, "-m", "tests.benchmarks", name]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            lines = []
+            for line in process.stdout:
+                print(line, end="", flush=True)
+                lines.append(line)
+        if process.returncode != 0:
+            print(f"{name} ended with code {process.returncode}; nothing is published")
+            return 1
+        printed[name] = "".join(lines)
+        commands.append(f"python -m tests.benchmarks {name}")
+    created = time.strftime("%Y-%m-%dT%H:%M:%S%z")
+    into = HERE.parent.parent / "reports"
+    page = publish_text(report, into, parts=printed, commands=commands, created=created, environment=environment())
+    print(f"Published: {page}")
+    return 0
+
+
 if __name__ == "__main__":
-    sys.exit(main([argument for argument in sys.argv[1:] if not argument.startswith("-")]))
+    chosen = [argument for argument in sys.argv[1:] if not argument.startswith("-")]
+    into = [argument.removeprefix("--publish=") for argument in sys.argv[1:] if argument.startswith("--publish=")]
+    sys.exit(publish(into[0], chosen) if into and chosen else main(chosen))

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from sysid.reporting.pdf import find_browser
+from sysid.workbench.cli import run_cli
+
 playwright_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge")
 FOLDER = Path(__file__).resolve().parents[2] / "build" / "browser"
 """Where screenshots are kept: with the output of the tests, and out of the repository."""
-
-
-def browser_path() -> str | None:
-    """An installed browser of the Chromium family; ``SYSID_BROWSER`` names one that is nowhere on the path."""
-    named = os.environ.get("SYSID_BROWSER")
-    return named or next((found for name in NAMES if (found := shutil.which(name))), None)
 
 
 @pytest.fixture(scope="session")
@@ -28,11 +23,18 @@ def browser() -> Iterator[object]:
     with playwright_api.sync_playwright() as playwright:
         try:
             # Rendering in the page's own process: containers seldom allow the sandbox, and the pages are ours.
-            started = playwright.chromium.launch(executable_path=browser_path(), args=["--no-sandbox"])
+            program = find_browser() or playwright.chromium.executable_path
+            started = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
         except playwright_api.Error as error:
             pytest.skip(f"no browser ({str(error).splitlines()[0]}): install one, or run `playwright install chromium`")
         yield started
         started.close()
+
+
+@pytest.fixture(scope="session")
+def program(browser) -> str:
+    """The browser as a program."""
+    return find_browser() or str(browser.browser_type.executable_path)
 
 
 @pytest.fixture
@@ -58,3 +60,15 @@ def picture(page, request: pytest.FixtureRequest) -> Callable[..., Path]:
         return path
 
     return take
+
+
+@pytest.fixture(scope="session")
+def tracked_workspace(browser, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A new user's workspace after their first run: three fits, the best of them exported."""
+    workspace = tmp_path_factory.mktemp("seen") / "mine"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("MLFLOW_TRACKING_URI", raising=False)
+        assert run_cli(["init", str(workspace)]) == 0
+        patch.chdir(workspace)
+        assert run_cli(["run", "tank"]) == 0
+    return workspace

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.reporting import publish_run, read_results
+from sysid.reporting import publish_run, publish_text, read_results
 from sysid.reporting.publication import MARK
 
 PAIR = ("ARX", "NARX free run")
@@ -77,6 +77,27 @@ def test_a_folder_of_somebody_else_is_left_alone(page: tuple[Path, Path], tmp_pa
     with pytest.raises(ConfigError, match="something else where the report would go"):
         publish_run(page[0], tmp_path, name="mine")
     assert (tmp_path / "mine" / "README.md").read_text(encoding="utf-8") == "# My own words\n"
+
+
+def test_what_benchmarks_print_is_published_with_what_they_ran_on(tmp_path: Path) -> None:
+    path = publish_text(
+        "runtime",
+        tmp_path,
+        parts={"training": "one epoch  37 ms\n"},
+        commands=["python -m tests.benchmarks training"],
+        created="2026-11-21T04:00:00+0000",
+        environment={"cpu": "A", "cores": 2, "sysid": "0.1.0", "commit": "9ffa098", "packages": {"numpy": "2.4"}},
+    )
+    text = path.read_text(encoding="utf-8")
+    for words in (
+        "| run | `python -m tests.benchmarks training` |",
+        "| date | 21 November 2026, 04:00 UTC |",
+        "| commit | 9ffa098 |",
+        "| machine | A, 2 cores |",
+        "| versions | sysid 0.1.0, numpy 2.4 |",
+        "## training\n\n```text\none epoch  37 ms\n```",
+    ):
+        assert words in text
 
 
 def test_the_reports_of_this_repository_are_made_by_the_command() -> None:
