@@ -2,8 +2,9 @@
 
 Run with ``python -m tests.benchmarks assembly``. Not collected by pytest. The cascades have random weights of the size
 of fitted ones (their run time does not depend on the values). The same 2,000 s of command go into everything; each
-figure is the median of repeats after one run that warms up. Beside the wall time stands the processor time of the
-calling thread: on a machine that others use, ratios of processor times are the ones that hold.
+figure is the median of repeats after one run that warms up. Beside the wall time stands the processor time of all
+threads: on a machine that others use, ratios of processor times are the ones that hold. Divided among cores they are a
+projection, that of a machine which is otherwise idle.
 """
 
 from __future__ import annotations
