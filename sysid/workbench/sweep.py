@@ -179,10 +179,10 @@ def publish(record: SweepRecord, url: str) -> int:
     Returns:
         Number of trials that were added; those that are there already are not added again.
     """
-    with _quiet():
+    with _quiet(), _database(url) as storage:
         study = optuna.create_study(
             study_name=record.name,
-            storage=url,
+            storage=storage,
             load_if_exists=True,
             directions=["minimize"] * len(record.objectives),
         )
@@ -191,6 +191,17 @@ def publish(record: SweepRecord, url: str) -> int:
         added = [_finished(trial, record) for trial in record.trials if trial.key not in known]
         study.add_trials(added)
     return len(added)
+
+
+@contextmanager
+def _database(url: str) -> Iterator[optuna.storages.RDBStorage]:
+    """A database of studies, whose connections are closed when we are done with it."""
+    storage = optuna.storages.RDBStorage(url)
+    try:
+        yield storage
+    finally:
+        storage.remove_session()
+        storage.engine.dispose()
 
 
 def _finished(trial: Trial, record: SweepRecord) -> optuna.trial.FrozenTrial:

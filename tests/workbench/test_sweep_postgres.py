@@ -125,8 +125,11 @@ def test_a_sweeps_trials_reach_an_optuna_study_once(server: str) -> None:
     url = f"{server}/optuna"
     assert publish(record(), url) == 5
     assert publish(record(), url) == 0
-    study = optuna.load_study(study_name="s", storage=url)
+    storage = optuna.storages.RDBStorage(url)
+    study = optuna.load_study(study_name="s", storage=storage)
     assert sorted(trial.params["neurons"] for trial in study.best_trials) == [1, 2, 3, 4, 5]
+    storage.remove_session()
+    storage.engine.dispose()
 
 
 @pytest.mark.slow
