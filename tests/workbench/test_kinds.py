@@ -8,7 +8,7 @@ import pytest
 from pydantic import BaseModel
 
 from sysid.errors import ConfigError
-from sysid.workbench.kinds import KINDS, kind_of
+from sysid.workbench.kinds import KINDS, kind_of, kinds
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -31,3 +31,14 @@ def test_a_misspelt_kind_is_named(tmp_path: Path) -> None:
     file.write_text("kind: fit\nname: a", encoding="utf-8")
     with pytest.raises(ConfigError, match="did you mean fits"):
         kind_of(file)
+
+
+@pytest.mark.parametrize("name", sorted(set(kinds()) - set(KINDS)))
+def test_a_kind_that_a_package_brings_is_as_strict(name: str) -> None:
+    config = kinds()[name].load_config()
+    assert config.model_config["extra"] == "forbid"
+    assert callable(kinds()[name].load_runner())
+
+
+def test_the_kinds_of_the_packages_that_are_installed_are_known() -> None:
+    assert {"consequence", "drive-cycles"} <= set(kinds())

@@ -37,7 +37,7 @@ class PartConfig(BaseModel):
                 "it is not said where a model lies",
                 expected="one of run (with fit), bundle and model",
                 got=", ".join(given) or "none of them",
-                remedy="write for example {run: service-brake, fit: best}",
+                remedy="write for example {run: tank, fit: best}",
             )
         return self
 

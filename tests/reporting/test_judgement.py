@@ -1,0 +1,94 @@
+"""What a judge said, as a section of a report and as results of its own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.reporting.judgement import FOLDER, judgement_sections, parse_judgement, read_judgements
+from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.parts import Picture
+from sysid.reporting.tables import Table
+
+SAID: dict[str, Any] = {
+    "title": "Consequence",
+    "headline": "It stops late.",
+    "sentences": ["By a little."],
+    "tables": [
+        {"caption": "First", "head": [["scene", ""], ["late", "m"]], "rows": [["level", 1.25], ["hill", None]]},
+        {"caption": "Second", "head": [["scene", ""]], "rows": []},
+    ],
+    "charts": [
+        {
+            "title": "What an error costs",
+            "caption": "Both axes are logarithmic.",
+            "x": "mse",
+            "y": "late",
+            "logarithmic": True,
+            "lines": [
+                {"name": "asked", "x": [0.1, 10.0], "y": [1.0, 1.0], "target": True},
+                {"name": "found", "x": [0.1, 10.0], "y": [0.2, 4.0]},
+                {"name": "models", "x": [1.0], "y": [0.7], "marks": True},
+            ],
+        }
+    ],
+    "metrics": {"a": {"late": 1.25}},
+}
+
+
+def test_a_section_begins_with_what_matters() -> None:
+    (section,) = judgement_sections([parse_judgement(SAID, where="here")])
+    kinds = [type(part) for part in section.parts]
+    assert kinds == [str, str, Table, Picture, Table]
+    assert section.parts[0] == "It stops late."
+    table = section.parts[2]
+    assert isinstance(table, Table)
+    assert table.rows[0][0].header
+    assert table.rows[0][1].value == 1.25
+    assert table.rows[1][1].text == ""
+
+
+def test_two_judgements_have_names_of_their_own_in_the_page() -> None:
+    record = parse_judgement(SAID, where="here")
+    assert len({section.anchor for section in judgement_sections([record, record])}) == 2
+
+
+def test_judgements_lie_in_the_run_that_was_judged(tmp_path: Path) -> None:
+    assert read_judgements(tmp_path) == []
+    folder = tmp_path / FOLDER
+    folder.mkdir()
+    (folder / "a.json").write_text(json.dumps(SAID), encoding="utf-8")
+    assert read_judgements(tmp_path)[0].metrics == {"a": {"late": 1.25}}
+    (folder / "b.json").write_text("{", encoding="utf-8")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_judgements(tmp_path)
+
+
+@pytest.mark.parametrize("missing", ["title", "headline"])
+def test_a_judgement_without_its_words_is_refused(missing: str) -> None:
+    with pytest.raises(ConfigError, match="judgement cannot be used"):
+        parse_judgement({name: value for name, value in SAID.items() if name != missing}, where="here")
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ({"judgement": SAID, "schema_version": 99}, "newer release"),
+        ({"judgement": SAID, "schema_version": 1}, "damaged"),
+    ],
+    ids=["newer", "damaged"],
+)
+def test_results_that_cannot_be_read_are_named(tmp_path: Path, document: dict[str, Any], message: str) -> None:
+    (tmp_path / "results.json").write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(ConfigError, match=message):
+        read_judgement_results(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"fits": []}'])
+def test_results_of_something_else_are_left_to_others(tmp_path: Path, text: str) -> None:
+    (tmp_path / "results.json").write_text(text, encoding="utf-8")
+    assert read_judgement_results(tmp_path) is None
