@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -274,7 +276,7 @@ def evidence_figure(results: Results) -> Figure | None:
         figure = new_figure(7.6, 3.0)
         axes = figure.subplots()
         for index, ((mapping, loop), pairs) in enumerate(series.items()):
-            style = {"marker": MARKERS[index % len(MARKERS)], "color": PALETTE[index % len(PALETTE)]}
+            style: dict[str, Any] = {"marker": MARKERS[index % len(MARKERS)], "color": PALETTE[index % len(PALETTE)]}
             axes.plot([n for n, _ in pairs], [value for _, value in pairs], label=f"{mapping}, {loop} loop", **style)
         axes.set_xlabel("parameters")
         axes.set_ylabel("log evidence")
