@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 # One BLAS thread per process: two processes with default threads were measured ten times slower.
 export MLFLOW_DISABLE_TELEMETRY = true
 
-.PHONY: run test check lint types setup bench clean
+.PHONY: run test check lint types setup bench docs clean
 
 setup: $(VENV)/.ready  ## environment with the tested versions
 
@@ -30,6 +30,9 @@ types: setup
 
 bench: setup  ## the benchmarks, not part of the tests
 	$(BIN)/python -m tests.benchmarks
+
+docs: setup  ## the API reference, from the docstrings
+	$(BIN)/python -m pdoc --docformat google --output-directory build/docs sysid '!sysid.testing'
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache

@@ -6,7 +6,12 @@ What follows is the short way, in the words of the command line; each word is ex
     fit = sysid.fit(traces, "u -> y", sysid.ARX(na=2, nb=(2,), nk=(1,)))
     print(sysid.compare(traces, fit))
     sysid.save(fit, traces, "bundle")
+
+The rooms of the house, each with its public names: :mod:`sysid.ingest`, :mod:`sysid.models`, :mod:`sysid.estimation`,
+:mod:`sysid.validation`, :mod:`sysid.export`, :mod:`sysid.reporting`, :mod:`sysid.workbench`.
 """
+
+from typing import Any
 
 __version__ = "0.1.0"
 
@@ -16,11 +21,8 @@ WORDS = (
 )
 """What is imported when it is first used: ``sysid --help`` loads none of it."""
 
-__all__ = ["ARX", "NARX", "WORDS", "Comparison", "NeuralStateSpace", "Role", "Start", "Training", "TransferFunction"]
-__all__ += ["compare", "fit", "load", "save"]
 
-
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     """A word of the short way, imported now."""
     if name not in WORDS:
         raise AttributeError(f"module 'sysid' has no attribute {name!r}")

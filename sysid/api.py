@@ -83,6 +83,7 @@ def fit(
     *,
     start: Start = FROM_FIRST_SAMPLE,
     rest_output: float | None = None,
+    initial: FitResult | None = None,
 ) -> FitResult:
     """Fit one structure to the traces whose role is estimation; those for selection choose between starts.
 
@@ -93,6 +94,7 @@ def fit(
         training: How a network is trained; nothing to choose for a linear model.
         start: How each free run begins.
         rest_output: The output's value at rest, in its unit; needed where ``start`` is rest.
+        initial: A network of the same structure to begin with: an open-loop fit whose loop is to be closed.
 
     Returns:
         The fit: its model, how it ended, its history.
@@ -117,6 +119,8 @@ def fit(
     selection = traces.with_role(Role.SELECTION)
     if isinstance(structure, TransferFunction):
         return fit_transfer_function(estimation, chosen, structure, selection=selection, **common)
+    if initial is not None:
+        common["initial"] = initial
     if type(structure) in _NETWORKS:
         return _NETWORKS[type(structure)](estimation, chosen, structure, training, selection=selection, **common)
     raise ConfigError(
