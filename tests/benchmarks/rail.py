@@ -1,9 +1,9 @@
 """Run time of a braked train: 101 vehicles, 600 s, on the machine at hand. Not collected by pytest.
 
-Run with ``python -m tests.benchmarks rail``, or ``python tests/benchmarks/rail.py REPEATS``. Each figure is the median of
-so many runs (5) after one that warms up, by the clock on the wall and by the processor's, which other jobs on the
-machine touch less. The handle makes an application, a release and an emergency; the brake is asked once for each second,
-or at every sample.
+Run with ``python -m tests.benchmarks rail``, or ``python tests/benchmarks/rail.py REPEATS``. Each figure is the median
+of so many runs (5) after one that warms up, by the clock on the wall and by the processor's, which other jobs on the
+machine touch less. The handle makes an application, a release and an emergency; the brake is asked once for each
+second, or at every sample.
 """
 
 from __future__ import annotations
