@@ -18,6 +18,7 @@ from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Picture, Section, identifier, picture
 from sysid.reporting.published import PublishedTable
 from sysid.reporting.results import FitRecord, Results
+from sysid.reporting.runtime_table import exported_run_times
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.state_table import state_section
 from sysid.reporting.sweep_section import sweep_sections
@@ -92,7 +93,9 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     sections += [_run_times(results, published), _tried(results)]
     exports = export_table(results)
     if exports is not None:
-        sections.append(Section(anchor="exports", title="Exported files", parts=(exports,)))
+        timed = exported_run_times(results)
+        parts = (exports,) if timed is None else (exports, timed)
+        sections.append(Section(anchor="exports", title="Exported files", parts=parts))
     sections += [_data(results), *_others(results, signals, columns)]
     comparability = "" if published is None else published.comparability
     return Document(results=results, verdict=verdict(results, moments, comparability), sections=tuple(sections))

@@ -96,6 +96,14 @@ class CaseRecord(_Record):
     )
 
 
+class RunTimeRecord(_Record):
+    """How long an exported file takes for 20,000 samples, beside its model's own compiled free run."""
+
+    cars: int = Field(description="Runs side by side in one call.")
+    seconds: Number
+    ratio: Number = Field(description="To the model's own free run, for each car.")
+
+
 class ExportRecord(_Record):
     """One exported file and how it compares with its model."""
 
@@ -104,6 +112,7 @@ class ExportRecord(_Record):
     largest_difference: Number = Field(description="Over all cases, in the output's unit.")
     tolerance: Number = Field(description="What was allowed, in the same unit.")
     unit: str = ""
+    run_times: list[RunTimeRecord] = Field(default=[], description="Empty where none were measured.")
 
 
 class LearningCurve(_Record):

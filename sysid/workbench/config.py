@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_v
 from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import Training
-from sysid.models import ARX, NARX, Start, TransferFunction
+from sysid.models import ARX, NARX, NeuralStateSpace, Start, TransferFunction
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
     STRICT,
@@ -59,6 +59,12 @@ class FitConfig(BaseModel):
                 expected="neither: a linear model finds its own start",
                 remedy="remove training and initial",
             )
+        if isinstance(self.structure, NeuralStateSpace) and self.initial is not None:
+            raise FieldError(
+                f"the fit {self.name!r} has an initial fit, but is {self.structure.kind}",
+                expected="none: a neural state space begins at the best linear one",
+                remedy="remove initial",
+            )
         try:
             self.training_options(seed=0)
         except ConfigError as error:
@@ -87,6 +93,7 @@ class ExportConfig(BaseModel):
         fit: Name of a fit, or ``best``: least free-run error on the selection traces.
         formats: File formats.
         tolerance: Largest difference allowed between a file and its model, in the output's unit.
+        run_times: Whether every file is timed beside the model's own free run; some seconds a format.
     """
 
     model_config = STRICT
@@ -94,6 +101,7 @@ class ExportConfig(BaseModel):
     fit: str = "best"
     formats: tuple[FormatField, ...] = ("onnx", "torchscript")
     tolerance: float = Field(default=1e-9, gt=0.0)
+    run_times: bool = False
 
 
 class ReportConfig(BaseModel):

@@ -228,7 +228,9 @@ class _Run:
             provenance = {"pipeline": config.name, "fit": best.ready.config.name, "command": self.command}
             began = time.perf_counter()
             bundle = steps.export(best.ready.fit, best.scores, data, config, folder=folder, provenance=provenance)
-            exports = [export_record(entry, folder.name, best.ready.fit.model.output_unit) for entry in bundle.files]
+            timed = steps.export_run_times(bundle) if config.export and config.export.run_times else ()
+            unit = best.ready.fit.model.output_unit
+            exports = [export_record(entry, folder.name, unit, timed) for entry in bundle.files]
             if best.final:
                 files = [file for file in sorted(folder.rglob("*")) if file.is_file()]
                 self.store.mark_done("export", key, files, exports=exports, seconds=time.perf_counter() - began)

@@ -219,13 +219,14 @@ def results_document(
     }
 
 
-def export_record(entry: Any, folder: str, unit: str) -> dict[str, Any]:
+def export_record(entry: Any, folder: str, unit: str, run_times: Sequence[Any] = ()) -> dict[str, Any]:
     """One exported file as it stands in results.json.
 
     Args:
         entry: The bundle's entry.
         folder: The bundle's folder, relative to the run folder.
         unit: The output's unit.
+        run_times: What was measured of all files.
 
     Returns:
         JSON values.
@@ -236,6 +237,11 @@ def export_record(entry: Any, folder: str, unit: str) -> dict[str, Any]:
         "largest_difference": entry.largest_difference,
         "tolerance": entry.tolerance,
         "unit": unit,
+        "run_times": [
+            {"cars": one.cars, "seconds": one.seconds, "ratio": one.ratio}
+            for one in run_times
+            if (one.name, one.format) == (entry.name, entry.format)
+        ],
     }
 
 

@@ -23,9 +23,10 @@ from sysid.estimation import (
     TransferFunctionTraining,
     fit_arx,
     fit_narx,
+    fit_neural_state_space,
     fit_transfer_function,
 )
-from sysid.models import ARX, NARX, TransferFunction
+from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation import Evaluation, evaluate, evaluate_case
 from sysid.workbench.annotation import annotated_set, by_state, find_annotator, weighted
@@ -35,6 +36,7 @@ from sysid.workbench.store import code_digest, digest
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
+    from sysid.export.run_times import RunTime
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -169,7 +171,7 @@ def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | N
         64 hexadecimal digits.
     """
     is_arx = isinstance(fit.structure, ARX)
-    network = isinstance(fit.structure, NARX)
+    network = isinstance(fit.structure, NARX | NeuralStateSpace)
     training = dataclasses.asdict(fit.training_options(config.seed)) if network else {"seed": config.seed}
     terms = {
         "structure": fit.structure.to_dict(),
@@ -240,6 +242,19 @@ def fit_traces(
             fit.training_options(config.seed),
             selection=data.selection,
             initial=initial,
+            vet=check.passes,
+            on_progress=on_progress,
+            **common,
+        )
+        return check.applied(found)
+    if isinstance(structure, NeuralStateSpace):
+        check = StabilityCheck.of(config.stability, config.mapping, data.estimation, data.sequences)
+        found = fit_neural_state_space(
+            data.estimation,
+            config.mapping,
+            structure,
+            fit.training_options(config.seed),
+            selection=data.selection,
             vet=check.passes,
             on_progress=on_progress,
             **common,
@@ -394,3 +409,17 @@ def export(
         metrics=scores.evaluation,
         provenance=provenance,
     )
+
+
+def export_run_times(bundle: Bundle) -> tuple[RunTime, ...]:
+    """Time every file of a bundle beside the model's own free run.
+
+    Args:
+        bundle: The bundle.
+
+    Returns:
+        The model's own run, then file by file.
+    """
+    from sysid.export.run_times import bundle_run_times
+
+    return bundle_run_times(bundle)
