@@ -14,6 +14,7 @@ from sysid.estimation import starts
 from sysid.estimation.arx import first_output
 from sysid.estimation.attempts import Attempt
 from sysid.estimation.basis import RebasedProvider, RegressorBasis
+from sysid.estimation.batched import device_named
 from sysid.estimation.checkpoint import Checkpoint
 from sysid.estimation.growing import grown
 from sysid.estimation.initialise import Layout
@@ -22,6 +23,7 @@ from sysid.estimation.prelude import StepSamples
 from sysid.estimation.provider import Experiment, RecursionProvider, experiments_of
 from sysid.estimation.regression import lagged
 from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.scouting import Patrol, Scout
 from sysid.estimation.training import FitProgress, Training
 from sysid.models import NARX, ARXModel, History, Mapping, NARXModel, Scaling, Start
 from sysid.traces import Trace
@@ -95,6 +97,7 @@ def fit_narx(
         on_progress=on_progress,
         resume=resume,
         prelude=_prelude(training, template, experiments, layout, basis),
+        scouted=_scouted(training, inner, to_plain, layout),
         curriculum=[RebasedProvider(inner=replace(inner, horizon=k), to_plain=to_plain) for k in training.curriculum],
     )
     candidates = starts.run(race)
@@ -116,6 +119,23 @@ def fit_narx(
         posterior = calibrate(posterior, chosen.model, experiments_of(selection, mapping, start, rest))
     fit = raced_result(choice, candidates, training, status, time.perf_counter() - began)
     return replace(fit, posterior=posterior)
+
+
+def _scouted(
+    training: Training, inner: RecursionProvider, to_plain: NDArray[np.float64], layout: Layout
+) -> list[Scout]:
+    """The best of the scouts as starts; none where none are asked for, or no device is there to send them out on."""
+    if not training.scouts or (training.device == "auto" and device_named("auto") == "cpu"):
+        return []
+    patrol = Patrol(
+        provider=inner,
+        to_plain=to_plain,
+        layout=layout,
+        centre=np.asarray(np.linalg.solve(to_plain, layout.centre())),
+        regularisation=training.regularisation,
+        device=training.device,
+    )
+    return patrol.scouts(range(training.seed, training.seed + training.scouts))[: training.starts]
 
 
 def _prelude(
@@ -296,7 +316,9 @@ def _notes(choice: starts.Choice, candidates: Sequence[starts.Candidate], traini
     notes = []
     if training.starts > 1:
         by_selection = training.choose_by == "selection" and np.isfinite(choice.chosen.score)
-        how = "the least error on the selection traces (geometric mean)" if by_selection else "the largest evidence"
+        by_evidence = choice.chosen.solution.evidence is not None
+        how = "the largest evidence" if by_evidence else "the least error on the estimation traces"
+        how = "the least error on the selection traces (geometric mean)" if by_selection else how
         notes.append(f"Chosen by {how} among {training.starts} starts looked at {len(candidates)} times.")
     refused = sum(stable is False for stable in choice.stable)
     if refused and any(choice.stable):

@@ -20,6 +20,9 @@ from sysid.estimation.training import FitProgress, Training
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
 from sysid.traces import Trace
 
+LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "curriculum", "scouts")
+"""Options of a training that concern lagged regressors."""
+
 
 def fit_neural_state_space(
     traces: Sequence[Trace],
@@ -42,7 +45,7 @@ def fit_neural_state_space(
         traces: Estimation traces.
         mapping: Which channels go in, which comes out.
         network: The structure.
-        training: How to train; its basis and offsets do not apply.
+        training: How to train; options for lagged regressors do not apply.
         start: What stands before each trace; at rest by default.
         rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
         selection: Traces that choose between starts; without them the evidence chooses.
@@ -54,7 +57,8 @@ def fit_neural_state_space(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
-        ConfigError: If the training is for one step ahead, which a hidden state does not have.
+        ConfigError: If the training is for one step ahead, which a hidden state does not have, or has options that are
+            for lagged regressors alone.
     """
     began = time.perf_counter()
     training, start = training or Training(), start or Start()
@@ -65,6 +69,14 @@ def fit_neural_state_space(
             expected="closed",
             got=training.loop.value,
             remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
+        )
+    strangers = [name for name in LAGGED_ONLY if getattr(training, name) != getattr(Training(), name)]
+    if strangers:
+        raise ConfigError(
+            f"a neural state space is not trained with {', '.join(strangers)}",
+            where="training",
+            expected="options that do not concern lagged regressors",
+            remedy=f"leave out {', '.join(strangers)}",
         )
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = experiments_of(traces, mapping, start, rest)

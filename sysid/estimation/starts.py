@@ -26,6 +26,7 @@ from sysid.estimation.prelude import StepSamples
 from sysid.estimation.provider import AbstractProvider
 from sysid.estimation.regularisation import Prior
 from sysid.estimation.result import Loop, Status
+from sysid.estimation.scouting import Scout
 from sysid.estimation.termination import Termination
 from sysid.estimation.training import FitProgress, Training
 from sysid.models import NARXModel, NeuralStateSpaceModel, Start
@@ -78,6 +79,8 @@ class Race:
     prelude: StepSamples | None = None
     curriculum: Sequence[AbstractProvider] = ()
     stop: threading.Event = field(default_factory=threading.Event)
+    scouted: Sequence[Scout] = ()
+    """Starts that were found among many; by default each is drawn."""
     iterations: dict[int, int] = field(default_factory=dict)
     """Iterations done by each start, for the progress bar."""
 
@@ -329,6 +332,8 @@ def _begin(race: Race, number: int) -> tuple[int | None, NDArray[np.float64], ND
     centre = _in_basis(race, race.layout.centre())
     if number == 0 and race.initial is not None:
         return None, _in_basis(race, race.initial), centre
+    if race.scouted:
+        return race.scouted[number].seed, race.scouted[number].theta, centre
     seed = race.training.seed + number
     return seed, race.layout.draw(np.random.default_rng(seed), centre), centre
 

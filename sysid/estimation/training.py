@@ -8,6 +8,13 @@ from dataclasses import dataclass
 from sysid.errors import ConfigError
 from sysid.estimation.result import Loop
 
+CHOICES = {
+    "choose_by": ("selection", "evidence"),
+    "basis": ("levels and rates", "plain"),
+    "device": ("auto", "cpu", "cuda"),
+}
+"""Options that are words, and what they may be; the first is a good example."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Training:
@@ -42,6 +49,10 @@ class Training:
             ``[1, 20, 200]``: after each horizon the free run begins anew from measured output. It helps the typical
             start more than the best of many (``docs/choosing-lags.md`` has the figures).
         curriculum_iterations: Iterations of each horizon; they come before those of ``max_iterations``.
+        scouts: Random starts that a graphics processor fits at once for a few iterations (``scouting.py``); the best of
+            them are the starts. 0 for none.
+        device: Where scouts run: ``auto`` sends them out only where there is a graphics processor, ``cuda`` insists on
+            one, ``cpu`` does without, slowly.
     """
 
     loop: Loop = Loop.CLOSED
@@ -61,11 +72,13 @@ class Training:
     stride: int = 1
     curriculum: tuple[int, ...] = ()
     curriculum_iterations: int = 20
+    scouts: int = 0
+    device: str = "auto"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loop", Loop(self.loop))
         object.__setattr__(self, "offsets", tuple(dict(offset) for offset in self.offsets))
-        for name, choices in {"choose_by": ("selection", "evidence"), "basis": ("levels and rates", "plain")}.items():
+        for name, choices in CHOICES.items():
             if getattr(self, name) not in choices:
                 raise ConfigError(
                     f"unknown value of {name}",
@@ -94,6 +107,15 @@ class Training:
         ):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
+        if self.scouts and (self.scouts < self.starts or self.loop is Loop.OPEN or self.prelude or self.stride != 1):
+            raise ConfigError(
+                "scouts cannot be sent out with these options",
+                where="scouts",
+                expected="at least as many scouts as starts, in closed loop, without a prelude or a stride",
+                got=f"{self.scouts} scouts for {self.starts} starts, {self.loop.value} loop, prelude {self.prelude}, "
+                f"stride {self.stride}",
+                remedy="leave scouts out, or the other option",
+            )
         if self.prelude < 0:
             raise ConfigError("prelude is too small", where="prelude", expected="0 or more", got=self.prelude)
         if self.regularisation is not None and not 0.0 <= self.regularisation < float("inf"):

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from sysid.errors import TraceError
 from sysid.estimation import FitResult
-from sysid.models import ARX, NARX, TransferFunction
+from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
 from sysid.traces import Role
 from sysid.validation import analyse_residuals, judge_linearity
 from sysid.workbench.config import PipelineConfig
@@ -56,6 +56,6 @@ def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:
     usable = [ready for ready in fits if ready.fit.status.comparable]
     linear, networks = (
         {ready.config.name: ready.evaluation for ready in usable if isinstance(ready.fit.model.structure, kinds)}
-        for kinds in ((ARX, TransferFunction), NARX)
+        for kinds in ((ARX, TransferFunction), (NARX, NeuralStateSpace))
     )
     return judge_linearity(linear, networks).to_dict() if linear and networks else None
