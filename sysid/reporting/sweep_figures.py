@@ -39,7 +39,7 @@ def over_trials_figure(record: SweepRecord, name: str, *, title: str) -> Figure:
     with styled():
         figure = new_figure(7.6, 3.4)
         axes = figure.subplots()
-        axes.set_title(title)
+        axes.set_title(title, pad=24.0)
         full, dropped = record.tried_in_full, [t for t in record.trials if t.usable and t.dropped_at is not None]
         _dots(axes, record, full, name, color=PALETTE[0], marker=".", label="trained in full")
         if dropped:
@@ -54,7 +54,7 @@ def over_trials_figure(record: SweepRecord, name: str, *, title: str) -> Figure:
         _log(axes, [_value(record, trial, name) for trial in record.trials])
         axes.set_xlabel("trial")
         axes.set_ylabel(record.words(name))
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.05), ncols=4, borderaxespad=0.1)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.1)
         return figure
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,10 +14,13 @@ from pydantic import BaseModel
 from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import NARX, AbstractStructure
-from sysid.models.ranges import AbstractRange, declared_ranges, parse_range
+from sysid.models.ranges import WORD, AbstractRange, declared_ranges, parse_range
 from sysid.workbench.fields import STRICT, STRUCTURES, StructureField, TrainingConfig
 from sysid.workbench.store import digest
 from sysid.yaml_files import check
+
+MAX_POINTS = 100_000
+"""Points of a sweep: more cannot be tried, and to list them takes minutes."""
 
 TRAINING = "training."
 """Begins the name of a dimension that belongs to the training."""
@@ -141,6 +145,14 @@ class Space:
         """
         if self._points:
             return self._points
+        n = sum(math.prod(len(dimension.values) for dimension in one.dimensions) for one in self.alternatives)
+        if n > MAX_POINTS:
+            raise ConfigError(
+                f"the ranges hold {n:,} points",
+                where=self.alternatives[0].where,
+                expected=f"up to {MAX_POINTS:,}, each of which is checked before the first is tried",
+                remedy="give the ranges a step, or leave one of them out",
+            )
         seen: set[str] = set()
         reason: ConfigError | None = None
         for index, alternative in enumerate(self.alternatives):
@@ -231,7 +243,7 @@ def _checked(fields: Mapping[str, Any], where: str) -> AbstractStructure:
 
 
 def _many(value: object) -> typing.TypeGuard[list[Any]]:
-    return isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
+    return isinstance(value, list) and any(isinstance(entry, dict) or entry == WORD for entry in value)
 
 
 def _members(hint: Any) -> tuple[Any, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
@@ -187,6 +188,8 @@ _BENCH: list[Bench] = []
 
 def _settle_in(bench: Bench) -> None:
     _BENCH[:] = [bench]
+    # Ctrl-C reaches every process of a terminal; what becomes of a sweep is the driver's business.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_leave_with, args=(parent.sentinel,), daemon=True).start()

@@ -93,6 +93,10 @@ WRONG_SPACES = {
     "an unknown kind": ([CHAPTER | {"kind": "NARKS"}], {}),
     "no point that is a structure": ([{"kind": "NARX", "input_delays": 0, "output_delays": 1, "neurons": 1}], {}),
     "lags for another number of inputs": ([CHAPTER | {"input_delays": [[1], [2], [3]]}], {}),
+    "more points than can be tried": (
+        [{"kind": "ARX", "na": "range", "nb": ["range", "range"], "nk": ["range", "range"]}],
+        {},
+    ),
     "a misspelt option": ([CHAPTER], {"lop": "open"}),
     "a wrong value in an option's range": ([CHAPTER], {"loop": {"among": ["open", "shut"]}}),
 }
