@@ -14,16 +14,17 @@ async function main(bundle) {
   for (const name of fs.readdirSync(path.join(bundle, "verify")).filter((file) => file.startsWith("record")).sort()) {
     const lines = fs.readFileSync(path.join(bundle, "verify", name), "utf8").trim().split("\n").slice(1);
     const rows = lines.map((line) => line.split(",").map((text) => (text === "nan" ? NaN : Number(text))));
-    // At rest: the inputs of the first row, and the declared value of the output.
-    const rest = { ...about.initialisation.values };
-    about.inputs.forEach((channel, i) => (rest[channel.name] = rows[0][1 + i]));
+    // At rest: each channel at its level, a number or the input whose first sample it is.
+    const first = Object.fromEntries(about.inputs.map((channel, i) => [channel.name, rows[0][1 + i]]));
+    const rest = Object.fromEntries(
+      Object.entries(about.initialisation.levels).map(([name, level]) => [name, first[level] ?? level]),
+    );
     const state = new Float64Array(about.state.size);
     for (const line of about.state.lines) {
       state.fill((rest[line.channel] - line.offset) / line.scale, line.first, line.first + line.length);
     }
     for (const space of about.state.state_spaces ?? []) {
-      const { input_offset, input_scale } = about.scaling;
-      const scaled = about.inputs.map((_, i) => (rows[0][1 + i] - input_offset[i]) / input_scale[i]);
+      const scaled = space.channels.map((name, i) => (rest[name] - space.offset[i]) / space.scale[i]);
       space.at_rest.forEach((row, i) => {
         state[space.first + i] = row.reduce((sum, number, j) => sum + number * scaled[j], 0);
       });
@@ -34,10 +35,13 @@ async function main(bundle) {
       state: new ort.Tensor("float64", state, [1, about.state.size]),
     });
     let worst = 0;
+    const nOutputs = about.outputs.length;
     rows.forEach((row, i) => {
-      const [expected, y] = [row[1 + nInputs], result.y.data[i]];
-      if (Number.isNaN(expected) !== Number.isNaN(y)) worst = Infinity;
-      else if (!Number.isNaN(y)) worst = Math.max(worst, Math.abs(y - expected));
+      for (let k = 0; k < nOutputs; k++) {
+        const [expected, y] = [row[1 + nInputs + k], result.y.data[i * nOutputs + k]];
+        if (Number.isNaN(expected) !== Number.isNaN(y)) worst = Infinity;
+        else if (!Number.isNaN(y)) worst = Math.max(worst, Math.abs(y - expected));
+      }
     });
     const sameFlags = rows.every((row, i) => row[row.length - 1] === result.flags.data[i]);
     const good = worst <= 1e-9 && sameFlags;

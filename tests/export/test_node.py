@@ -22,6 +22,12 @@ def _needs_node():
         pytest.skip("node finds no onnxruntime-web: npm install onnxruntime-web, and NODE_PATH=<there>/node_modules")
 
 
+def test_records_of_a_cascade_are_found_as_recorded(limited, command, tmp_path):
+    bundle = export_bundle(limited, command, tmp_path / "b", formats=["onnx"])
+    done = subprocess.run(["node", EXAMPLE, bundle.folder], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr, done.stdout.count(": as recorded")) == (0, "", 3)
+
+
 def test_records_are_found_as_recorded(fit, traces, start, tmp_path):
     bundle = export_bundle(fit, traces, tmp_path / "b", start=start, formats=["onnx"])
     done = subprocess.run(["node", EXAMPLE, bundle.folder], capture_output=True, text=True, check=False)

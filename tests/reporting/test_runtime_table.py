@@ -20,7 +20,7 @@ def test_a_row_for_each_file_and_number_of_cars():
     )
     assert [[cell.text for cell in row] for row in table.rows] == [
         ["onnx", "network", "bundle/sequence.onnx", "1", "61.2", "12.5"],
-        ["onnx", "network", "bundle/sequence.onnx", "100", "180", "0.37"],
+        ["onnx", "network", "bundle/sequence.onnx", "100", "180", "0.370"],
     ]
 
 
