@@ -8,10 +8,10 @@ winner with any number of workers, killed or not. The driver alone writes: worke
 from __future__ import annotations
 
 import heapq
+import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any
 
 from sysid.models import NARX
@@ -215,11 +215,12 @@ class Driver:
         followers: dict[str, list[Job]] = {}
         ready: list[tuple[bool, float, int, Job]] = []
         waited_for = {job.after for job in missing.values()}
-        for order, job in enumerate(missing.values()):
+        turn = itertools.count()  # jobs of one cost are done in the order in which they became ready
+        for job in missing.values():
             if job.after in missing:
                 followers.setdefault(str(job.after), []).append(job)
             else:
-                heapq.heappush(ready, (job.key not in waited_for, -job.cost, order, job))
+                heapq.heappush(ready, (job.key not in waited_for, -job.cost, next(turn), job))
         busy = 0
         while ready or busy:
             while ready and self.workers.free > 0:
@@ -233,7 +234,7 @@ class Driver:
                 self.clock.keep()
                 done[job.key] = self._note(job, outcome, fresh=True)
                 for follower in followers.pop(job.key, []):
-                    heapq.heappush(ready, (follower.key not in waited_for, -follower.cost, follower.number, follower))
+                    heapq.heappush(ready, (follower.key not in waited_for, -follower.cost, next(turn), follower))
             self._progress.show()
         return done
 
@@ -298,7 +299,7 @@ def _next_smaller(points: Sequence[Point]) -> dict[int, Point]:
     found: dict[int, Point] = {}
     for group in alike.values():
         rising = sorted(group, key=lambda point: point.structure.to_dict()["neurons"])
-        found |= {larger.number: smaller for smaller, larger in pairwise(rising)}
+        found |= {larger.number: smaller for smaller, larger in itertools.pairwise(rising)}
     return found
 
 

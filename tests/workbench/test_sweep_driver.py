@@ -163,6 +163,17 @@ def test_networks_with_the_same_delays_share_one_linear_fit(tmp_path: Path) -> N
     assert {job.after for job in crew.done if job not in linear} == {job.key for job in linear}
 
 
+def test_jobs_of_one_cost_need_no_order_of_their_own(tmp_path: Path) -> None:
+    network = {
+        "kind": "NARX",
+        "input_delays": {"from": 1, "to": 8},
+        "output_delays": {"from": 1, "to": 8},
+        "neurons": 4,
+    }
+    found, _ = sweep(tmp_path, Crew(3, 1), structure=network, warm_start="linear")
+    assert len(found) == 64
+
+
 def test_a_network_grows_from_the_next_smaller_one(tmp_path: Path) -> None:
     crew = Crew(2, 0)
     sweep(tmp_path, crew, warm_start="smaller")
