@@ -43,8 +43,8 @@ NAME_WIDTH: Final = 330
 METRIC_WIDTH: Final = 165
 """Pixels for the name of a metric."""
 
-LAYOUT: Final = {"at a glance": (3, 360), "learning": (1, 360), "target and output": (1, 420)}
-"""Charts side by side and their height in pixels, by section; pictures need the whole width for several fits."""
+LAYOUT: Final = {"at a glance": (3, 360), "learning": (1, 360), "target and output": (2, 420)}
+"""Charts side by side and their height in pixels, by section."""
 
 
 def view_tag(cases: Sequence[str], created_ms: int) -> str:
