@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +14,8 @@ from sysid.errors import ConfigError
 from sysid.estimation import Loop, Training
 from sysid.models import NARX, StartKind
 from sysid.workbench.config import find_pipeline, json_schema, parse_pipeline, read_pipeline
+from sysid.workbench.kinds import kind_of, kinds
+from sysid.yaml_files import check, read_yaml
 
 GOOD = """\
 name: first
@@ -147,9 +151,14 @@ def test_schema_knows_the_structures() -> None:
 
 @pytest.mark.parametrize("file", sorted(content_folders("pipelines")[0].glob("*.yaml")), ids=lambda file: file.stem)
 def test_built_in_pipelines_can_be_read(file: Path) -> None:
-    pipeline = read_pipeline(file)
-    assert pipeline.config.name == file.stem
+    kind = kind_of(file)
+    config: Any = check(kinds()[kind].load_config(), read_yaml(file), where=file)
+    assert config.name == file.stem
     assert find_pipeline(file.stem).resolve() == file
+    # What an installed package brings checks its own options.
+    for group in ("sysid.judges", "sysid.makers"):
+        for entry in entry_points(group=group, name=kind):
+            check(entry.load().options, config.options, where=file)
 
 
 def test_a_workspace_comes_before_what_is_built_in(workspace: Path) -> None:
