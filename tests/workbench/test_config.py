@@ -13,7 +13,7 @@ from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import Loop, Training
 from sysid.models import NARX, StartKind
-from sysid.workbench.config import find_pipeline, json_schema, parse_pipeline, read_pipeline
+from sysid.workbench.config import find_pipeline, json_schema, parse_pipeline
 from sysid.workbench.kinds import kind_of, kinds
 from sysid.yaml_files import check, read_yaml
 
