@@ -171,6 +171,7 @@ class AssemblyConfig(BaseModel):
         description: What it is for.
         data: Data set whose cases are scored; they need the inputs of the whole and the outputs that are scored.
         training: Data set with the traces that are fitted, and those that choose (role ``selection``).
+        selection: Another data set with traces that choose.
         outputs: Outputs that are scored.
         choose_on: Outputs whose error on the selection traces chooses; those that are scored by default.
         definitions: Anything, to be repeated by YAML's anchors; not read.
@@ -192,6 +193,7 @@ class AssemblyConfig(BaseModel):
     description: str = ""
     data: str
     training: str
+    selection: str | None = None
     outputs: tuple[str, ...] = Field(min_length=1)
     choose_on: tuple[str, ...] = ()
     definitions: dict[str, Any] = Field(default_factory=dict)

@@ -103,6 +103,8 @@ class _Run:
         cases = self._load(self.config.data)
         training = self._load(self.config.training)
         estimation, selection = training.with_role(Role.ESTIMATION), training.with_role(Role.SELECTION)
+        if self.config.selection is not None:
+            selection = (*selection, *self._load(self.config.selection).with_role(Role.SELECTION))
         if not estimation or not selection:
             raise ConfigError(
                 "the training data lack a role",
