@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.workbench.sweep_trial import Bench, Job, run_job
 from sysid.workbench.sweep_workers import MAX_DEATHS, TICK_S, AbstractWorkers, WorkersLostError
+
+POLL_S = 0.01
+"""Between two looks at what is done: little beside a job's seconds."""
 
 CONNECT_S = 30
 """How long a scheduler may take to answer."""
@@ -67,12 +71,11 @@ class DaskWorkers(AbstractWorkers):
         """What has come in; a job whose worker died is sent again, with what it needs."""
         from concurrent.futures import CancelledError
 
-        from distributed import KilledWorker, wait
+        from distributed import KilledWorker
 
-        try:
-            done = wait(list(self._jobs), timeout=TICK_S, return_when="FIRST_COMPLETED").done
-        except TimeoutError:
-            return []
+        deadline = time.monotonic() + TICK_S
+        while not (done := [future for future in self._jobs if future.done()]) and time.monotonic() < deadline:
+            time.sleep(POLL_S)
         results = []
         for future in done:
             job, before = self._jobs.pop(future)
