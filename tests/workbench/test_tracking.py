@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sysid.reporting.results import Results
-from sysid.workbench import registry, tracked, tracking
+from sysid.workbench import registry, tracked, tracking, views
 from sysid.workbench.cli import run_cli
 from sysid.workbench.config import read_pipeline
 from sysid.workbench.pipeline import run_pipeline
@@ -110,6 +110,57 @@ def test_pictures_have_the_same_key_in_every_fit(tracked_once) -> None:
     assert set(map(frozenset, keys.values())) == {
         frozenset({"target and output~run-1", "target and output~run-2", "target and output~run-3"})
     }
+
+
+def test_pictures_lie_where_the_comparison_of_runs_looks_for_them(tracked_once) -> None:
+    _, client, _ = tracked_once
+    for run in runs_of(client).values():
+        files = {entry.path for entry in client.list_artifacts(run.info.run_id) if not entry.is_dir}
+        assert {f"target and output - run-{n}.png" for n in (1, 2, 3)} <= files
+
+
+def test_a_fit_leads_to_the_fit_it_started_from_and_to_its_bundle(tracked_once) -> None:
+    _, client, results = tracked_once
+    runs = runs_of(client)
+    closed, parent = runs["closed loop"], runs["open loop"].info.run_id
+    here = f"#/experiments/{closed.info.experiment_id}/runs"
+    assert closed.data.tags["initial_run"] == parent
+    assert f"[started from open loop]({here}/{parent})" in closed.data.tags["mlflow.note.content"]
+    best = runs[results.best.name]
+    for part in ("bundle", "report"):
+        assert f"[{part}]({here}/{best.info.run_id}/artifacts/{part})" in best.data.tags["mlflow.note.content"]
+    zips = [entry.path for entry in client.list_artifacts(best.info.run_id) if entry.path.endswith(".zip")]
+    assert len(zips) == 1
+
+
+def test_the_experiment_shows_first_what_matters_first(tracked_once) -> None:
+    _, client, _ = tracked_once
+    tags = client.get_experiment_by_name("inlet+valve -> outlet").tags
+    state = views.read_view(tags[views.TAG])
+    assert tags[views.CASES_TAG] == "run-1|run-2|run-3"
+    assert state["selectedColumns"][0] == state["orderByKey"] == "metrics.`mean_free_run_mse`"
+    known = {name for run in runs_of(client).values() for name in run.data.metrics}
+    charts = state["compareRunCharts"]
+    assert {chart["metricKey"] for chart in charts if "metricKey" in chart} <= known
+    pictures = [chart["imageKeys"] for chart in charts if chart["type"] == "IMAGE"]
+    assert pictures == [[f"target and output/run-{n}"] for n in (1, 2, 3)]
+
+
+def test_a_view_of_many_cases_fits_into_a_tag() -> None:
+    names = [f"case {n} {'x' * (n % 40)}" for n in range(400)]
+    value = views.view_tag(names, 0)
+    assert len(value) <= views.TAG_LIMIT
+    shown = [chart for chart in views.read_view(value)["compareRunCharts"] if chart["type"] == "IMAGE"]
+    assert 10 < len(shown) < 400
+
+
+def test_an_experiment_made_by_other_means_gets_the_view_when_it_is_opened(tmp_path: Path, empty_store: Path) -> None:
+    shutil.copyfile(empty_store, tmp_path / "mlflow.db")
+    client = tracking.connect(f"sqlite:///{tmp_path / 'mlflow.db'}")
+    experiment = client.create_experiment("other", artifact_location=(tmp_path / "files").as_uri())
+    client.create_run(experiment)
+    assert latest_experiment(f"sqlite:///{tmp_path / 'mlflow.db'}") == experiment
+    assert views.TAG in client.get_experiment(experiment).tags
 
 
 def test_the_best_fit_has_bundle_report_and_a_model_that_runs(tracked_once) -> None:
