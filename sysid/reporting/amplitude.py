@@ -109,7 +109,7 @@ def amplitude_section(fit: FitRecord, signals: Dict[str, CaseSignals]) -> Sectio
     )
     title = f"{fit.name}: error by level of {output}"
     words = "Errors of the free run by level of the target, logarithmic."
-    drawing = picture(amplitude_figure(found, label=output, unit=unit), title, words, "amplitude")
+    drawing = picture(amplitude_figure(found, label=output, unit=unit), title, words, "error-by-level")
     parts: tuple[Part, ...] = (table, drawing)
     return Section(anchor="amplitude", title="Error by amplitude", parts=parts)
 
