@@ -50,7 +50,8 @@ def test_own_data_from_a_yaml(workspace: Path) -> None:
     rewrite(workspace, "export: null", "export: {tolerance: 1.0e-9}")
     results, stored = run(workspace)
     assert stored == dict.fromkeys(FITS, False)
-    assert read_results(workspace / "run") == results
+    # As text: what was not computed is NaN, and NaN differs from itself as a number.
+    assert read_results(workspace / "run").model_dump_json() == results.model_dump_json()
     assert [(fit.name, fit.loop.value, fit.mapping) for fit in results.fits] == [
         ("ARX", "open", "inlet+valve -> outlet"),
         ("open loop", "open", "inlet+valve -> outlet"),
@@ -125,7 +126,7 @@ def test_a_second_run_fits_nothing(workspace: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(steps, "score", lambda *_: pytest.fail("scored again"))
     second, stored = run(workspace)
     assert stored == dict.fromkeys(FITS, True)
-    assert second.fits == first.fits
+    assert [fit.model_dump_json() for fit in second.fits] == [fit.model_dump_json() for fit in first.fits]
 
 
 @pytest.mark.usefixtures("no_report")
