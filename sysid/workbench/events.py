@@ -10,7 +10,6 @@ from typing import Any
 from sysid.estimation import FitResult
 from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord
-from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import TraceSet
 from sysid.validation import Evaluation
 from sysid.workbench.config import FitConfig, PipelineConfig
@@ -174,25 +173,6 @@ class JudgementReady(Event):
     page: Path
     document: Path
     command: str
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SweepReady(Event):
-    """Every trial of a sweep is on disk, and its winner has gone through the steps.
-
-    Args:
-        record: The trials.
-        folder: The run folder.
-        command: The command that makes it again.
-        data: Name of the data set.
-        seed: Seed of the sweep.
-    """
-
-    record: SweepRecord
-    folder: Path
-    command: str
-    data: str
-    seed: int
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
