@@ -130,7 +130,7 @@ def _steps(
     ridge = prior.precision / prior.beta
     g = gradient + ridge * (thetas - prior.centre)
     H = matrix + np.diag(ridge)
-    usable = np.isfinite(H).all(axis=(1, 2)) & np.isfinite(g).all(axis=1)
+    usable: NDArray[np.bool_] = np.asarray(np.isfinite(H).all(axis=(1, 2)) & np.isfinite(g).all(axis=1))
     H = np.where(usable[:, None, None], H, np.eye(len(ridge)))
     g = np.where(usable[:, None], g, 0.0)
     diagonal = np.einsum("cpp->cp", H)

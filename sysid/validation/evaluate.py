@@ -52,14 +52,18 @@ class CaseResult:
     def to_dict(self) -> dict[str, Any]:
         """Figures and run time as JSON values, without the signals."""
         states = {} if self.by_state is None else {"by_state": _states(self.by_state)}
-        return states | {
-            "role": self.role.value,
-            "free_run": self.free_run.to_dict(),
-            "one_step": self.one_step.to_dict(),
-            "run_time_s": self.run_time_s,
-            "n_samples": len(self.target),
-            "simulated_s": float(self.time[-1] - self.time[0]),
-        } | ({} if self.intervals is None else {"coverage": self.intervals.to_dict()})
+        return (
+            states
+            | {
+                "role": self.role.value,
+                "free_run": self.free_run.to_dict(),
+                "one_step": self.one_step.to_dict(),
+                "run_time_s": self.run_time_s,
+                "n_samples": len(self.target),
+                "simulated_s": float(self.time[-1] - self.time[0]),
+            }
+            | ({} if self.intervals is None else {"coverage": self.intervals.to_dict()})
+        )
 
 
 def _states(by_state: Dict[str, tuple[Figures, float]]) -> dict[str, Any]:

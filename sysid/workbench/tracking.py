@@ -352,9 +352,7 @@ class Tracker:
 
         if self.client is None:
             self.client = connect(self.uri)
-        log_judgement(
-            self.client, ready, key_tag=KEY_TAG, experiment=self._experiment(ready.kind), metric=Metric
-        )
+        log_judgement(self.client, ready, key_tag=KEY_TAG, experiment=self._experiment(ready.kind), metric=Metric)
 
     def _log_sweep(self, ready: SweepReady) -> None:
         from mlflow.entities import Metric, Param
