@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from pydantic import BaseModel, Field
 
 from sysid.errors import TraceError
-from sysid.estimation import FitResult, Status
+from sysid.estimation import FitResult, Loop, Status
 from sysid.models import AbstractModel, Mapping
 from sysid.traces import Trace
 from sysid.validation import AbstractSequences, Excursions, Stability, TraceSequences, check_stability
@@ -28,6 +28,8 @@ class StabilityConfig(BaseModel):
         count: How many at most; 0 checks nothing.
         tolerance: How far from its plateau a run may settle, as a share of the output's range.
         seed: Seed of the sequences.
+        choose: Whether the best start gives way to the best stable one. It never does in a fit of the open loop, which
+            is not made to run free.
     """
 
     model_config = STRICT
@@ -36,6 +38,7 @@ class StabilityConfig(BaseModel):
     count: int = Field(default=SEQUENCES, ge=0)
     tolerance: float = Field(default=TOLERANCE, gt=0.0)
     seed: int = Field(default=SEED, ge=0)
+    choose: bool = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,6 +87,14 @@ class StabilityCheck:
             still=max(1, round(STILL_S / declared[0].sample_time)),
         )
         return cls(config=config, sequences=sequences)
+
+    def vet(self, loop: Loop) -> Callable[[AbstractModel], bool] | None:
+        """What a fit asks of its candidates; ``None`` where it takes the best as it is.
+
+        Args:
+            loop: In which loop it is trained.
+        """
+        return self.passes if self.config.choose and loop is Loop.CLOSED else None
 
     def passes(self, model: AbstractModel) -> bool:
         """Whether a model's free run is stable.

@@ -224,7 +224,7 @@ def fit_traces(
     Raises:
         ConfigError: If no estimator belongs to the structure.
     """
-    structure = fit.structure
+    structure, training_options = fit.structure, fit.training_options(config.seed)
     common: dict[str, Any] = {"start": config.start, "rest_output": config.rest_output}
     if isinstance(structure, ARX):
         return fit_arx(data.estimation, config.mapping, structure, **common)
@@ -239,10 +239,10 @@ def fit_traces(
             data.estimation,
             config.mapping,
             structure,
-            fit.training_options(config.seed),
+            training_options,
             selection=data.selection,
             initial=initial,
-            vet=check.passes,
+            vet=check.vet(training_options.loop),
             on_progress=on_progress,
             **common,
         )
@@ -253,9 +253,9 @@ def fit_traces(
             data.estimation,
             config.mapping,
             structure,
-            fit.training_options(config.seed),
+            training_options,
             selection=data.selection,
-            vet=check.passes,
+            vet=check.vet(training_options.loop),
             on_progress=on_progress,
             **common,
         )

@@ -83,3 +83,16 @@ def test_traces_too_short_for_excursions_are_not_checked():
     short = replace(trace(), values=trace().values[:10])
     nothing = StabilityCheck.of(StabilityConfig(), MAPPING, [short], ())
     assert nothing.applied(fit(model())).stability is None
+
+
+@pytest.mark.parametrize(
+    ("choose", "loop", "asked"),
+    [
+        pytest.param(True, Loop.CLOSED, True, id="a closed loop gives way to a stable one"),
+        pytest.param(True, Loop.OPEN, False, id="an open loop is not made to run free"),
+        pytest.param(False, Loop.CLOSED, False, id="the pipeline takes the best as it is"),
+    ],
+)
+def test_who_is_asked_to_be_stable(choose: bool, loop: Loop, asked: bool) -> None:
+    check = StabilityCheck(config=StabilityConfig(choose=choose), sequences=None)
+    assert (check.vet(loop) is not None) == asked
