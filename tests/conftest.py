@@ -1,7 +1,14 @@
 """Settings that all tests share."""
 
+import pytest
 from hypothesis import settings
 
 # Seeds are fixed, so that a failure is the same everywhere; machines that are busy are not slow code.
 settings.register_profile("sysid", derandomize=True, deadline=None)
 settings.load_profile("sysid")
+
+
+@pytest.fixture(autouse=True)
+def no_store_of_an_earlier_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    """MLflow leaves the store that it was last told of in the environment."""
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)

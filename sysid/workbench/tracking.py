@@ -62,6 +62,10 @@ QUIET = {
 """Settings that MLflow reads when it is imported; what the user has set stays."""
 
 
+TRACKING_VARIABLE = "MLFLOW_TRACKING_URI"
+"""MLflow's own environment variable for the store."""
+
+
 def store_uri(workspace: Path) -> str:
     """Where runs are tracked: ``MLFLOW_TRACKING_URI``, or SQLite in the workspace.
 
@@ -71,7 +75,7 @@ def store_uri(workspace: Path) -> str:
     Returns:
         A tracking URI.
     """
-    return os.environ.get("MLFLOW_TRACKING_URI") or f"{SQLITE}{(workspace / 'mlflow.db').resolve().as_posix()}"
+    return os.environ.get(TRACKING_VARIABLE) or f"{SQLITE}{(workspace / 'mlflow.db').resolve().as_posix()}"
 
 
 def connect(uri: str) -> Any:
@@ -313,7 +317,7 @@ class Tracker:
         import onnx
 
         network = onnx.load(str(file))
-        before = mlflow.get_tracking_uri()
+        before, variable = mlflow.get_tracking_uri(), os.environ.get(TRACKING_VARIABLE)
         mlflow.set_tracking_uri(self.uri)
         try:
             with mlflow.start_run(run_id=run_id):
@@ -337,6 +341,10 @@ class Tracker:
             )
         finally:
             mlflow.set_tracking_uri(before)
+            # MLflow writes what it is told into the environment too, where it would name the store of the next run.
+            os.environ.pop(TRACKING_VARIABLE, None)
+            if variable is not None:
+                os.environ[TRACKING_VARIABLE] = variable
 
     def _example(self, network: Any, ready: FitReady) -> dict[str, NDArray[np.float64]]:
         """A few samples of the first trace for one car, from the middle of every channel's range."""

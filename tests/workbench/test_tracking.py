@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -49,6 +50,7 @@ def tracked_once(tmp_path_factory: pytest.TempPathFactory, write_rig, empty_stor
         file.write_text(file.read_text().replace("export: null", "export: {formats: [onnx]}"), encoding="utf-8")
         tracker, results = track(workspace)
         assert tracker.failures == []
+        assert "MLFLOW_TRACKING_URI" not in os.environ, "the next run in this process would be tracked there"
         yield workspace, tracker.client, results
 
 
