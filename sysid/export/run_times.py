@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -75,11 +76,8 @@ def measure_run_times(
         samples = SAMPLES if whole and file.format != "torchscript" else SHORT
         many = (1, cars) if whole and file.format.startswith("onnx") else (1,)
         for count in many:
-
-            def run(count: int = count, runner=runner, samples: int = samples) -> None:  # type: ignore[no-untyped-def]  # a runner, bound at once
-                runner(inputs[:samples, :count], states[:count])
-
-            seconds, ratio = _timed(run, lambda samples=samples: own(samples), repeats)  # type: ignore[misc]  # the same
+            run = partial(runner, inputs[:samples, :count], states[:count])
+            seconds, ratio = _timed(run, partial(own, samples), repeats)
             scale = SAMPLES / samples
             found.append(
                 RunTime(
@@ -120,7 +118,7 @@ def bundle_run_times(bundle: Bundle, *, repeats: int = 3) -> tuple[RunTime, ...]
     return measure_run_times(Surrogate.of(bundle.model, ranges), files, bundle.folder, repeats=repeats)
 
 
-def _timed(run: Callable[[], None], own: Callable[[], None], repeats: int) -> tuple[float, float]:
+def _timed(run: Callable[[], object], own: Callable[[], None], repeats: int) -> tuple[float, float]:
     """Median time of a run, and the median of its ratio to the own run just before it."""
     run()
     own()

@@ -7,9 +7,7 @@ each of which is a state with a name. What the states are is its own business.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Mapping
-from importlib.metadata import entry_points
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +19,7 @@ from sysid.traces import Trace, TraceSet
 from sysid.validation import CaseResult, Evaluation
 from sysid.validation.metrics import figures
 from sysid.workbench.fields import STRICT
+from sysid.workbench.plugins import find_plugin
 
 GROUP = "sysid.annotators"
 
@@ -67,17 +66,7 @@ def find_annotator(name: str, *, where: object) -> Annotator:
     Raises:
         ConfigError: If none of that name is installed.
     """
-    found = {entry.name: entry for entry in entry_points(group=GROUP)}
-    if name not in found:
-        near = difflib.get_close_matches(name, found, n=1)
-        raise ConfigError(
-            f"no annotator named {name} is installed",
-            where=where,
-            expected=f"one of {', '.join(sorted(found))}" if found else "an installed annotator; there is none at all",
-            got=name,
-            remedy=f"did you mean {near[0]}?" if near else "install the package that brings it",
-        )
-    annotator: Annotator = found[name].load()
+    annotator: Annotator = find_plugin(GROUP, name, what="annotator", where=where)
     return annotator
 
 

@@ -28,7 +28,7 @@ from sysid.validation import evaluate_cascade
 from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
 from sysid.workbench.assembly.document import Outcome, document
-from sysid.workbench.assembly.members import Members, assembled, whole_score, written
+from sysid.workbench.assembly.members import Members, assembled, own_traces, whole_score, written
 from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
 from sysid.workbench.assembly.stress import stress
 from sysid.workbench.environment import environment
@@ -47,13 +47,14 @@ def run_assembly(request: RunRequest) -> int:
         request: What was asked.
 
     Returns:
-        Exit code 0.
+        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
 
     Raises:
         UserError: If the pipeline or its data cannot be used.
     """
     from sysid.workbench.commands.run import console
     from sysid.workbench.screen import LogFile, Screen
+    from sysid.workbench.tracking import Tracker
 
     config = check(AssemblyConfig, read_yaml(request.path), where=request.path)
     folder = (request.out or Path("runs") / config.name).resolve()
@@ -61,6 +62,12 @@ def run_assembly(request: RunRequest) -> int:
     target = console()
     screen, log = Screen(target), LogFile()
     log.write_to(folder, command)
+
+    def warn(text: str) -> None:
+        for watch in (screen, log):
+            watch(events.Warned(text=text))
+
+    tracker = Tracker.of_workspace(Path.cwd(), warn) if request.tracking else None
     run = _Run(
         config=config,
         text=request.path.read_bytes(),
@@ -68,7 +75,7 @@ def run_assembly(request: RunRequest) -> int:
         store=RunFolder(path=folder),
         command=command,
         fresh=request.fresh,
-        watchers=(screen, log),
+        watchers=(screen, log, *([tracker] if tracker else [])),
     )
     try:
         with run.store.locked():
@@ -78,6 +85,11 @@ def run_assembly(request: RunRequest) -> int:
     target.print()
     target.print(results.judgement.headline, soft_wrap=True)
     target.print(f"Report:  {page}\nResults: {run.store.results}", soft_wrap=True)
+    if tracker is not None and tracker.failures:
+        target.print(
+            "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
+        )
+        return 1
     return 0
 
 
@@ -117,7 +129,9 @@ class _Run:
         models, key = self._retrained(models, key, estimation, selection)
         self._together(models, key, estimation, selection)
         results = self._results(cases, selection)
-        return results, self._report()
+        page = self._report()
+        self._track(results, page)
+        return results, page
 
     def _tell(self, event: events.Event) -> None:
         for watch in self.watchers:
@@ -212,8 +226,6 @@ class _Run:
         return {name: models[alone[name]] for name, models in candidates.items()}, digest(strict([keys, alone]))
 
     def _alone(self, member: MemberConfig, model: Any, selection: Sequence[Trace]) -> float:
-        from sysid.workbench.assembly.members import own_traces
-
         errors = [
             float(np.mean((model.simulate(t.columns(model.mapping.inputs)) - t[model.mapping.output]) ** 2))
             for t in own_traces(member, selection)
@@ -351,6 +363,24 @@ class _Run:
         page = write_report(self.store.path)
         self._tell(events.StepDone(step=step, stored=False, detail=str(page)))
         return page
+
+    def _track(self, results: JudgementResults, page: Path) -> None:
+        """Each stage as a run of its own, its figures beside the others'."""
+        for stage, metrics in results.judgement.metrics.items():
+            self._tell(
+                events.JudgementReady(
+                    kind=self.config.kind,
+                    pipeline=self.config.name,
+                    subject=stage,
+                    digest=digest(strict({"pipeline": self.config.name, "stage": stage, "metrics": metrics})),
+                    metrics=metrics,
+                    fit_keys=(),
+                    tracked_as=(),
+                    page=page,
+                    document=self.store.results,
+                    command=self.command,
+                )
+            )
 
 
 def read_assembly(folder: Path) -> Cascade:

@@ -5,16 +5,14 @@ A judge is an object registered in the entry-point group ``sysid.judges``; its n
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
-from importlib.metadata import entry_points
 from typing import Any, Protocol
 
 from pydantic import BaseModel
 
-from sysid.errors import ConfigError
 from sysid.models import AbstractModel, Cascade
 from sysid.workbench.kept_steps import Step
+from sysid.workbench.plugins import find_plugin
 
 GROUP = "sysid.judges"
 
@@ -54,15 +52,5 @@ def find_judge(name: str, *, where: object) -> Judge:
     Raises:
         ConfigError: If none of that name is installed.
     """
-    found = {entry.name: entry for entry in entry_points(group=GROUP)}
-    if name not in found:
-        near = difflib.get_close_matches(name, found, n=1)
-        raise ConfigError(
-            f"no judge named {name} is installed",
-            where=where,
-            expected=f"one of {', '.join(sorted(found))}" if found else "an installed judge; there is none at all",
-            got=name,
-            remedy=f"did you mean {near[0]}?" if near else "install the package that brings it",
-        )
-    judge: Judge = found[name].load()
+    judge: Judge = find_plugin(GROUP, name, what="judge", where=where)
     return judge

@@ -5,15 +5,13 @@ A maker is an object registered in the entry-point group ``sysid.makers``; its n
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
-from importlib.metadata import entry_points
 from typing import Any, Protocol
 
 from pydantic import BaseModel
 
-from sysid.errors import ConfigError
 from sysid.workbench.kept_steps import Step
+from sysid.workbench.plugins import find_plugin
 
 GROUP = "sysid.makers"
 
@@ -48,15 +46,5 @@ def find_maker(name: str, *, where: object) -> Maker:
     Raises:
         ConfigError: If none of that name is installed.
     """
-    found = {entry.name: entry for entry in entry_points(group=GROUP)}
-    if name not in found:
-        near = difflib.get_close_matches(name, found, n=1)
-        raise ConfigError(
-            f"no maker named {name} is installed",
-            where=where,
-            expected=f"one of {', '.join(sorted(found))}" if found else "an installed maker; there is none at all",
-            got=name,
-            remedy=f"did you mean {near[0]}?" if near else "install the package that brings it",
-        )
-    maker: Maker = found[name].load()
+    maker: Maker = find_plugin(GROUP, name, what="maker", where=where)
     return maker

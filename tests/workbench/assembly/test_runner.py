@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,13 @@ from sysid.errors import ConfigError
 from sysid.reporting.judgement_report import read_judgement_results
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.kinds import RunRequest, kind_of
+from sysid.workbench.tracking import connect, store_uri
 from tests.workbench.assembly.conftest import levels
 
 
-def run(workspace: Path, *, fresh: bool = False) -> int:
+def run(workspace: Path, *, fresh: bool = False, tracking: bool = False) -> int:
     file = workspace / "pipelines" / "tanks.yaml"
-    return run_assembly(RunRequest(path=file, typed="tanks", fresh=fresh, tracking=False))
+    return run_assembly(RunRequest(path=file, typed="tanks", fresh=fresh, tracking=tracking))
 
 
 def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -63,6 +65,19 @@ def test_the_chosen_stage_is_the_best_on_the_selection_traces(workspace: Path) -
     rows = [row for row in results["judgement"]["tables"][0]["rows"] if row[-1] is not None]
     best = min(rows, key=lambda row: row[-1])
     assert best[0].endswith("(chosen)")
+
+
+def test_every_stage_is_tracked_once(workspace: Path, empty_store: Path) -> None:
+    shutil.copyfile(empty_store, workspace / "mlflow.db")
+    for _ in range(2):
+        assert run(workspace, tracking=True) == 0
+    client = connect(store_uri(workspace))
+    experiment = client.get_experiment_by_name("assembly")
+    runs = client.search_runs([experiment.experiment_id])
+    assert sorted(one.info.run_name for one in runs) == [
+        "assembly · chosen together", "assembly · each alone", "assembly · retrained", "assembly · trained end to end"
+    ]  # fmt: skip
+    assert all(any(name.endswith("V/mse") for name in one.data.metrics) for one in runs)
 
 
 def test_training_data_without_selection_are_refused(workspace: Path) -> None:
