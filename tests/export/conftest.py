@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 
 from sysid.estimation.result import FitResult, Loop, Status
-from sysid.export import EXPORTERS, AbstractExporter, ExportedFile, Run, StateLayout, Surrogate
+from sysid.export import (
+    EXPORTERS,
+    AbstractExporter,
+    Bundle,
+    ExportedFile,
+    Run,
+    StateLayout,
+    Surrogate,
+    export_bundle,
+)
 from sysid.models import (
     ARX,
     NARX,
@@ -34,6 +43,7 @@ from sysid.models import (
 from sysid.models.transfer_function import TransferFunctionModel
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.units import Reference
+from sysid.validation import evaluate_cascade
 
 MAPPINGS = {1: "BP -> BC", 2: "BP+AR -> BC"}
 
@@ -418,3 +428,13 @@ def command() -> TraceSet:
         output = build_limited().simulate(columns)["BC"]
         records.append(Trace(name=name, sample_time=0.1, channels=channels, values=np.column_stack([columns, output])))
     return TraceSet(name="commands", traces=tuple(records), roles={"EST01": Role.ESTIMATION}, source="Made for a test.")
+
+
+@pytest.fixture(scope="session")
+def cascade_bundle(limited: Cascade, command: TraceSet, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    """A whole cascade in every format but torch's, which take long; read-only."""
+    formats = [name for name in EXPORTERS if not name.startswith("torch")]
+    folder = tmp_path_factory.mktemp("cascade") / "b"
+    return export_bundle(
+        limited, command, folder, formats=formats, metrics=evaluate_cascade(limited, command, repeats=1)
+    )

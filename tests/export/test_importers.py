@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from sysid.export import export_bundle
-
 RECEIVERS = Path(__file__).resolve().parents[2] / "docs" / "receivers"
 EXAMPLES = {"ecos_fmus.py": 6, "libcosim_fmu.py": 3}
 """Each with the records that it compares: three for each version of FMI that it imports."""
-
-
-@pytest.fixture(scope="module")
-def bundle(limited, command, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("importers") / "bundle"
-    return export_bundle(limited, command, folder, formats=["fmi2", "fmi3"]).folder
 
 
 def run(example, bundle):
@@ -27,19 +20,16 @@ def run(example, bundle):
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_records_of_a_cascade_are_found_as_recorded(example, bundle):
-    done = run(example, bundle)
+def test_records_of_a_cascade_are_found_as_recorded(example, cascade_bundle):
+    done = run(example, cascade_bundle.folder)
     assert (done.returncode, done.stdout.count(": as recorded")) == (0, EXAMPLES[example]), done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_a_record_that_was_changed_is_found_out(example, bundle):
-    record = bundle / "verify" / "record2.csv"
-    before = record.read_text()
-    record.write_text(before.replace("\n1.0,", "\n1.0,9", 1))
-    try:
-        done = run(example, bundle)
-    finally:
-        record.write_text(before)
+def test_a_record_that_was_changed_is_found_out(example, cascade_bundle, tmp_path):
+    folder = shutil.copytree(cascade_bundle.folder, tmp_path / "b")
+    record = folder / "verify" / "record2.csv"
+    record.write_text(record.read_text().replace("\n1.0,", "\n1.0,9", 1))
+    done = run(example, folder)
     assert done.returncode == 1
     assert done.stdout.count(": NOT as recorded") == EXAMPLES[example] // 3
