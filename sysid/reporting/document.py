@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.runtime_table import exported_run_times
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.state_table import state_section
-from sysid.reporting.sweep_section import sweep_sections
+from sysid.reporting.sweep_section import sweep_points, sweep_sections
 from sysid.reporting.tables import (
     DIVERGED,
     Cell,
@@ -78,7 +78,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     if best is not None:
         judged = scored_cases(best) or best.cases
         moments = worst_moments({name: signals[best.slug][name] for name in judged}, 5)
-    sections = [_accuracy(results, published)]
+    sections = [_accuracy(results, published), *sweep_sections(folder, published)]
     columns = _columns(results)
     if best is not None:
         sections.append(_best(best, signals[best.slug], moments, columns))
@@ -89,7 +89,6 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     sections += [*trust_sections(results), *evidence_sections(folder, results)]
     states = state_section(results)
     sections += ([] if states is None else [states]) + judgement_sections(read_judgements(folder))
-    sections += sweep_sections(folder, published)
     sections += [_run_times(results, published), _tried(results)]
     exports = export_table(results)
     if exports is not None:
@@ -98,7 +97,9 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         sections.append(Section(anchor="exports", title="Exported files", parts=parts))
     sections += [_data(results), *_others(results, signals, columns)]
     comparability = "" if published is None else published.comparability
-    return Document(results=results, verdict=verdict(results, moments, comparability), sections=tuple(sections))
+    found = verdict(results, moments, comparability)
+    found = replace(found, points=(*sweep_points(folder, published), *found.points))
+    return Document(results=results, verdict=found, sections=tuple(sections))
 
 
 def _accuracy(results: Results, published: PublishedTable | None) -> Section:
@@ -221,7 +222,7 @@ def _tried(results: Results) -> Section:
     parts: list[Part] = []
     if results.best is not None:
         parts.append(f"Choice: {results.best.chosen_by}")
-    if results.selection is not None:
+    if results.selection is not None and not (results.best is not None and results.best.cases_chose):
         parts.append(f"Traces that choose: {results.selection.name} ({', '.join(results.selection.cases)}).")
     parts.append(ranking_table(results))
     for index, fits in enumerate(results.mappings().values()):

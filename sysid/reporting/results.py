@@ -229,6 +229,9 @@ class BestRecord(_Record):
 
     name: str
     chosen_by: str = Field(description="One sentence: by which figure, on which traces.")
+    cases_chose: bool = Field(
+        default=False, description="Whether the cases that are scored took part, as in a published sweep that did so."
+    )
 
 
 class AmplitudeRecord(_Record):

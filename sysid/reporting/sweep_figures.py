@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.reporting.style import PALETTE, TARGET, new_figure, styled
 from sysid.reporting.sweep_record import SweepRecord, Trial
+from sysid.reporting.sweep_tables import PublishedRank
 
 COLOURS = "cividis"
 """A map that is even in lightness, and the same to those who see red and green alike."""
@@ -25,16 +26,19 @@ MAX_LINES = 600
 """Lines of parallel coordinates: beyond these they are one grey."""
 
 
-def over_trials_figure(record: SweepRecord, name: str, *, title: str) -> Figure:
+def over_trials_figure(
+    record: SweepRecord, name: str, *, title: str, published: Sequence[PublishedRank] = ()
+) -> Figure:
     """A figure of merit over the number of the trial, as in Lopes 2021, figures 4.13 and 4.14.
 
     Args:
         record: The sweep.
         name: The figure of merit.
         title: Stands above.
+        published: Published rows, each drawn at the trial of the same structure.
 
     Returns:
-        The figure: trials in full, those that were dropped, the best, and those chosen by hand.
+        The figure: trials in full, those that were dropped, the best, those chosen by hand, and published ones.
     """
     with styled():
         figure = new_figure(7.6, 3.4)
@@ -51,11 +55,23 @@ def over_trials_figure(record: SweepRecord, name: str, *, title: str) -> Figure:
         hand = [trial for trial in record.beside if trial.number <= record.points]
         if hand:
             _dots(axes, record, hand, name, color=TARGET, marker="x", label="chosen by hand", markersize=6.0)
+        theirs = _published_points(record, published, name)
+        if theirs:
+            label = f"published: best {len(theirs)}, {published[0].source}"
+            at, values = list(theirs), list(theirs.values())
+            axes.plot(at, values, linestyle="none", color=PALETTE[2], marker="D", markersize=4.5, label=label)
         _log(axes, [_value(record, trial, name) for trial in record.trials])
         axes.set_xlabel("trial")
         axes.set_ylabel(record.words(name))
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.1)
         return figure
+
+
+def _published_points(record: SweepRecord, published: Sequence[PublishedRank], name: str) -> dict[int, float]:
+    """Published values by the number of the trial that has the same structure."""
+    numbers = {trial.label: trial.number for trial in record.trials}
+    known = [rank for rank in published if rank.structure in numbers]
+    return {numbers[rank.structure]: rank.run_time if name == "run_time" else rank.mse for rank in known}
 
 
 def heat_maps(record: SweepRecord, name: str) -> Figure | None:

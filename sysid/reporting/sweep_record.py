@@ -17,6 +17,9 @@ from sysid.reporting.results import Number
 SCHEMA_VERSION: Final = 1
 SWEEP_FILE: Final = "sweep.json"
 
+TRACES: Final = {"selection": "the selection traces", "estimation": "the estimation traces", "cases": "all cases"}
+"""What chooses, in words, by ``choose_on``."""
+
 
 class _Record(BaseModel):
     """Frozen; keys from a later release are kept."""

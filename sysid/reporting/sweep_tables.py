@@ -112,7 +112,7 @@ def _ours(record: SweepRecord, trial: Trial | None, mse: str) -> tuple[Cell, ...
     if trial is None:
         return (Cell(text=""),) * 5
     return (
-        Cell(text=trial.label),
+        Cell(text=_unbroken(trial.label)),
         Cell(text=str(trial.number), value=trial.number, mark="number"),
         figure_cell(record.figure(trial, mse), digits=4),
         figure_cell(record.figure(trial, "run_time")),
@@ -126,14 +126,32 @@ def _theirs(row: PublishedRank | None, published: Sequence[PublishedRank]) -> tu
     if row is None:
         return (Cell(text=""),) * 3
     return (
-        Cell(text=row.structure),
+        Cell(text=_unbroken(row.structure)),
         figure_cell(row.mse, digits=4, mark="published"),
         figure_cell(row.run_time, mark="published"),
     )
 
 
+def _unbroken(label: str) -> str:
+    """A label that is not parted at the end of a line."""
+    return label.replace(" ", "\u00a0")
+
+
+def mean_not_fitted(trial: Trial) -> float:
+    """Mean free-run mse of a trial over the cases that it was not fitted to.
+
+    Args:
+        trial: The trial.
+
+    Returns:
+        The mean; NaN without such cases.
+    """
+    errors = [case.free_run_mse for case in trial.cases.values() if case.role in {"validation", "test"}]
+    return sum(errors) / len(errors) if errors else math.nan
+
+
 def beside_table(record: SweepRecord) -> Table | None:
-    """The winner and those chosen by hand, on the cases that chose nothing.
+    """The winner and those chosen by hand, on the cases that they were not fitted to.
 
     Args:
         record: The sweep.
@@ -149,19 +167,20 @@ def beside_table(record: SweepRecord) -> Table | None:
     rows = []
     for words, trial in trials:
         errors = [trial.cases[name].free_run_mse for name in unseen if name in trial.cases]
-        mean = sum(errors) / len(errors) if errors else float("nan")
         rows.append(
             (
                 Cell(text=trial.label, header=True, below=words),
                 *(figure_cell(error) for error in errors),
-                figure_cell(mean),
+                figure_cell(mean_not_fitted(trial)),
                 figure_cell(trial.selection_free_run_mse, missing="none"),
             )
         )
-    seen = " These cases did choose the winner here." if record.choose_on == "cases" else ""
+    chose = record.choose_on == "cases"
+    kind = "chose the winner" if chose else "unseen"
+    seen = " These cases did choose the winner here, by another figure." if chose else ""
     return Table(
         caption=f"Free run of the winner and of what was chosen by hand, mean squared error [{record.unit}²].",
-        head=(("structure", ""), *((name, "unseen") for name in unseen), ("mean", "unseen"), ("selection", "")),
+        head=(("structure", ""), *((name, kind) for name in unseen), ("mean", kind), ("selection", "")),
         rows=tuple(rows),
         note="One trial each: another seed gives other figures, for either." + seen,
     )

@@ -64,7 +64,7 @@ def verdict(results: Results, moments: Sequence[Moment], comparability: str) -> 
             warnings=_warnings(results, None),
         )
     cases = _judged(best)
-    points = [("Accuracy", _accuracy(best, cases))]
+    points = [("Accuracy", _accuracy(best, cases, cases_chose=results.best.cases_chose))]
     published = _published(cases, comparability)
     points += [("Published", published)] if published else []
     points += [("Speed", _speed(cases, results)), ("Weakness", _weakness(best, cases, moments))]
@@ -99,9 +99,11 @@ def _largest(values: Sequence[float]) -> float:
     return math.nan if any(math.isnan(value) for value in values) else max(values)
 
 
-def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord]) -> str:
+def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord], *, cases_chose: bool) -> str:
     squared = f"{fit.unit}²"
     kind = "that it was neither fitted to nor chosen on" if scored_cases(fit) else "of this run"
+    if cases_chose:
+        kind = "that it was not fitted to, but that took part in its choice"
     finite = {name: case for name, case in cases.items() if math.isfinite(case.free_run.mse)}
     if not finite:
         return f"The free run diverges on every one of the {_count(len(cases), 'case')} {kind}."
@@ -179,6 +181,11 @@ def _warnings(results: Results, best: FitRecord | None) -> tuple[str, ...]:
             found.append(
                 "There is no validation or test case: the figures are those of traces that the model has seen."
             )
+        if results.best is not None and results.best.cases_chose:
+            found.append(
+                "No case is unseen here: all of them took part in the choice, as in the sweep that is repeated. What "
+                "is called unseen below was not fitted to."
+            )
         if best.status in Status.__members__ and not Status[best.status].usable:
             found.append(f"{best.name}: {best.status_sentence}")
         found += [
@@ -203,6 +210,8 @@ def _overtaken(results: Results, best: FitRecord) -> list[str]:
     squared = f"{best.unit}²"
     theirs = quantity(mean_mse(ahead, "free_run"), squared)
     ours = quantity(mean_mse(best, "free_run"), squared, missing="diverged")
+    if results.best is not None and results.best.cases_chose:
+        return [f"{ahead.name} has a lower mean free-run mse ({theirs} against {ours}), which is not what chose."]
     return [
         f"{ahead.name} has a lower mean free-run mse on the unseen cases ({theirs} against {ours}); "
         "the choice rests on other traces, so that these cases stay unseen."

@@ -71,6 +71,7 @@ def run_pipeline(
     fresh: bool = False,
     watchers: Sequence[events.Watcher] = (),
     given: Mapping[str, GivenFit] | None = None,
+    chosen: steps.Choice | None = None,
 ) -> Results:
     """Run a pipeline; what an earlier run has finished is not done again.
 
@@ -84,6 +85,7 @@ def run_pipeline(
         fresh: Do everything again.
         watchers: Told everything that happens, in order.
         given: Fits that are made already, by name.
+        chosen: The fit that comes first, where it was chosen elsewhere; chosen here by default.
 
     Returns:
         The contents of ``results.json``.
@@ -100,6 +102,7 @@ def run_pipeline(
         fresh=fresh,
         watchers=watchers,
         given=given or {},
+        chosen=chosen,
     )
     with run.store.locked():
         return run.all()
@@ -115,6 +118,7 @@ class _Run:
     fresh: bool
     watchers: Sequence[events.Watcher]
     given: Mapping[str, GivenFit]
+    chosen: steps.Choice | None
     run_id: str = field(default_factory=lambda: time.strftime("%Y%m%d-%H%M%S"))
     environment: Mapping[str, Any] = field(default_factory=environment)
 
@@ -132,7 +136,7 @@ class _Run:
                 # A killed run leaves results.json with what is finished, not with what an older run had.
                 self._write_results(data, fitted, choice=None, exports=())
         asked = config.export.fit if config.export else "best"
-        choice = steps.choose({name: (one.ready.fit, one.scores) for name, one in fitted.items()}, asked)
+        choice = self.chosen or steps.choose({name: (one.ready.fit, one.scores) for name, one in fitted.items()}, asked)
         exports = self._export(fitted[choice.name], data) if config.export else ()
         results = self._write_results(data, fitted, choice=choice, exports=exports)
         self._report(fitted[choice.name], results)

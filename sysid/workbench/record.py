@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -213,7 +213,7 @@ def results_document(
         else None,
         "start": {"kind": start.kind.value, "n_measured": start.n_measured if start.kind is StartKind.MEASURED else 0},
         "fits": [fit_record(ready, exports if ready.config.name == first else ()) for ready in fits],
-        "best": {"name": choice.name, "chosen_by": choice.chosen_by} if choice else None,
+        "best": asdict(choice) if choice else None,
         "linearity": linearity(fits),
         "published": config.report.published,
     }

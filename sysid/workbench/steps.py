@@ -328,10 +328,12 @@ class Choice:
     Args:
         name: The fit.
         chosen_by: By which figure, on which traces, as a sentence.
+        cases_chose: Whether the cases that are scored took part in the choice.
     """
 
     name: str
     chosen_by: str
+    cases_chose: bool = False
 
 
 def choose(fits: Mapping[str, tuple[FitResult, Scores]], asked: str) -> Choice:

@@ -12,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.models import NARX
 from sysid.reporting.results import Results
-from sysid.reporting.sweep_record import FIGURES, SweepRecord, Trial, write_sweep
+from sysid.reporting.sweep_record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
 from sysid.workbench import events, steps
 from sysid.workbench.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.pipeline import GivenFit, run_pipeline
@@ -25,8 +25,6 @@ from sysid.workbench.sweep_store import TrialStore
 from sysid.workbench.sweep_trial import Bench, train
 from sysid.workbench.sweep_workers import AbstractWorkers, LocalWorkers
 from sysid.yaml_files import check, read_yaml
-
-TRACES = {"selection": "the selection traces", "estimation": "the estimation traces", "cases": "all cases"}
 
 Hire = Callable[[Bench, SweepConfig], AbstractWorkers]
 """Finds workers for a sweep."""
@@ -130,7 +128,10 @@ def run_sweep(
     fits = [run.fit_of(WINNER, found.winner)] + [run.fit_of(trial.label, trial) for trial in found.beside]
     pipeline = Pipeline(config=sweep.config.pipeline(fits), text=sweep.text, path=sweep.path)
     given = {fit.name: found.given[trial.number] for fit, trial in zip(fits, found.shown, strict=True)}
-    results = run_pipeline(pipeline, folder, command=command, fresh=fresh, watchers=watchers, given=given)
+    choice = steps.Choice(name=WINNER, chosen_by=found.record.chosen_by, cases_chose=sweep.config.choose.on == "cases")
+    results = run_pipeline(
+        pipeline, folder, command=command, fresh=fresh, watchers=watchers, given=given, chosen=choice
+    )
     ready = events.SweepReady(
         record=found.record, folder=store.path, command=command, data=sweep.config.data, seed=sweep.config.seed
     )

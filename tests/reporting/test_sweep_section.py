@@ -10,11 +10,18 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.reporting.numbers import quantity, times
 from sysid.reporting.published import read_published
 from sysid.reporting.sweep_figures import heat_maps, over_trials_figure, parallel_figure, pareto_figure
 from sysid.reporting.sweep_record import SWEEP_FILE, SweepRecord, Trial, TrialCase, read_sweep, write_sweep
-from sysid.reporting.sweep_section import sweep_figures, sweep_sections
-from sysid.reporting.sweep_tables import beside_table, best_table, cost_table, published_ranks
+from sysid.reporting.sweep_section import sweep_figures, sweep_points, sweep_sections
+from sysid.reporting.sweep_tables import (
+    beside_table,
+    best_table,
+    cost_table,
+    mean_not_fitted,
+    published_ranks,
+)
 
 
 def trial(number: int, delays: int, neurons: int, **change: Any) -> Trial:
@@ -78,7 +85,7 @@ def test_the_table_of_the_best_leaves_out_what_was_dropped_or_unusable() -> None
     found = record()
     table = best_table(found, "free_run_mse", mse="free_run_mse")
     ranked = sorted(found.tried_in_full, key=lambda t: t.selection_free_run_mse)[:5]
-    assert [row[1] for row in texts(table)] == [t.label for t in ranked]
+    assert [row[1].replace("\u00a0", " ") for row in texts(table)] == [t.label for t in ranked]
     assert len(found.tried_in_full) == 16
 
 
@@ -97,7 +104,7 @@ def test_published_ranks_stand_beside_ours() -> None:
         ("NARX 1/1/12", 0.195),
     ]
     table = best_table(record(), "one_step_mse", mse="one_step_mse", published=ranks)
-    assert [row[6] for row in texts(table)] == [r.structure for r in ranks]
+    assert [row[6].replace("\u00a0", " ") for row in texts(table)] == [r.structure for r in ranks]
     assert published_ranks(read_published("lopes-2021"), "STP -> BP", "accuracy") == []
 
 
@@ -154,6 +161,34 @@ def test_a_run_with_a_sweep_has_a_section_of_it_and_one_without_has_none(tmp_pat
     assert read_sweep(tmp_path).trials[:5] == record().trials[:5]
     (section,) = sweep_sections(tmp_path, read_published("lopes-2021"))
     assert len([part for part in section.parts if hasattr(part, "svg")]) == len(sweep_figures(record())) == 5
+
+
+def test_the_verdict_tells_what_the_sweep_found_beside_what_is_published_and_what_was_chosen_by_hand(
+    tmp_path: Path,
+) -> None:
+    assert sweep_points(tmp_path, None) == []
+    one_step = {"choose_by": "one_step_mse", "choose_on": "cases"}
+    trials = [*record().trials, trial(19, 4, 20, label="NARX 4/4/20")]
+    best = min((t for t in trials if t.in_full), key=lambda t: t.mean("one_step_mse"))
+    found = record(**one_step, trials=trials, winner=best.number)
+    write_sweep(tmp_path, found)
+    ((keyword, text),) = sweep_points(tmp_path, read_published("lopes-2021"))
+    assert keyword == "Sweep"
+    text = text.replace("\u00a0", " ")
+    ratio = best.mean("one_step_mse") / 2.5176e-5
+    assert f"(NARX 4/4/20, Table 4.3): ours is {times(ratio)} that".replace("\u00a0", " ") in text
+    for words in ("17 trained in full and usable", "1 dropped before their end", "1 unstable in free run"):
+        assert words in text
+    assert f"{best.label} has {quantity(mean_not_fitted(best), 'psi²')} on average".replace("\u00a0", " ") in text
+
+
+def test_published_values_are_drawn_at_the_trials_of_their_structures() -> None:
+    ranks = published_ranks(read_published("lopes-2021"), "BP+AR -> BC", "accuracy")
+    shown = record(trials=[*record().trials, trial(19, 4, 20, label="NARX 4/4/20")])
+    for name, value in (("one_step_mse", 2.5176e-5), ("run_time", ranks[0].run_time)):
+        (axes,) = over_trials_figure(shown, name, title="t", published=ranks).axes
+        (line,) = (line for line in axes.lines if str(line.get_label()).startswith("published"))
+        assert list(zip(line.get_xdata(), line.get_ydata(), strict=True)) == [(19, value)]
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"schema_version": 99}'], ids=["empty", "no fields", "newer"])

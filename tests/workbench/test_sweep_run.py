@@ -93,6 +93,7 @@ def test_the_report_says_how_the_winner_was_found(folder: Path, swept: Swept) ->
     page = (folder / "runs" / "tries" / "report" / "index.html").read_text(encoding="utf-8")
     for words in ("How the model was found", "on the selection traces among 8 trials", "chosen by hand"):
         assert words in page
+    assert "neither fitted to nor chosen on" in page
 
 
 def test_the_screen_hears_of_the_best_so_far_and_the_time_left(swept: Swept) -> None:
@@ -165,3 +166,11 @@ def test_all_cases_choose_in_a_reproduction_and_a_sampler_tries_fewer_points(wor
     swept = run(workspace, text + "choose: {by: one_step_mse, on: cases}\nreproduces: an old paper\n")
     assert "repeats an old paper, which chose on the very cases" in swept.record.chosen_by
     assert len(swept.record.trials) == 4
+    # The report's verdict is on the sweep's winner and by what chose it, and calls no case unseen that chose.
+    best = swept.results.best
+    assert best is not None
+    assert (best.name, best.chosen_by, best.cases_chose) == ("sweep winner", swept.record.chosen_by, True)
+    page = (workspace / "runs" / "tries" / "report" / "index.html").read_text(encoding="utf-8")
+    assert "all of them took part in the choice" in page
+    assert "neither fitted to nor chosen on" not in page
+    assert "stay unseen" not in page
