@@ -29,8 +29,10 @@ def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float
     x = [inputs[-1 - lag, channel] for channel, lags in enumerate(form.lags.inputs) for lag in lags]
     x += [outputs[-lag] for lag in form.lags.output]
     y = form.constant + sum(w * value for w, value in zip(form.linear, x, strict=True))
-    for weights, bias, readout in zip(form.hidden_weights, form.hidden_bias, form.readout, strict=True):
-        y += readout * np.tanh(bias + sum(w * value for w, value in zip(weights, x, strict=True)))
+    gates = np.zeros_like(form.hidden_weights) if form.gates is None else form.gates
+    for weights, bias, readout, gate in zip(form.hidden_weights, form.hidden_bias, form.readout, gates, strict=True):
+        gain = readout + sum(w * value for w, value in zip(gate, x, strict=True))
+        y += gain * np.tanh(bias + sum(w * value for w, value in zip(weights, x, strict=True)))
     return float(min(max(y, form.low), form.high))
 
 

@@ -11,8 +11,8 @@ therefore sees
 where each input's newest sample stays, its older ones become divided differences of neighbours, the levels of the
 inputs are rotated to be uncorrelated, and every entry is scaled by its largest magnitude in the training records.
 :math:`T` is square and regular: the set of networks is the same, what changes is which of them are simple.
-Parameters go back by :math:`W = W' T`, :math:`b = b' - W' T m`, and likewise for the linear part, so that the
-finished model knows nothing of the basis.
+Parameters go back by :math:`W = W' T`, :math:`b = b' - W' T m`, and likewise for the linear part and the gates, so that
+the finished model knows nothing of the basis.
 """
 
 from __future__ import annotations
@@ -88,12 +88,16 @@ class RegressorBasis:
             Shape ``(n_parameters, n_parameters)``.
         """
         r, k = layout.lags.n_regressors, layout.neurons
-        P = np.eye(layout.affine.stop)
+        P = np.eye(layout.n_parameters)
         shift = self.matrix @ self.centre
         for neuron in range(k):
             weights = slice(neuron * r, (neuron + 1) * r)
             P[weights, weights] = self.matrix.T
             P[k * r + neuron, weights] = -shift
+            if layout.gated:
+                gate = slice(layout.gates.start + neuron * r, layout.gates.start + (neuron + 1) * r)
+                P[gate, gate] = self.matrix.T
+                P[layout.readout.start + neuron, gate] = -shift
         if layout.linear:
             constant, weights = layout.affine.start, slice(layout.affine.start + 1, layout.affine.stop)
             P[weights, weights] = self.matrix.T

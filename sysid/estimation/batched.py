@@ -96,6 +96,13 @@ class _Parts:
     v: Tensor
     c: Tensor
     w: Tensor | None
+    V: Tensor | None
+
+    def gains(self, x: Tensor) -> Tensor:
+        """What stands before each activation, for regressors of shape ``(..., n_candidates, n_regressors)``."""
+        import torch
+
+        return self.v if self.V is None else self.v + torch.einsum("...cr,ckr->...ck", x, self.V)
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +231,8 @@ class BatchedRecursion:
             b=theta[:, k * r : k * (r + 1)],
             v=theta[:, k * (r + 1) : constant],
             c=theta[:, constant],
-            w=theta[:, constant + 1 :] if theta.shape[1] > constant + 1 else None,
+            w=theta[:, constant + 1 : constant + 1 + r] if theta.shape[1] > constant + 1 else None,
+            V=theta[:, constant + 1 + r :].reshape(n, k, r) if theta.shape[1] > constant + 1 + r else None,
         )
 
     def _run(self, parts: _Parts, inputs: Tensor, past: Tensor) -> _Run:
@@ -246,7 +254,7 @@ class BatchedRecursion:
             for i, lag in enumerate(lags.output):
                 x[t, :, n_in + i] = y[depth + t - lag]
             h[t] = torch.tanh(torch.baddbmm(parts.b[:, :, None], parts.W, x[t][:, :, None])[:, :, 0])
-            total = parts.c + (parts.v * h[t]).sum(1)
+            total = parts.c + (parts.gains(x[t]) * h[t]).sum(1)
             if parts.w is not None:
                 total = total + (parts.w * x[t]).sum(1)
             y[depth + t] = torch.clamp(total, self.template.low, self.template.high)
@@ -264,14 +272,18 @@ class BatchedRecursion:
         for first in range(0, samples, ROWS):
             rows = slice(first, min(first + ROWS, samples))
             x, h, free = run.x[rows], run.h[rows], run.free[rows]
-            slope = parts.v * (1.0 - h * h)
+            slope = parts.gains(x) * (1.0 - h * h)
             columns = [(slope[..., None] * x[:, :, None, :]).flatten(2), slope, h, torch.ones_like(free)[..., None]]
             if parts.w is not None:
                 columns.append(x)
+            if parts.V is not None:
+                columns.append((h[..., None] * x[:, :, None, :]).flatten(2))
             J = torch.cat([before, torch.cat(columns, dim=2) * free[..., None]])
             feedback = torch.einsum("tck,ckl->tcl", slope, parts.W[:, :, n_in:])
             if parts.w is not None:
                 feedback = feedback + parts.w[:, n_in:]
+            if parts.V is not None:
+                feedback = feedback + torch.einsum("tck,ckl->tcl", h, parts.V[:, :, n_in:])
             feedback = feedback * free[..., None]
             # Rows before the first sample are zero, as the history does not depend on the parameters.
             for t in range(len(x)):

@@ -7,7 +7,8 @@ fitted to, and a short fit is enough where a random start would need a long one.
 Scaled numbers differ between records. With :math:`x = A x' + c` between the scaled regressors of the two models, and
 :math:`y' = r y + d` between their scaled outputs,
 
-.. math:: W' = W A,\quad b' = b + W c,\quad v' = r v,\quad w' = r\,w A,\quad c_0' = r (c_0 + w c) + d.
+.. math:: W' = W A,\quad b' = b + W c,\quad v' = r (v + V c),\quad V' = r\,V A,\quad w' = r\,w A,
+    \quad c_0' = r (c_0 + w c) + d.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ def grown(source: Recursion, template: Recursion, fresh: NDArray[np.float64]) ->
 
     Args:
         source: The smaller network, or a linear model.
-        template: Lags, neurons and scaling of the larger one; its parameters say only whether it has a linear part.
+        template: Lags, neurons and scaling of the larger one; its parameters say only whether it has a linear part
+            and gates.
         fresh: A random start of the larger one, from which it takes the neurons that the smaller one lacks; shape
             ``(n_parameters,)``, over plain regressors.
 
@@ -62,6 +64,7 @@ def grown(source: Recursion, template: Recursion, fresh: NDArray[np.float64]) ->
         not contains(template.lags, source.lags)
         or source.neurons > template.neurons
         or (not linear and bool(np.any(source.linear)))
+        or (template.gates is None and source.gates is not None)
     ):
         raise ConfigError(
             "the initial fit is not contained in the network that is to start from it",
@@ -81,9 +84,14 @@ def grown(source: Recursion, template: Recursion, fresh: NDArray[np.float64]) ->
     v[: source.neurons] = small.v
     theta[k * (r + 2)] = small.constant
     if linear:
-        w = theta[k * (r + 2) + 1 :]
+        w = theta[k * (r + 2) + 1 : k * (r + 2) + 1 + r]
         w[:] = 0.0
         w[places] = small.w
+    if template.gates is not None:
+        V = theta[k * (r + 2) + 1 + r :].reshape(k, r)
+        V[: source.neurons] = 0.0
+        if small.V is not None:
+            V[: source.neurons, places] = small.V
     return theta
 
 
@@ -94,6 +102,7 @@ class _Parts:
     W: NDArray[np.float64]
     b: NDArray[np.float64]
     v: NDArray[np.float64]
+    V: NDArray[np.float64] | None
     w: NDArray[np.float64]
     constant: float
 
@@ -113,7 +122,8 @@ def _in_scaling(source: Recursion, to: Scaling) -> _Parts:
     return _Parts(
         W=source.hidden_weights * A,
         b=source.hidden_bias + source.hidden_weights @ c,
-        v=r * source.readout,
+        v=r * (source.readout if source.gates is None else source.readout + source.gates @ c),
+        V=None if source.gates is None else r * source.gates * A,
         w=r * source.linear * A,
         constant=r * (source.constant + float(source.linear @ c)) + d,
     )

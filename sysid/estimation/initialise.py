@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.regularisation import Group, Prior
-from sysid.models import Lags
+from sysid.models import NARX, Lags
 
 READOUT_SPREAD = 1e-3
 """Standard deviation of the initial readout. Small, so that the first free run is the linear part's: bounded, and
@@ -51,17 +51,39 @@ class AbstractLayout(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Layout(AbstractLayout):
-    """Where each part of the flat parameter vector ``[W | b | v | c | w]`` stands.
+    """Where each part of the flat parameter vector ``[W | b | v | c | w | V]`` stands.
 
     Args:
         lags: The regressors.
         neurons: Number of neurons.
         linear: Whether there is a linear part.
+        gated: Whether the neurons have gates.
     """
 
     lags: Lags
     neurons: int
     linear: bool
+    gated: bool = False
+
+    @classmethod
+    def of(cls, network: NARX, n_inputs: int) -> Layout:
+        """The layout of a network.
+
+        Args:
+            network: The structure.
+            n_inputs: Inputs of the mapping.
+
+        Returns:
+            The layout.
+        """
+        return cls(
+            lags=network.lags(n_inputs), neurons=network.neurons, linear=network.feedthrough, gated=network.gated
+        )
+
+    @property
+    def n_parameters(self) -> int:
+        """Length of the vector."""
+        return int(self.gates.stop)
 
     @property
     def hidden(self) -> slice:
@@ -79,6 +101,11 @@ class Layout(AbstractLayout):
         return slice(self.readout.stop, self.readout.stop + 1 + (self.lags.n_regressors if self.linear else 0))
 
     @property
+    def gates(self) -> slice:
+        """Weights of the gates, neuron by neuron."""
+        return slice(self.affine.stop, self.affine.stop + (self.neurons * self.lags.n_regressors if self.gated else 0))
+
+    @property
     def last_output(self) -> int | None:
         """Position of the linear weight of ``y(t-1)``; ``None`` if there is none."""
         if not self.linear or 1 not in self.lags.output:
@@ -91,7 +118,7 @@ class Layout(AbstractLayout):
         Sampled fast, a system's next output is close to its last; drawing the weight of ``y(t-1)`` to 1 instead
         of 0 lets the regularisation shrink towards a model that holds, not one that collapses.
         """
-        centre = np.zeros(self.affine.stop)
+        centre = np.zeros(self.n_parameters)
         if self.last_output is not None:
             centre[self.last_output] = 1.0
         return centre
@@ -99,8 +126,9 @@ class Layout(AbstractLayout):
     def prior(self, centre: NDArray[np.float64], *, alpha: float, beta: float) -> Prior:
         """The prior a fit begins with.
 
-        The hidden weights of each regressor are a group of their own, so that the evidence can find a regressor
-        unimportant (automatic relevance determination, MacKay 1994); biases, readout and linear part are groups too.
+        The hidden weights of each regressor are a group of their own, and so are its gates, so that the evidence can
+        find a regressor unimportant (automatic relevance determination, MacKay 1994); biases, readout and linear part
+        are groups too.
 
         Args:
             centre: What the parameters are drawn to, shape ``(n_parameters,)``.
@@ -117,6 +145,8 @@ class Layout(AbstractLayout):
             "readout": np.arange(self.readout.start, self.readout.stop),
             "linear": np.arange(self.affine.start, self.affine.stop),
         }
+        if self.gated:
+            members |= {f"gate {i}": self.gates.start + by_regressor[:, i] for i in range(r)}
         groups = tuple(Group(name=name, members=places) for name, places in members.items() if len(places))
         return Prior(centre=centre, groups=groups, alphas=np.full(len(groups), alpha), beta=beta)
 
@@ -142,4 +172,5 @@ class Layout(AbstractLayout):
             biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
             theta[self.hidden] = np.concatenate([weights.ravel(), biases])
             theta[self.readout] = READOUT_SPREAD * rng.standard_normal(k)
+            theta[self.gates] = READOUT_SPREAD * rng.standard_normal(self.gates.stop - self.gates.start)
         return theta

@@ -25,7 +25,7 @@ MAX_ROWS = 50_000
 
 @dataclass(frozen=True, kw_only=True)
 class MemberLayout:
-    """Where each part of the flat parameters ``[W | b | V | c | w]`` of a member stands.
+    """Where each part of the flat parameters of a member stands: ``[W | b | readouts | c | w | gates]``.
 
     Args:
         name: The outputs, for the names of groups.
@@ -33,6 +33,7 @@ class MemberLayout:
         outputs: Lags of the columns that are the member's own outputs.
         neurons: Number of neurons.
         linear: Whether there is a linear part.
+        gated: Whether the neurons have gates; of a member with one output.
     """
 
     name: str
@@ -40,6 +41,7 @@ class MemberLayout:
     outputs: tuple[tuple[int, ...], ...]
     neurons: int
     linear: bool
+    gated: bool = False
 
     @classmethod
     def of(cls, model: Member, part: Part) -> MemberLayout:
@@ -53,6 +55,7 @@ class MemberLayout:
             outputs=lags[n:],
             neurons=part.neurons,
             linear=part.linear,
+            gated=part.gated,
         )
 
     @property
@@ -63,13 +66,18 @@ class MemberLayout:
     @property
     def plain(self) -> Layout:
         """The layout of a network with these regressors and a single output."""
-        return Layout(lags=self.lags, neurons=self.neurons, linear=self.linear)
+        return Layout(lags=self.lags, neurons=self.neurons, linear=self.linear, gated=self.gated)
 
     @property
     def count(self) -> int:
         """Number of parameters."""
         r, k, m = self.lags.n_regressors, self.neurons, len(self.outputs)
-        return k * (r + 1) + m * (k + 1 + (r if self.linear else 0))
+        return k * (r + 1) + m * (k + 1 + (r if self.linear else 0)) + (k * r if self.gated else 0)
+
+    @property
+    def gates(self) -> int:
+        """Where the gates begin."""
+        return self.count - (self.neurons * self.lags.n_regressors if self.gated else 0)
 
     def centre(self) -> NDArray[np.float64]:
         """What the prior draws the parameters to: every output stays as it is."""
@@ -78,7 +86,7 @@ class MemberLayout:
         column = r - len(self.lags.output)
         for j, lags in enumerate(self.outputs):
             if self.linear and 1 in lags:
-                centre[self.count - m * r + j * r + column + lags.index(1)] = 1.0
+                centre[self.gates - m * r + j * r + column + lags.index(1)] = 1.0
             column += len(lags)
         return centre
 
@@ -93,10 +101,12 @@ class MemberLayout:
             Flat parameters.
         """
         plain = self.plain
-        drawn = plain.draw(rng, np.zeros(plain.affine.stop))[: plain.readout.stop]
+        whole = plain.draw(rng, np.zeros(plain.n_parameters))
+        drawn = whole[: plain.readout.stop]
         more = READOUT_SPREAD * rng.standard_normal(self.neurons * (len(self.outputs) - 1))
         theta = centre.copy()
         theta[: len(drawn) + len(more)] = np.concatenate([drawn, more])
+        theta[self.gates :] = whole[plain.gates]
         return theta
 
     def groups(self, first: int) -> list[Group]:
@@ -111,6 +121,8 @@ class MemberLayout:
         r, k, m = self.lags.n_regressors, self.neurons, len(self.outputs)
         by_regressor = np.arange(k * r).reshape(k, r)
         places = {f"hidden {i}": by_regressor[:, i] for i in range(r)} | {"bias": np.arange(k * r, k * (r + 1))}
+        if self.gated:
+            places |= {f"gate {i}": self.gates + by_regressor[:, i] for i in range(r)}
         readout, constants = k * (r + 1), k * (r + 1 + m)
         for j in range(m):
             suffix = f" {j}" if m > 1 else ""
@@ -135,6 +147,7 @@ class MemberLayout:
         # Each row of weights with the constant that takes up the shift of its regressors.
         rows = [(neuron * r, k * r + neuron) for neuron in range(k)]
         rows += [(constants + m + j * r, constants + j) for j in range(m if self.linear else 0)]
+        rows += [(self.gates + neuron * r, k * (r + 1) + neuron) for neuron in range(k if self.gated else 0)]
         for first, constant in rows:
             weights = slice(first, first + r)
             P[weights, weights] = basis.matrix.T

@@ -76,7 +76,7 @@ def fit_narx(
     experiments = experiments_of(traces, mapping, start, rest)
     experiments = (*experiments, *_offset(experiments, mapping, training))
     template = _template(traces[0], mapping, network, experiments, rest)
-    layout = Layout(lags=network.lags(len(mapping.inputs)), neurons=network.neurons, linear=network.feedthrough)
+    layout = Layout.of(network, len(mapping.inputs))
     basis = _basis(training, template, experiments, layout)
     to_plain = basis.to_plain(layout)
     inner = RecursionProvider(
@@ -168,7 +168,7 @@ def _template(
     first: Trace, mapping: Mapping, network: NARX, experiments: Sequence[Experiment], rest: float
 ) -> NARXModel:
     """The model but for its parameters."""
-    layout = Layout(lags=network.lags(len(mapping.inputs)), neurons=network.neurons, linear=network.feedthrough)
+    layout = Layout.of(network, len(mapping.inputs))
     return NARXModel(
         network=network,
         theta=layout.centre(),

@@ -122,13 +122,15 @@ class StepSamples(AbstractProvider):
         through = self.regressors[rng.integers(len(self.regressors), size=k)]
         theta[self.layout.hidden] = np.concatenate([weights.ravel(), -np.sum(weights * through, axis=1)])
         theta[self.layout.readout] = READOUT_SPREAD * rng.standard_normal(k) / sharpness
+        if self.layout.gated:
+            theta[self.layout.gates] = (READOUT_SPREAD * rng.standard_normal((k, r)) / sharpness[:, None]).ravel()
         return theta
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the sum of squared residuals; see the base class."""
         total = 0.0
         for rows in self._blocks():
-            _, residual = self._residual(theta, rows)
+            residual = self._pass(theta, rows).residual
             total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
 
@@ -139,34 +141,49 @@ class StepSamples(AbstractProvider):
         """
         loss, gradient, matrix = 0.0, np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
         for rows in self._blocks():
-            h, residual = self._residual(theta, rows)
-            J = self._jacobian(theta, rows, h)
-            loss += 0.5 * float(residual @ residual)
-            gradient += J.T @ residual
+            passed = self._pass(theta, rows)
+            J = self._jacobian(passed, len(theta))
+            loss += 0.5 * float(passed.residual @ passed.residual)
+            gradient += J.T @ passed.residual
             matrix += J.T @ J
         return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix)
 
     def _blocks(self) -> list[slice]:
         return [slice(first, first + BLOCK) for first in range(0, self.n_samples, BLOCK)]
 
-    def _residual(self, theta: NDArray[np.float64], rows: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Activations and residuals of some samples."""
-        k, r = self.layout.neurons, self.regressors.shape[1]
-        x, affine = self.regressors[rows], theta[self.layout.affine]
+    def _pass(self, theta: NDArray[np.float64], rows: slice) -> _Pass:
+        layout, x = self.layout, self.regressors[rows]
+        k, r = layout.neurons, x.shape[1]
+        affine = theta[layout.affine]
         h = np.tanh(x @ theta[: k * r].reshape(k, r).T + theta[k * r : k * (r + 1)])
-        return h, h @ theta[self.layout.readout] + affine[0] + x @ affine[1:] - self.target[rows]
+        g = np.broadcast_to(theta[layout.readout], h.shape)
+        if layout.gated:
+            g = g + x @ theta[layout.gates].reshape(k, r).T
+        return _Pass(x, h, g, np.sum(g * h, axis=1) + affine[0] + x @ affine[1:] - self.target[rows])
 
-    def _jacobian(self, theta: NDArray[np.float64], rows: slice, h: NDArray[np.float64]) -> NDArray[np.float64]:
-        k, r = self.layout.neurons, self.regressors.shape[1]
-        x = self.regressors[rows]
-        slopes = (1.0 - h * h) * theta[self.layout.readout]
-        J = np.empty((len(x), len(theta)))
+    def _jacobian(self, passed: _Pass, n_parameters: int) -> NDArray[np.float64]:
+        layout, x, h = self.layout, passed.x, passed.h
+        k, r = layout.neurons, x.shape[1]
+        slopes = (1.0 - h * h) * passed.g
+        J = np.empty((len(x), n_parameters))
         J[:, : k * r] = (slopes[:, :, None] * x[:, None, :]).reshape(len(x), -1)
         J[:, k * r : k * (r + 1)] = slopes
-        J[:, self.layout.readout] = h
-        J[:, self.layout.affine.start] = 1.0
-        J[:, self.layout.affine.start + 1 :] = x
+        J[:, layout.readout] = h
+        J[:, layout.affine.start] = 1.0
+        J[:, layout.affine.start + 1 : layout.affine.stop] = x
+        if layout.gated:
+            J[:, layout.gates] = (h[:, :, None] * x[:, None, :]).reshape(len(x), -1)
         return J
+
+
+@dataclass(frozen=True, eq=False)
+class _Pass:
+    """Some samples: regressors, activations, what stands before each activation, residuals."""
+
+    x: NDArray[np.float64]
+    h: NDArray[np.float64]
+    g: NDArray[np.float64]
+    residual: NDArray[np.float64]
 
 
 def space_filling(regressors: NDArray[np.float64], samples: int, rng: np.random.Generator) -> NDArray[np.int64]:

@@ -1,9 +1,9 @@
 r"""A cascade of recursions in one compiled pass over the samples.
 
 Each member is :math:`y_t = \mathrm{clip}(w x_t + c + V\tanh(W x_t + b))` in its own scaled numbers, with one or several
-outputs (``sysid/kernels/recursion.py`` has the single one and its derivation). Members run in order within a sample:
-one that reads an upstream output with lag 0 reads the value of the same sample. One may also read the past of what is
-computed after it: models that stand in a circle, as reservoirs that feed each other do.
+outputs, or with one output and gates (``sysid/kernels/recursion.py`` has the single one and its derivation). Members
+run in order within a sample: one that reads an upstream output with lag 0 reads the value of the same sample. One may
+also read the past of what is computed after it: models that stand in a circle, as reservoirs that feed each other do.
 
 All members' columns stand side by side in one array ``z``: for each member its scaled inputs, then its scaled outputs,
 extended to the left by ``depth`` past samples. A regressor is a column of ``z`` and a lag, whatever it means; a
@@ -85,47 +85,64 @@ def padded(n):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def gates_at(theta_first, m, n, n_x, n_y):
+    """Where the gates of a member stand in the parameters; -1 for a member without."""
+    first = theta_first[m] + n * (n_x + 1 + n_y) + n_y + n_y * n_x
+    return first if theta_first[m + 1] > first else -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _unpacked(p):
-    """All members' hidden weights by column, biases and readouts, ``[member, row, neuron]``, padded with zeros."""
+    """All members' hidden weights by column, biases, readouts and gates, ``[member, row, neuron]``, padded with zeros.
+
+    A member without gates has none of their rows; whether it has is said by :func:`gates_at`.
+    """
     members = len(p.neurons)
     rows, wide = 0, 0
     for m in range(members):
         n_x, n_y = p.regressor_first[m + 1] - p.regressor_first[m], p.output_first[m + 1] - p.output_first[m]
-        rows, wide = max(rows, n_x + 1 + n_y), max(wide, padded(p.neurons[m]))
+        own = n_x + 1 + n_y + (n_x if gates_at(p.theta_first, m, p.neurons[m], n_x, n_y) >= 0 else 0)
+        rows, wide = max(rows, own), max(wide, padded(p.neurons[m]))
     weights = np.zeros((members, rows, wide))
     for m in range(members):
         n_x, n_y = p.regressor_first[m + 1] - p.regressor_first[m], p.output_first[m + 1] - p.output_first[m]
         n, at = p.neurons[m], p.theta_first[m]
+        gates = gates_at(p.theta_first, m, n, n_x, n_y)
         for k in range(n):
             for i in range(n_x):
                 weights[m, i, k] = p.theta[at + k * n_x + i]
             weights[m, n_x, k] = p.theta[at + n * n_x + k]
             for j in range(n_y):
                 weights[m, n_x + 1 + j, k] = p.theta[at + n * (n_x + 1) + j * n + k]
+            if gates >= 0:
+                for i in range(n_x):
+                    weights[m, n_x + 1 + n_y + i, k] = p.theta[gates + k * n_x + i]
     return weights
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _neurons(weights, m, n_x, x, h):
-    """Activations of one member; four columns at a time, or loading and storing the sums would take most of it."""
-    n = len(h)
+def _affine(weights, m, row, constant, n_x, x, out):
+    """One affine function of the regressors for each neuron of a member, from ``row`` on.
+
+    Four columns at a time, or loading and storing the sums would take most of it.
+    """
+    n = len(out)
     for k in range(n):
-        h[k] = weights[m, n_x, k]
+        out[k] = weights[m, constant, k]
     fours = n_x // 4 * 4
     for i in range(0, fours, 4):
         x0, x1, x2, x3 = x[i], x[i + 1], x[i + 2], x[i + 3]
         for k in range(n):
-            h[k] += (
-                weights[m, i, k] * x0
-                + weights[m, i + 1, k] * x1
-                + weights[m, i + 2, k] * x2
-                + weights[m, i + 3, k] * x3
+            out[k] += (
+                weights[m, row + i, k] * x0
+                + weights[m, row + i + 1, k] * x1
+                + weights[m, row + i + 2, k] * x2
+                + weights[m, row + i + 3, k] * x3
             )
     for i in range(fours, n_x):
         value = x[i]
         for k in range(n):
-            h[k] += weights[m, i, k] * value
-    tanh_in_place(h)
+            out[k] += weights[m, row + i, k] * value
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -164,7 +181,7 @@ def run(p, depth, rest, values, z, kept, held):
     """
     weights = _unpacked(p)
     x = np.empty(weights.shape[1])
-    sums = np.empty(weights.shape[2])
+    sums, gains = np.empty(weights.shape[2]), np.empty(weights.shape[2])
     for t in range(depth):
         for column in range(len(p.column_channel)):
             z[t, column] = (rest[p.column_channel[column]] - p.column_offset[column]) / p.column_scale[column]
@@ -182,14 +199,22 @@ def run(p, depth, rest, values, z, kept, held):
                     z[now - late, column] = (value - p.column_offset[column]) / p.column_scale[column]
             for i in range(n_x):
                 x[i] = z[now - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
-            h = sums[:wide]
-            _neurons(weights, m, n_x, x, h)
+            h, g = sums[:wide], gains[:wide]
+            _affine(weights, m, 0, n_x, n_x, x, h)
+            tanh_in_place(h)
             at = p.theta_first[m] + n * (n_x + 1 + n_y)
             linear = p.theta_first[m + 1] > at + n_y
+            gated = gates_at(p.theta_first, m, n, n_x, n_y) >= 0
+            if gated:
+                _affine(weights, m, n_x + 2, n_x + 1, n_x, x, g)
             for j in range(n_y):
                 total = p.theta[at + j]
-                for k in range(wide):
-                    total += weights[m, n_x + 1 + j, k] * h[k]
+                if gated:
+                    for k in range(wide):
+                        total += g[k] * h[k]
+                else:
+                    for k in range(wide):
+                        total += weights[m, n_x + 1 + j, k] * h[k]
                 if linear:
                     for i in range(n_x):
                         total += p.theta[at + n_y + j * n_x + i] * x[i]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, _bounded, _limited
+from sysid.kernels.cascade import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, _bounded, _limited, gates_at
 from sysid.kernels.recursion import tanh_in_place
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -24,13 +24,12 @@ CHUNK = 128
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _neurons(theta, first, n, n_x, x, h):
-    """Sums of all neurons in all lanes, two neurons and four regressors at a time, before their tanh."""
+def _affine(theta, first, constants, n, n_x, x, h):
+    """One affine function for each neuron in all lanes, two neurons and four regressors at a time."""
     lanes = x.shape[1]
     fours, pairs = n_x // 4 * 4, n // 2 * 2
-    bias = first + n * n_x
     for k in range(n):
-        b = theta[bias + k]
+        b = theta[constants + k]
         for lane in range(lanes):
             h[k, lane] = b
     for k in range(0, pairs, 2):
@@ -55,6 +54,14 @@ def _weighted(total, theta, first, n, a):
         w = theta[first + k]
         for lane in range(len(total)):
             total[lane] += w * a[k, lane]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _products(total, g, n, h):
+    """Add the sums of the products of two arrays to the totals of all lanes."""
+    for k in range(n):
+        for lane in range(len(total)):
+            total[lane] += g[k, lane] * h[k, lane]
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
@@ -88,6 +95,16 @@ def _hold(total, value, codes, offset, scale, low_bound, high_bound, low, high, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _fill_past(p, depth, rest, record, z):
+    """Write what every column was before sample 0, in every lane."""
+    for column in range(len(p.column_channel)):
+        for lane in range(len(record)):
+            level = rest[record[lane], p.column_channel[column]]
+            for t in range(depth):
+                z[t, column, lane] = (level - p.column_offset[column]) / p.column_scale[column]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sizes(p):
     width, neurons = 1, 1
     for m in range(len(p.neurons)):
@@ -111,7 +128,7 @@ def run(p, depth, rest, lanes, values, held):
     width, most = _sizes(p)
     records, samples, channels = values.shape
     x, hidden, total = np.zeros((width, lanes)), np.zeros(most * lanes), np.zeros(lanes)
-    h = hidden.reshape(most, lanes)
+    h, g = hidden.reshape(most, lanes), np.zeros((most, lanes))
     low, high, codes = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes, dtype=np.int8)
     z = np.zeros((depth + CHUNK, len(p.column_channel), lanes))
     now_values = np.zeros((channels, lanes))
@@ -119,11 +136,7 @@ def run(p, depth, rest, lanes, values, held):
     record = np.minimum(np.arange(lanes), records - 1)
     is_output = np.zeros(channels, dtype=np.bool_)
     is_output[p.output_channel] = True
-    for column in range(len(p.column_channel)):
-        for lane in range(lanes):
-            level = rest[record[lane], p.column_channel[column]]
-            for t in range(depth):
-                z[t, column, lane] = (level - p.column_offset[column]) / p.column_scale[column]
+    _fill_past(p, depth, rest, record, z)
     for t in range(samples):
         if t > 0 and t % CHUNK == 0:
             z[:depth] = z[CHUNK : CHUNK + depth].copy()
@@ -143,9 +156,12 @@ def run(p, depth, rest, lanes, values, held):
                     _scaled(z[now - late, column], levels, p.column_offset[column], p.column_scale[column])
             for i in range(n_x):
                 x[i] = z[now - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
-            _neurons(p.theta, p.theta_first[m], n, n_x, x, h)
+            own, gates = p.theta_first[m], gates_at(p.theta_first, m, n, n_x, n_y)
+            _affine(p.theta, own, own + n * n_x, n, n_x, x, h)
             tanh_in_place(hidden[: n * lanes])
-            at = p.theta_first[m] + n * (n_x + 1 + n_y)
+            if gates >= 0:
+                _affine(p.theta, gates, own + n * (n_x + 1), n, n_x, x, g)
+            at = own + n * (n_x + 1 + n_y)
             linear = p.theta_first[m + 1] > at + n_y
             for j in range(n_y):
                 o = first_y + j
@@ -158,7 +174,10 @@ def run(p, depth, rest, lanes, values, held):
                 if p.limit_channel[o, 1] >= 0:
                     high[:], high_code = now_values[p.limit_channel[o, 1]], HIGH_CHANNEL
                 total[:] = p.theta[at + j]
-                _weighted(total, p.theta, p.theta_first[m] + n * (n_x + 1) + j * n, n, h)
+                if gates >= 0:
+                    _products(total, g, n, h)
+                else:
+                    _weighted(total, p.theta, own + n * (n_x + 1) + j * n, n, h)
                 if linear:
                     _weighted(total, p.theta, at + n_y + j * n_x, n_x, x)
                 value = now_values[channel]

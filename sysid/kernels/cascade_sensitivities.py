@@ -1,13 +1,14 @@
 r"""Sensitivities of a cascade's outputs with respect to the parameters of its members, forward and exact.
 
 With the notation of ``sysid/kernels/cascade.py``, let :math:`\theta` be the parameters of all members that are trained.
-For output :math:`j` of a member, with :math:`s_{jk} = V_{jk}(1 - h_k^2)` and regressor :math:`i` reading column
-:math:`\kappa(i)` with lag :math:`l_i`,
+For output :math:`j` of a member, with :math:`s_{jk} = g_{jk}(1 - h_k^2)`, where :math:`g_{jk}` is what stands before
+the activation (the readout, or the gate), and regressor :math:`i` reading column :math:`\kappa(i)` with lag
+:math:`l_i`,
 
 .. math::
     \frac{d y_{j,t}}{d\theta} = \frac{\partial y_{j,t}}{\partial\theta}
       + \sum_i c_{ji,t}\,\frac{d z_{\kappa(i),\,t-l_i}}{d\theta},
-    \qquad c_{ji,t} = w_{ji} + \sum_k s_{jk,t} W_{ki}.
+    \qquad c_{ji,t} = w_{ji} + \sum_k \Bigl(s_{jk,t} W_{ki} + h_{k,t} \frac{\partial g_{jk,t}}{\partial x_i}\Bigr).
 
 The sum runs over regressors whose column comes from an output of the cascade, the member's own or an upstream one: the
 sensitivity of the upstream output is an input of the downstream recursion, scaled from the one's numbers to the
@@ -22,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade import FREE, HIGH_CHANNEL, LOW_CHANNEL
+from sysid.kernels.cascade import FREE, HIGH_CHANNEL, LOW_CHANNEL, gates_at
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -40,11 +41,20 @@ def _add_four(row, f0, f1, f2, f3, p0, p1, p2, p3, n):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _own(row, at, theta, first, j, n, n_x, n_y, linear, x, h):
-    """The part of a row that does not go through earlier samples; ``at`` is where the member's parameters stand."""
-    readout = first + n * (n_x + 1) + j * n
+def _gains(g, theta, readout, gates, n, n_x, x):
+    """What stands before each activation: the readout, and the gate of a member that has gates."""
     for k in range(n):
-        slope = theta[readout + k] * (1.0 - h[k] * h[k])
+        g[k] = theta[readout + k]
+        if gates >= 0:
+            for i in range(n_x):
+                g[k] += theta[gates + k * n_x + i] * x[i]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _own(row, at, gates, j, n, n_x, n_y, linear, x, h, g):
+    """The part of a row that does not go through earlier samples; ``at`` is where the member's parameters stand."""
+    for k in range(n):
+        slope = g[k] * (1.0 - h[k] * h[k])
         for i in range(n_x):
             row[at + k * n_x + i] = slope * x[i]
         row[at + n * n_x + k] = slope
@@ -54,19 +64,25 @@ def _own(row, at, theta, first, j, n, n_x, n_y, linear, x, h):
     if linear:
         for i in range(n_x):
             row[constants + n_y + j * n_x + i] = x[i]
+    if gates >= 0:
+        for k in range(n):
+            for i in range(n_x):
+                row[gates + k * n_x + i] = h[k] * x[i]
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _factors(c, theta, first, j, n, n_x, n_y, linear, h):
+def _factors(c, theta, first, gates, j, n, n_x, n_y, linear, h, g):
     """Derivative of an output with respect to each regressor."""
-    readout = first + n * (n_x + 1) + j * n
     weights = first + n * (n_x + 1 + n_y) + n_y + j * n_x
     for i in range(n_x):
         c[i] = theta[weights + i] if linear else 0.0
     for k in range(n):
-        slope = theta[readout + k] * (1.0 - h[k] * h[k])
+        slope = g[k] * (1.0 - h[k] * h[k])
         for i in range(n_x):
             c[i] += slope * theta[first + k * n_x + i]
+        if gates >= 0:
+            for i in range(n_x):
+                c[i] += h[k] * theta[gates + k * n_x + i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -92,7 +108,7 @@ def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, sou
     members, width = len(p.neurons), 0
     for m in range(members):
         width = max(width, p.regressor_first[m + 1] - p.regressor_first[m])
-    x, c = np.empty(width), np.empty(width)
+    x, c, g = np.empty(width), np.empty(width), np.empty(p.neurons.max())
     for r in range(n_rows):
         t = first + r
         at_neuron = 0
@@ -105,6 +121,7 @@ def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, sou
             for i in range(n_x):
                 x[i] = z[depth + t - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
             linear = p.theta_first[m + 1] - p.theta_first[m] > n * (n_x + 1 + n_y) + n_y
+            gates = gates_at(p.theta_first, m, n, n_x, n_y)
             for j in range(n_y):
                 o = first_y + j
                 row = J[o, carry + r]
@@ -118,11 +135,13 @@ def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, sou
                                 ratio = p.column_scale[p.output_column[s]] / p.column_scale[p.output_column[o]]
                                 _add(row, ratio, J[s, carry + r], extent[s])
                     continue
-                if own_first[m] >= 0:
-                    _own(row, own_first[m], p.theta, p.theta_first[m], j, n, n_x, n_y, linear, x, h)
                 if extent[o] == 0:
                     continue
-                _factors(c, p.theta, p.theta_first[m], j, n, n_x, n_y, linear, h)
+                _gains(g, p.theta, p.theta_first[m] + n * (n_x + 1) + j * n, gates, n, n_x, x)
+                if own_first[m] >= 0:
+                    own_gates = own_first[m] + gates - p.theta_first[m] if gates >= 0 else -1
+                    _own(row, own_first[m], own_gates, j, n, n_x, n_y, linear, x, h, g)
+                _factors(c, p.theta, p.theta_first[m], gates, j, n, n_x, n_y, linear, h, g)
                 i = 0
                 while i < n_x:
                     column = p.regressor_column[first_x + i]

@@ -3,16 +3,20 @@ r"""The recursion of a lagged network, its free run and its exact forward sensit
 With the regressors :math:`x_t` (lagged inputs, then lagged outputs) one step is
 
 .. math::
-    \hat y_t = \mathrm{clip}\bigl(w^T x_t + c + \textstyle\sum_k v_k h_{t,k}\bigr),
-    \qquad h_{t,k} = \tanh(W_k x_t + b_k).
+    \hat y_t = \mathrm{clip}\bigl(w^T x_t + c + \textstyle\sum_k g_{t,k} h_{t,k}\bigr),
+    \qquad h_{t,k} = \tanh(W_k x_t + b_k), \qquad g_{t,k} = v_k + V_k x_t.
+
+Without gates :math:`V = 0`: a layer of tanh neurons and its readout. With them each neuron switches a linear function
+of the regressors on and off, which is what a valve does to a flow: the rate of a filling volume is a product, which a
+plain layer has to put together out of many neurons.
 
 In a free run the lagged outputs in :math:`x_t` are the recursion's own. Differentiating with respect to
-the parameters :math:`\theta` gives, with :math:`s_{t,k} = v_k (1 - h_{t,k}^2)`,
+the parameters :math:`\theta` gives, with :math:`s_{t,k} = g_{t,k} (1 - h_{t,k}^2)`,
 
 .. math::
     \frac{d \hat y_t}{d\theta} = \frac{\partial \hat y_t}{\partial\theta}
       + \sum_l c_{t,l}\,\frac{d \hat y_{t-l}}{d\theta},
-    \qquad c_{t,l} = w_l + \sum_k s_{t,k} W_{k,l}
+    \qquad c_{t,l} = w_l + \sum_k (s_{t,k} W_{k,l} + h_{t,k} V_{k,l})
 
 a linear recursion over the rows of the Jacobian (real-time recurrent learning, Williams and Zipser 1989):
 exact, forward, one pass. With a single output it costs ``n_parameters * (1 + n_output_lags)`` multiply-adds a sample,
@@ -23,10 +27,11 @@ Between the free run and the prediction one step ahead stands the run over windo
 begins from measured output: lagged outputs from before the window are measured, and do not depend on the parameters. A
 horizon of 1 is one step ahead, one as long as the record the free run.
 
-Parameters are one flat vector ``[W (n_neurons, n_regressors) | b | v | c | w]``. The linear part ``w`` stands
-last so that a network without it is a shorter vector; no neurons at all leaves ``[c | w]``, an ARX model with
-an intercept. Everything is in the model's scaled numbers. Time is extended to the left by ``depth`` past
-samples, so that ``u[depth + t]`` and ``y[depth + t]`` belong to step ``t``.
+Parameters are one flat vector ``[W (n_neurons, n_regressors) | b | v | c | w | V (n_neurons, n_regressors)]``. Gates
+``V`` and linear part ``w`` stand last so that a network without them is a shorter vector (gates come with a linear part
+only); no neurons at all leaves ``[c | w]``, an ARX model with an intercept. Everything is in the model's scaled
+numbers. Time is extended to the left by ``depth`` past samples, so that ``u[depth + t]`` and ``y[depth + t]`` belong to
+step ``t``.
 
 Limits: one output; the Jacobian of an unstable free run grows without bound, which the clip stops.
 """
@@ -89,17 +94,23 @@ def tanh_in_place(a):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
-def _neurons(W_columns, b, x, h):
-    """Activations of all neurons for one regressor vector; neurons stand side by side in a vector register."""
-    n = len(b)
+def _affine(columns, constant, x, out):
+    """One affine function of the regressors per neuron; neurons stand side by side in a vector register."""
+    n = len(constant)
     for k in range(n):
-        h[k] = b[k]
+        out[k] = constant[k]
     for i in range(len(x)):
         value = x[i]
-        column = W_columns[i]
+        column = columns[i]
         for k in range(n):
-            h[k] += column[k] * value
-    tanh_in_place(h)
+            out[k] += column[k] * value
+
+
+@njit(cache=True, nogil=True)
+def _gates(theta, n_neurons, n_x):
+    """``V`` by column, shape ``(n_regressors, n_neurons)``; no neurons where the network has no gates."""
+    flat = theta[n_neurons * (n_x + 2) + 1 + n_x :]
+    return np.ascontiguousarray(flat.reshape(n_neurons if len(flat) > 0 else 0, n_x).T)
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
@@ -114,7 +125,7 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
         input_channel: Shape ``(n_input_regressors,)``.
         input_lag: Shape ``(n_input_regressors,)``.
         output_lag: Shape ``(n_output_regressors,)``.
-        theta: Parameters; with or without the linear part.
+        theta: Parameters; with or without the linear part and gates.
         n_neurons: Number of neurons.
         low: Lower bound of the output.
         high: Upper bound of the output.
@@ -127,8 +138,11 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
     v = theta[n_neurons * (n_x + 1) : n_neurons * (n_x + 2)]
     linear = len(theta) > n_neurons * (n_x + 2) + 1
     constant = theta[n_neurons * (n_x + 2)]
-    w = theta[n_neurons * (n_x + 2) + 1 :]
+    w = theta[n_neurons * (n_x + 2) + 1 : n_neurons * (n_x + 2) + 1 + n_x]
+    V_columns = _gates(theta, n_neurons, n_x)
+    gated = V_columns.shape[1] > 0
     x = np.empty(n_x)
+    g = v.copy()
     h = np.empty(n_neurons)
     for t in range(depth, depth + n_steps):
         for i in range(n_in):
@@ -139,9 +153,12 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
         if linear:
             for i in range(n_x):
                 total += w[i] * x[i]
-        _neurons(W_columns, b, x, h)
+        _affine(W_columns, b, x, h)
+        tanh_in_place(h)
+        if gated:
+            _affine(V_columns, v, x, g)
         for k in range(n_neurons):
-            total += v[k] * h[k]
+            total += g[k] * h[k]
         y[t] = min(max(total, low), high) if not math.isnan(total) else total
 
 
@@ -194,8 +211,11 @@ def activations(
     v = theta[n_neurons * (n_x + 1) : n_neurons * (n_x + 2)]
     linear = len(theta) > n_neurons * (n_x + 2) + 1
     constant = theta[n_neurons * (n_x + 2)]
-    w = theta[n_neurons * (n_x + 2) + 1 :]
+    w = theta[n_neurons * (n_x + 2) + 1 : n_neurons * (n_x + 2) + 1 + n_x]
+    V_columns = _gates(theta, n_neurons, n_x)
+    gated = V_columns.shape[1] > 0
     x = np.empty(n_x)
+    g = v.copy()
     slopes = np.empty(n_neurons)
     for t in range(n_steps):
         window = depth + (t // horizon) * horizon
@@ -211,18 +231,25 @@ def activations(
             for i in range(n_x):
                 total += w[i] * x[i]
         row = h[t]
-        _neurons(W_columns, b, x, row)
+        _affine(W_columns, b, x, row)
+        tanh_in_place(row)
+        if gated:
+            _affine(V_columns, v, x, g)
         # A loop that sums and writes is guarded by a check for overlapping memory, and takes another order of summation
         # where the guard, by where the arrays happen to lie, fires: results would depend on addresses.
         for k in range(n_neurons):
-            total += v[k] * row[k]
+            total += g[k] * row[k]
         for k in range(n_neurons):
-            slopes[k] = v[k] * (1.0 - row[k] * row[k])
+            slopes[k] = g[k] * (1.0 - row[k] * row[k])
         for i in range(n_out):
             column = W_columns[n_in + i]
             derivative = 0.0
             for k in range(n_neurons):
                 derivative += slopes[k] * column[k]
+            if gated:
+                column = V_columns[n_in + i]
+                for k in range(n_neurons):
+                    derivative += row[k] * column[k]
             c[t, i] += derivative
         bounded = min(max(total, low), high) if not math.isnan(total) else total
         c[t, n_out] = 1.0 if bounded == total else 0.0
@@ -275,11 +302,15 @@ def sensitivities(
     n_in, n_out = len(input_lag), len(output_lag)
     n_x = n_in + n_out
     n_p = len(theta)
-    v = theta[n_neurons * (n_x + 1) :]
+    v = theta[n_neurons * (n_x + 1) : n_neurons * (n_x + 2)]
     bias_at = n_neurons * n_x
     constant_at = n_neurons * (n_x + 2)
+    gates_at = constant_at + 1 + n_x
     linear = n_p > constant_at + 1
+    V_columns = _gates(theta, n_neurons, n_x)
+    gated = V_columns.shape[1] > 0
     x = np.empty(n_x)
+    g = v.copy()
     for r in range(n_rows):
         t = first + r
         window = (t // horizon) * horizon
@@ -292,14 +323,19 @@ def sensitivities(
         for i in range(n_out):
             past = t - output_lag[i]
             x[n_in + i] = y[depth + past] if past >= window else measured[depth + past]
+        if gated:
+            _affine(V_columns, v, x, g)
         for k in range(n_neurons):
             z = h[t, k]
-            slope = v[k] * (1.0 - z * z)
+            slope = g[k] * (1.0 - z * z)
             at = k * n_x
             for i in range(n_x):
                 row[at + i] = slope * x[i]
             row[bias_at + k] = slope
             row[bias_at + n_neurons + k] = z
+            if gated:
+                for i in range(n_x):
+                    row[gates_at + at + i] = z * x[i]
         row[constant_at] = 1.0
         if linear:
             for i in range(n_x):

@@ -10,6 +10,7 @@ from sysid.models.form import AbstractForm
 from sysid.models.history import History, Start, StartKind
 from sysid.models.ladder import Domain
 from sysid.models.lags import Lags
+from sysid.models.line import Line
 from sysid.models.mapping import Mapping
 from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_form import NeuralForm
@@ -37,6 +38,7 @@ __all__ = [
     "History",
     "Lags",
     "Limit",
+    "Line",
     "Mapping",
     "Member",
     "NARXModel",

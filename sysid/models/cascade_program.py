@@ -25,6 +25,7 @@ class Part:
         neurons: Number of neurons.
         theta: Flat parameters.
         linear: Whether there is a linear part.
+        gated: Whether the neurons have gates.
         offset: Of every column, in its unit.
         scale: Of every column, in its unit.
         low: Lower bound of the outputs in scaled numbers.
@@ -35,6 +36,7 @@ class Part:
     neurons: int
     theta: NDArray[np.float64]
     linear: bool
+    gated: bool
     offset: tuple[float, ...]
     scale: tuple[float, ...]
     low: float
@@ -50,6 +52,7 @@ class Part:
                 neurons=model.network.neurons,
                 theta=model.theta,
                 linear=model.network.feedthrough,
+                gated=False,
                 offset=(*scaling.input_offset, *scaling.output_offset),
                 scale=(*scaling.input_scale, *scaling.output_scale),
                 low=-model.clamp,
@@ -63,6 +66,7 @@ class Part:
             neurons=form.neurons,
             theta=form.theta,
             linear=len(form.theta) > form.neurons * (form.lags.n_regressors + 2) + 1,
+            gated=form.gates is not None,
             offset=(*form.scaling.input_offset, form.scaling.output_offset),
             scale=(*form.scaling.input_scale, form.scaling.output_scale),
             low=form.low,

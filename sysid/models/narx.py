@@ -33,6 +33,8 @@ class NARX(AbstractStructure):
         output_delays: Lags of the output, in the same forms, from 1 on.
         neurons: Number of tanh neurons.
         feedthrough: A linear part from all regressors to the output beside the neurons.
+        gated: Each neuron is a gate: what it adds is not a constant but a linear function of the regressors times its
+            tanh. For flows through valves, whose rate is a product; about twice the parameters for the same neurons.
 
     Raises:
         ConfigError: If a set of lags or the number of neurons cannot be used.
@@ -42,12 +44,15 @@ class NARX(AbstractStructure):
         'NARX 4/4/20'
         >>> NARX(input_delays=[[0, 1], [1, 2, 4]], output_delays="1:2", neurons=5).lags(2).n_regressors
         7
+        >>> NARX(input_delays="0:1", output_delays=1, neurons=12, gated=True).label
+        'NARX 0:1/1/12 gated'
     """
 
     input_delays: Annotated[tuple[tuple[int, ...], ...], IntRange(low=1, high=5)]
     output_delays: Annotated[tuple[int, ...], IntRange(low=1, high=5)]
     neurons: Annotated[int, IntRange(low=1, high=20)]
     feedthrough: bool = True
+    gated: bool = False
 
     kind = "NARX"
 
@@ -58,11 +63,13 @@ class NARX(AbstractStructure):
         output_delays: LagSpec,
         neurons: int,
         feedthrough: bool = True,
+        gated: bool = False,
     ) -> None:
         object.__setattr__(self, "input_delays", _per_input(input_delays))
         object.__setattr__(self, "output_delays", parse_lags(output_delays, first=1, where="output_delays"))
         object.__setattr__(self, "neurons", neurons)
         object.__setattr__(self, "feedthrough", feedthrough)
+        object.__setattr__(self, "gated", gated)
         if not isinstance(neurons, int) or neurons < 0 or (neurons == 0 and not feedthrough):
             raise ConfigError(
                 "not a number of neurons",
@@ -71,13 +78,21 @@ class NARX(AbstractStructure):
                 got=repr(neurons),
                 remedy="write for example neurons: 20",
             )
+        if gated and not (feedthrough and neurons):
+            raise ConfigError(
+                "gates stand beside a linear part",
+                where="gated",
+                expected="at least one neuron, and feedthrough",
+                got=f"{neurons} neurons, feedthrough {feedthrough}",
+                remedy="leave feedthrough out: it is on by default",
+            )
 
     @property
     def label(self) -> str:
         """Delays and neurons as ``NARX 4/4/20``; other lag sets are written out by their ends and number."""
         distinct = dict.fromkeys(self.input_delays)
         inputs = ",".join(_short(lags) for lags in distinct)
-        return f"NARX {inputs}/{_short(self.output_delays)}/{self.neurons}"
+        return f"NARX {inputs}/{_short(self.output_delays)}/{self.neurons}{' gated' if self.gated else ''}"
 
     def lags(self, n_inputs: int) -> Lags:
         """The regressors for a number of inputs.
@@ -110,6 +125,7 @@ class NARX(AbstractStructure):
             "output_delays": list(self.output_delays),
             "neurons": self.neurons,
             "feedthrough": self.feedthrough,
+            **({"gated": True} if self.gated else {}),  # absent without, so that older files keep their digest
         }
 
 
@@ -136,7 +152,7 @@ class NARXModel(AbstractModel):
 
     Args:
         network: The structure.
-        theta: Flat parameters ``[W | b | v | c | w]`` in scaled numbers (see :class:`Recursion`).
+        theta: Flat parameters ``[W | b | v | c | w | V]`` in scaled numbers (see :class:`Recursion`).
         scaling: Between units and scaled numbers.
         mapping: Which channels go in, which comes out.
         sample_time: Seconds.

@@ -15,33 +15,34 @@ from sysid.models.lags import Lags
 from sysid.models.scaling import Scaling
 
 
-def parameter_count(lags: Lags, neurons: int, *, linear: bool) -> int:
-    """Length of the flat parameter vector ``[W | b | v | c | w]``.
+def parameter_count(lags: Lags, neurons: int, *, linear: bool, gated: bool = False) -> int:
+    """Length of the flat parameter vector ``[W | b | v | c | w | V]``.
 
     Args:
         lags: The regressors.
         neurons: Number of tanh neurons.
         linear: Whether there is a linear part beside them.
+        gated: Whether each neuron has a gate; with a linear part only.
 
     Returns:
         Number of parameters.
     """
     r = lags.n_regressors
-    return neurons * (r + 2) + 1 + (r if linear else 0)
+    return neurons * (r + 2) + 1 + (r if linear else 0) + (neurons * r if gated else 0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recursion(AbstractForm):
     r"""A tanh layer and a linear part over lagged regressors, scaling included.
 
-    In scaled numbers :math:`\hat y_t = \mathrm{clip}(w^T x_t + c + \sum_k v_k \tanh(W_k x_t + b_k))`; the
-    kernel's docstring has the derivation. Exporters read this form, so that what runs elsewhere is what was
-    fitted.
+    In scaled numbers :math:`\hat y_t = \mathrm{clip}(w^T x_t + c + \sum_k (v_k + V_k x_t) \tanh(W_k x_t + b_k))`, with
+    :math:`V = 0` where there are no gates; the kernel's docstring has the derivation. Exporters read this form, so that
+    what runs elsewhere is what was fitted.
 
     Args:
         lags: The regressors.
         neurons: Number of tanh neurons; 0 for a linear model.
-        theta: Flat parameters ``[W | b | v | c | w]``, with or without ``w``.
+        theta: Flat parameters ``[W | b | v | c | w | V]``, with or without ``V``, or ``w`` and ``V``.
         scaling: Between units and scaled numbers.
         low: Lower bound of the output in scaled numbers; ``-inf`` for none.
         high: Upper bound of the output in scaled numbers; ``inf`` for none.
@@ -58,7 +59,8 @@ class Recursion(AbstractForm):
         theta = np.array(self.theta, dtype=np.float64)
         theta.setflags(write=False)
         object.__setattr__(self, "theta", theta)
-        sizes = {parameter_count(self.lags, self.neurons, linear=linear) for linear in (True, False)}
+        kinds = ((False, False), (True, False), (True, True))
+        sizes = {parameter_count(self.lags, self.neurons, linear=linear, gated=gated) for linear, gated in kinds}
         if theta.ndim != 1 or len(theta) not in sizes:
             raise TraceError(
                 "the parameter vector does not fit the structure",
@@ -98,8 +100,17 @@ class Recursion(AbstractForm):
     @property
     def linear(self) -> NDArray[np.float64]:
         """``w``, shape ``(n_regressors,)``; zeros where the model has no linear part."""
-        w = self.theta[self.neurons * (self.lags.n_regressors + 2) + 1 :]
-        return w if len(w) else np.zeros(self.lags.n_regressors)
+        r = self.lags.n_regressors
+        first = self.neurons * (r + 2) + 1
+        w = self.theta[first : first + r]
+        return w if len(w) else np.zeros(r)
+
+    @property
+    def gates(self) -> NDArray[np.float64] | None:
+        """``V``, shape ``(n_neurons, n_regressors)``; ``None`` where the neurons have no gates."""
+        r = self.lags.n_regressors
+        flat = self.theta[self.neurons * (r + 2) + 1 + r :]
+        return flat.reshape(self.neurons, r) if len(flat) else None
 
     def extended(
         self, inputs: NDArray[np.float64], history: History

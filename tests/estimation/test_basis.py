@@ -47,18 +47,19 @@ def test_a_constant_regressor_is_not_blown_up():
     assert np.abs(basis.matrix).max() < 1e3
 
 
-@pytest.mark.parametrize("neurons", [0, 3])
-def test_a_network_in_the_basis_is_the_network_over_plain_regressors(neurons):
+@pytest.mark.parametrize(("neurons", "gated"), [(0, False), (3, False), (3, True)], ids=["linear", "tanh", "gates"])
+def test_a_network_in_the_basis_is_the_network_over_plain_regressors(neurons, gated):
     X = records()
     basis = RegressorBasis.levels_and_rates(LAGS, X)
-    layout = Layout(lags=LAGS, neurons=neurons, linear=True)
-    theta = np.random.default_rng(1).standard_normal(layout.affine.stop)
+    layout = Layout(lags=LAGS, neurons=neurons, linear=True, gated=gated)
+    theta = np.random.default_rng(1).standard_normal(layout.n_parameters)
     plain = basis.to_plain(layout) @ theta
 
     def output(parameters: np.ndarray, x: np.ndarray) -> np.ndarray:
         form = Recursion(lags=LAGS, neurons=neurons, theta=parameters, scaling=Scaling.identity(2))
         hidden = np.tanh(x @ form.hidden_weights.T + form.hidden_bias)
-        return x @ form.linear + form.constant + hidden @ form.readout
+        gains = form.readout if form.gates is None else form.readout + x @ form.gates.T
+        return x @ form.linear + form.constant + np.sum(hidden * gains, axis=1)
 
     assert_allclose(output(plain, X), output(theta, (X - basis.centre) @ basis.matrix.T), atol=1e-9)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def record(seed: int = 1, n: int = 400) -> Trace:
 
 def recursion(network: NARX, scaling: Scaling, seed: int) -> Recursion:
     lags = network.lags(2)
-    size = parameter_count(lags, network.neurons, linear=True)
+    size = parameter_count(lags, network.neurons, linear=True, gated=network.gated)
     theta = 0.2 * np.random.default_rng(seed).standard_normal(size)
     return Recursion(lags=lags, neurons=network.neurons, theta=theta, scaling=scaling)
 
@@ -42,6 +43,7 @@ LARGER = {
     "more delays": NARX(input_delays=3, output_delays=2, neurons=3),
     "more delays of one input": NARX(input_delays=[[1], [0, 1, 4]], output_delays=1, neurons=3),
     "the same": NARX(input_delays=1, output_delays=1, neurons=3),
+    "gates": NARX(input_delays=2, output_delays=1, neurons=3, gated=True),
 }
 
 
@@ -55,6 +57,18 @@ def test_a_network_grown_by_lags_computes_what_the_smaller_one_did(larger: NARX,
     inputs = np.random.default_rng(5).uniform(-1.0, 1.0, (50, 2))
     history = History.at_rest(inputs=inputs[0], output=0.2)
     np.testing.assert_allclose(large.simulate(inputs, history), small.simulate(inputs, history), rtol=1e-11)
+
+
+def test_a_gated_network_is_grown_with_its_gates() -> None:
+    small = recursion(NARX(input_delays=1, output_delays=1, neurons=3, gated=True), ONE, 3)
+    template = recursion(NARX(input_delays=3, output_delays=2, neurons=3, gated=True), OTHER, 4)
+    large = replace(template, theta=grown(small, template, template.theta))
+    inputs = np.random.default_rng(5).uniform(-1.0, 1.0, (50, 2))
+    history = History.at_rest(inputs=inputs[0], output=0.2)
+    np.testing.assert_allclose(large.simulate(inputs, history), small.simulate(inputs, history), rtol=1e-11)
+    without = recursion(NARX(input_delays=3, output_delays=2, neurons=3), ONE, 4)
+    with pytest.raises(ConfigError, match="not contained"):
+        grown(small, without, without.theta)
 
 
 def test_added_neurons_come_from_the_fresh_start() -> None:

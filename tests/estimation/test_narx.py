@@ -178,7 +178,7 @@ def test_an_interruption_keeps_the_best_model_so_far():
             seen.set()
             _thread.interrupt_main()
 
-    training = Training(max_iterations=100_000, starts=2, patience=100_000)
+    training = Training(max_iterations=100_000, starts=1, patience=100_000)
     fit = fit_narx([tank(1)], TANK, SMALL, training, on_progress=interrupt_once)
     assert fit.status is Status.INTERRUPTED
     assert np.isfinite(fit.model.theta).all()

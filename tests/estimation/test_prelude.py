@@ -13,20 +13,19 @@ from sysid.estimation.basis import RegressorBasis
 from sysid.estimation.initialise import Layout
 from sysid.estimation.prelude import SHARPEST, SMOOTHEST, StepSamples, space_filling
 from sysid.estimation.provider import Experiment, RecursionProvider
-from sysid.models import NARX, History, Mapping, NARXModel, Scaling, parameter_count
+from sysid.models import NARX, History, Mapping, NARXModel, Scaling
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace
 
 NETWORK = NARX(input_delays=[0, 2], output_delays=[1, 2], neurons=4)
-LAYOUT = Layout(lags=NETWORK.lags(1), neurons=4, linear=True)
+GATED = NARX(input_delays=[0, 2], output_delays=[1, 2], neurons=4, gated=True)
+LAYOUT = Layout.of(NETWORK, 1)
 
 
-def model(theta: np.ndarray | None = None) -> NARXModel:
+def model(network: NARX = NETWORK) -> NARXModel:
     return NARXModel(
-        network=NETWORK,
-        theta=0.3 * np.random.default_rng(1).standard_normal(parameter_count(LAYOUT.lags, 4, linear=True))
-        if theta is None
-        else theta,
+        network=network,
+        theta=0.3 * np.random.default_rng(1).standard_normal(Layout.of(network, 1).n_parameters),
         scaling=Scaling(input_offset=(1.0,), input_scale=(2.0,), output_offset=0.5, output_scale=3.0),
         mapping=Mapping.parse("u -> y"),
         sample_time=1.0,
@@ -44,19 +43,21 @@ def experiment(n: int = 80, seed: int = 0, weights: np.ndarray | None = None) ->
     )
 
 
-def all_samples(basis: RegressorBasis, *records: Experiment) -> StepSamples:
-    return StepSamples.of(model(), records, LAYOUT, basis, samples=10_000, seed=0)
+def all_samples(basis: RegressorBasis, *records: Experiment, network: NARX = NETWORK) -> StepSamples:
+    return StepSamples.of(model(network), records, Layout.of(network, 1), basis, samples=10_000, seed=0)
 
 
-def test_on_all_samples_it_is_the_open_loop():
+@pytest.mark.parametrize("network", [NETWORK, GATED], ids=["tanh neurons", "gates"])
+def test_on_all_samples_it_is_the_open_loop(network: NARX):
+    layout = Layout.of(network, 1)
     records = (experiment(), experiment(50, 1))
     basis = RegressorBasis.levels_and_rates(LAYOUT.lags, np.random.default_rng(0).standard_normal((50, 4)))
-    theta = 0.3 * np.random.default_rng(2).standard_normal(LAYOUT.affine.stop)
-    one = all_samples(basis, *records)
+    theta = 0.3 * np.random.default_rng(2).standard_normal(layout.n_parameters)
+    one = all_samples(basis, *records, network=network)
     # Without bounds, as the prelude has none: what is far off has to be seen to be mended.
-    template = replace(model().recursion, low=-np.inf, high=np.inf)
+    template = replace(model(network).recursion, low=-np.inf, high=np.inf)
     other = RecursionProvider(template=template, experiments=records, closed=False)
-    P = basis.to_plain(LAYOUT)
+    P = basis.to_plain(layout)
     found, expected = one.linearise(theta), other.linearise(P @ theta)
     assert one.n_samples == other.n_samples == 130
     assert_allclose(found.loss, expected.loss, rtol=1e-10)
@@ -67,7 +68,7 @@ def test_on_all_samples_it_is_the_open_loop():
 
 def test_its_gradient_is_that_of_its_loss():
     one = all_samples(RegressorBasis.identity(LAYOUT.lags), experiment())
-    theta = 0.5 * np.random.default_rng(3).standard_normal(LAYOUT.affine.stop)
+    theta = 0.5 * np.random.default_rng(3).standard_normal(LAYOUT.n_parameters)
     expected = finite_difference_jacobian(lambda at: np.array([one.loss(at)]), theta)[0]
     assert_allclose(one.linearise(theta).gradient, expected, rtol=1e-5, atol=1e-5)
 

@@ -23,7 +23,7 @@ def a_provider(
     template = Recursion(
         lags=lags,
         neurons=network.neurons,
-        theta=np.zeros(parameter_count(lags, network.neurons, linear=network.feedthrough)),
+        theta=np.zeros(parameter_count(lags, network.neurons, linear=network.feedthrough, gated=network.gated)),
         scaling=Scaling.identity(2),
         low=-3.0,
         high=3.0,
@@ -57,6 +57,7 @@ STRUCTURES = [
     pytest.param(NARX(input_delays=[1, 7], output_delays=[2, 5], neurons=4), id="sparse lags"),
     pytest.param(NARX(input_delays=2, output_delays=2, neurons=3, feedthrough=False), id="without feed-through"),
     pytest.param(NARX(input_delays=2, output_delays=3, neurons=0), id="linear"),
+    pytest.param(NARX(input_delays="0:1", output_delays=[1, 3], neurons=3, gated=True), id="gates"),
 ]
 
 

@@ -24,15 +24,15 @@ RESTS = {"BP": 90.0, "AR": 90.0, "ER": 90.0, "BC": 0.0, "x": 0.0, "y": 0.0}
 
 
 def network(
-    text: str, *, seed: int = 0, neurons: int = 3, inputs=(0, 1, 3), outputs=(1, 2), spread: float = 0.3
+    text: str, *, seed: int = 0, neurons: int = 3, inputs=(0, 1, 3), outputs=(1, 2), spread: float = 0.3, gated=False
 ) -> NARXModel:
     """One network of a cascade."""
     mapping, structure = (
         Mapping.parse(text),
-        NARX(input_delays=list(inputs), output_delays=list(outputs), neurons=neurons),
+        NARX(input_delays=list(inputs), output_delays=list(outputs), neurons=neurons, gated=gated),
     )
     n = len(mapping.inputs)
-    count = parameter_count(structure.lags(n), neurons, linear=True)
+    count = parameter_count(structure.lags(n), neurons, linear=True, gated=gated)
     return NARXModel(
         network=structure,
         theta=spread * np.random.default_rng(seed).standard_normal(count),
@@ -123,6 +123,12 @@ CASCADES = {
             network("BP+AR -> BC", seed=3, spread=0.2),
         ),
         limits={"AR": Limit(high="BP"), "BC": Limit(low=0.0)},
+    ),
+    "gates": Cascade(
+        models=(
+            network("STP -> BP", seed=1), network("BP -> AR", seed=2, neurons=9, gated=True),
+            network("BP+AR -> BC", seed=3, gated=True, spread=0.2),
+        )
     ),
     "no neurons": Cascade(models=(network("STP -> BP", neurons=0, spread=0.15), linear("STP+BP -> BC"))),
 }  # fmt: skip

@@ -1,0 +1,230 @@
+"""Line: one system stretched over many places, modelled at a few of them and interpolated to the others.
+
+Along a pipe, a rod or a road a field is smooth between its ends, and what hangs on it is the same everywhere. So the
+field is modelled at a few knots only, by a cascade that runs once; between the knots it is interpolated; and the same
+models stand at every place, all of them run side by side. A place at which nothing was fitted costs no more than one at
+which all was.
+
+The field is interpolated by the cubic spline through the knots (not-a-knot ends), which is linear in the values: a
+place is a row of fixed weights. Limits: no faster change along the line than the knots resolve (a front that takes many
+samples from one knot to the next is smeared for that long), and no place beyond the outer knots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.models.cascade import Cascade
+from sysid.models.cascade_run import CascadeRun
+from sysid.models.store import cascade_from_dict
+from sysid.traces import Trace
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Line:
+    """A cascade at knots along a line, and another at every place.
+
+    Args:
+        along: The cascade that writes the field at the knots; it runs once.
+        knots: Position of each knot, increasing, by the channel that is the field there.
+        at_place: The cascade that stands at every place. It reads :attr:`channel`, and may read inputs of ``along``.
+        channel: Name under which it reads the field.
+
+    Raises:
+        ConfigError: If the knots are fewer than two or do not increase, or the cascades do not fit each other.
+        ChannelError: If a channel is written by none of them.
+
+    Example:
+        >>> from sysid.models import ARX, ARXModel, Mapping
+        >>> def model(text: str, gain: float) -> ARXModel:
+        ...     return ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.0, gain]), intercept=0.0,
+        ...         mapping=Mapping.parse(text), sample_time=0.1, input_units=("psi",), output_unit="psi",
+        ...         rest_output=0.0)
+        >>> line = Line(along=Cascade(models=(model("u -> p1", 1.0), model("u -> p9", 5.0))), knots={"p1": 1, "p9": 9},
+        ...     at_place=Cascade(models=(model("p -> c", 2.0),)), channel="p")
+        >>> line.simulate(np.ones((3, 1)), [1, 5, 9])["c"][:, -1].tolist()
+        [2.0, 6.0, 10.0]
+    """
+
+    along: Cascade
+    knots: Dict[str, float]
+    at_place: Cascade
+    channel: str
+
+    kind = "Line"
+
+    def __post_init__(self) -> None:
+        knots = {name: float(position) for name, position in self.knots.items()}
+        object.__setattr__(self, "knots", knots)
+        positions = np.array(list(knots.values()))
+        if len(knots) < 2 or not (np.diff(positions) > 0.0).all():
+            raise ConfigError(
+                "the knots are no line",
+                where="knots",
+                expected="two or more, at increasing positions",
+                got=", ".join(f"{name}: {position:g}" for name, position in knots.items()) or "none",
+                remedy="give each knot its position, in order",
+            )
+        strangers = [name for name in knots if name not in self.along.outputs]
+        if strangers:
+            raise ChannelError(strangers, self.along.outputs, where="knots of the line")
+        readable = (self.channel, *self.along.inputs)
+        strangers = [name for name in self.at_place.inputs if name not in readable]
+        if strangers:
+            raise ChannelError(strangers, readable, where="inputs at a place of the line")
+        if not np.isclose(self.along.sample_time, self.at_place.sample_time, rtol=1e-9, atol=0.0):
+            raise ConfigError(
+                "the cascades of the line have different sample times",
+                expected=f"{self.along.sample_time:g} s",
+                got=f"{self.at_place.sample_time:g} s",
+            )
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Inputs of the whole."""
+        return self.along.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """What is had at every place: the field, and what the cascade there writes."""
+        return (self.channel, *self.at_place.outputs)
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds."""
+        return self.along.sample_time
+
+    @property
+    def n_parameters(self) -> int:
+        """Parameters of both cascades; the same for any number of places."""
+        return self.along.n_parameters + self.at_place.n_parameters
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(list(self.knots.values()), np.eye(len(self.knots)))
+
+    def weights(self, positions: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+        """What each knot says of the field at some places.
+
+        Args:
+            positions: The places.
+
+        Returns:
+            Shape ``(n_places, n_knots)``; a row adds up to 1.
+
+        Raises:
+            ConfigError: If there is none, or one lies beyond the outer knots.
+        """
+        places = np.atleast_1d(np.asarray(positions, dtype=np.float64))
+        first, *_, last = self.knots.values()
+        beyond = ~((places >= first) & (places <= last))
+        if not len(places) or beyond.any():
+            raise ConfigError(
+                "no such place on the line",
+                where="positions",
+                expected=f"places between {first:g} and {last:g}, where the outer knots are",
+                got=", ".join(f"{place:g}" for place in places[beyond]) or "none",
+                remedy="leave these places out: what is fitted between the knots says nothing of what is beyond them",
+            )
+        found: NDArray[np.float64] = self._spline(places)
+        return found
+
+    def simulate(
+        self, inputs: NDArray[np.float64], positions: Sequence[float] | NDArray[np.float64], *, workers: int = 2
+    ) -> CascadeRun:
+        """Free run of every place, from the inputs of the whole alone.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the order of :attr:`inputs` and in their units.
+            positions: The places.
+            workers: Threads.
+
+        Returns:
+            One run whose arrays have a first axis of places; its channels are the inputs of the cascade at a place
+            (the field among them) and its outputs.
+
+        Raises:
+            TraceError: If the number of inputs is not that of the line.
+            ConfigError: If a place is not on the line.
+        """
+        weights, along = self.weights(positions), self.along.simulate(inputs)
+        fields = weights @ np.stack([along[name] for name in self.knots])
+        records = np.empty((*fields.shape, len(self.at_place.inputs)))
+        for column, name in enumerate(self.at_place.inputs):
+            records[..., column] = fields if name == self.channel else along[name]
+        return self.at_place.simulate_batch(records, workers=workers)
+
+    def simulate_trace(
+        self, trace: Trace, positions: Sequence[float] | NDArray[np.float64], *, workers: int = 2
+    ) -> CascadeRun:
+        """Free run of every place over a trace's inputs; its other channels are not read.
+
+        Args:
+            trace: The trace.
+            positions: The places.
+            workers: Threads.
+
+        Returns:
+            As :meth:`simulate`.
+
+        Raises:
+            ChannelError: If the trace lacks an input.
+            TraceError: If the trace has another sample time.
+        """
+        if not np.isclose(trace.sample_time, self.sample_time, rtol=1e-9, atol=0.0):
+            raise TraceError(
+                "the trace has another sample time than the line",
+                where=f"trace {trace.name}",
+                expected=f"{self.sample_time:g} s",
+                got=f"{trace.sample_time:g} s",
+                remedy="resample it at ingest",
+            )
+        return self.simulate(trace.columns(self.inputs), positions, workers=workers)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the line again, as JSON values."""
+        return {
+            "structure": {"kind": self.kind},
+            "along": self.along.to_dict(),
+            "knots": dict(self.knots),
+            "at_place": self.at_place.to_dict(),
+            "channel": self.channel,
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> Line:
+        """The line that :meth:`to_dict` wrote.
+
+        Args:
+            fields: What it wrote.
+
+        Returns:
+            The line.
+
+        Raises:
+            ConfigError: If it is no line, or a field is missing.
+        """
+        wanted = ("along", "knots", "at_place", "channel")
+        missing = [name for name in wanted if name not in fields]
+        if fields.get("structure", {}).get("kind") != cls.kind or missing:
+            raise ConfigError(
+                "not a stored line",
+                expected=f"the kind {cls.kind} and {', '.join(wanted)}",
+                got=f"the fields {', '.join(fields)}",
+                remedy="let the pipeline that makes it run again",
+            )
+        return cls(
+            along=cascade_from_dict(fields["along"]),
+            knots=fields["knots"],
+            at_place=cascade_from_dict(fields["at_place"]),
+            channel=fields["channel"],
+        )

@@ -1,0 +1,113 @@
+"""Lines: a field modelled at knots, interpolated between them, and the same cascade at every place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.interpolate import CubicSpline
+
+from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.models import Cascade, Limit, Line, Mapping
+from sysid.traces import Channel, Trace
+from tests.models.cascades import network
+
+KNOTS = {"BP": 1.0, "BP10": 10.0, "BP25": 25.0, "BP50": 50.0}
+
+
+def along() -> Cascade:
+    """The pipe at four knots."""
+    models = [
+        replace(network("STP -> BP", seed=i), mapping=Mapping(inputs=("STP",), output=name))
+        for i, name in enumerate(KNOTS)
+    ]
+    return Cascade(models=tuple(models))
+
+
+def valve(text: str = "BP -> AR") -> Cascade:
+    """A reservoir and a cylinder behind the pipe."""
+    models = (network(text, seed=7), network("BP+AR -> BC", seed=8))
+    return Cascade(models=models, limits={"BC": Limit(low=0.0)})
+
+
+def line() -> Line:
+    return Line(along=along(), knots=KNOTS, at_place=valve(), channel="BP")
+
+
+def handle(n: int = 200) -> np.ndarray:
+    return np.repeat(np.random.default_rng(0).uniform(64.0, 90.0, n // 20), 20)[:, None]
+
+
+def test_at_a_knot_the_line_is_what_its_cascades_are():
+    run, alone = line().simulate(handle(), list(KNOTS.values())), along().simulate(handle())
+    for place, name in enumerate(KNOTS):
+        assert_allclose(run["BP"][place], alone[name], atol=1e-10)
+        assert_allclose(run["BC"][place], valve().simulate(alone[name][:, None])["BC"], atol=1e-9)
+
+
+def test_between_knots_the_field_is_the_cubic_spline_through_them():
+    places, alone = [3.0, 17.5, 49.0], along().simulate(handle())
+    spline = CubicSpline(list(KNOTS.values()), np.stack([alone[name] for name in KNOTS]))
+    run = line().simulate(handle(), places)
+    assert_allclose(run["BP"], spline(places), atol=1e-10)
+    assert_allclose(run["BC"][1], valve().simulate(spline(17.5)[:, None])["BC"], atol=1e-9)
+
+
+def test_a_straight_field_is_kept_straight_and_rows_of_weights_add_up_to_one():
+    places = np.linspace(1.0, 50.0, 99)
+    weights = line().weights(places)
+    assert_allclose(weights.sum(axis=1), 1.0, atol=1e-12)
+    assert_allclose(weights @ np.array(list(KNOTS.values())), places, atol=1e-12)
+
+
+def test_many_places_run_in_lockstep_as_few_do_alone():
+    places = np.linspace(1.0, 50.0, 40)
+    many = line().simulate(handle(), places, workers=1)
+    for i in (0, 13, 39):
+        assert_allclose(many["BC"][i], line().simulate(handle(), [places[i]])["BC"][0], atol=1e-9)
+
+
+def test_what_stands_at_a_place_may_read_an_input_of_the_whole():
+    reads = Line(along=along(), knots=KNOTS, at_place=valve("BP+STP -> AR"), channel="BP")
+    alone = along().simulate(handle())
+    expected = valve("BP+STP -> AR").simulate(np.column_stack([alone["BP25"], handle()]))
+    assert_allclose(reads.simulate(handle(), [25.0])["BC"][0], expected["BC"], atol=1e-9)
+
+
+def test_a_trace_of_another_sample_time_is_refused():
+    channel = (Channel(name="STP", unit="psi"),)
+    same = Trace(name="T", sample_time=0.1, channels=channel, values=handle())
+    assert_allclose(line().simulate_trace(same, [5.0])["BC"], line().simulate(handle(), [5.0])["BC"])
+    with pytest.raises(TraceError, match="another sample time"):
+        line().simulate_trace(Trace(name="T", sample_time=0.2, channels=channel, values=handle()), [5.0])
+
+
+def test_it_is_stored_and_read_again():
+    again = Line.from_dict(line().to_dict())
+    assert again.outputs == line().outputs == ("BP", "AR", "BC")
+    assert again.n_parameters == line().n_parameters
+    assert_allclose(again.simulate(handle(), [7.0])["BC"], line().simulate(handle(), [7.0])["BC"], rtol=0, atol=0)
+    with pytest.raises(ConfigError, match="not a stored line"):
+        Line.from_dict(along().to_dict())
+
+
+@pytest.mark.parametrize("places", [[0.0], [51.0], [np.nan], [], [5.0, 60.0]], ids=str)
+def test_no_place_beyond_the_outer_knots(places):
+    with pytest.raises(ConfigError, match="no such place"):
+        line().simulate(handle(), places)
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "match"),
+    [
+        pytest.param({"knots": {"BP": 1.0}}, ConfigError, "no line", id="one knot"),
+        pytest.param({"knots": {"BP": 2.0, "BP10": 1.0}}, ConfigError, "no line", id="knots out of order"),
+        pytest.param({"knots": {"BP": 1.0, "BP11": 2.0}}, ChannelError, "knots", id="a knot that nobody writes"),
+        pytest.param({"channel": "PIPE"}, ChannelError, "inputs at a place", id="a place that reads something else"),
+    ],
+)
+def test_a_line_that_cannot_be_is_refused(changes, error, match):
+    with pytest.raises(error, match=match):
+        replace(line(), **changes)
