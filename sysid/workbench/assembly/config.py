@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
@@ -146,6 +147,80 @@ class StressConfig(BaseModel):
     within: float = Field(gt=0.0)
 
 
+class GrowConfig(BaseModel):
+    """Training data that grow by what the whole is worst at, round by round.
+
+    Args:
+        data: Data set of the pool: cases with ``role: estimation`` are added from, cases with ``role: selection`` say
+            what a round has brought. Never sequences that are scored.
+        outputs: Outputs that are looked at; the one with the largest error counts.
+        within: Root mean square error in their unit that a sequence should stay under.
+        members: Outputs of the members that are trained again in each round, in this order, on what the others put out.
+        add: Sequences added in each round.
+        rounds: At most.
+        until: Share of the sequences within the limit at which no further round is begun.
+        patience: Rounds without an improvement after which no further one is begun.
+        max_iterations: Of each training.
+    """
+
+    model_config = STRICT
+
+    data: str
+    outputs: tuple[str, ...] = Field(min_length=1)
+    within: float = Field(gt=0.0)
+    members: tuple[str, ...] = Field(min_length=1)
+    add: int = Field(default=20, ge=1)
+    rounds: int = Field(default=5, ge=1)
+    until: float = Field(default=0.99, gt=0.0, le=1.0)
+    patience: int = Field(default=2, ge=1)
+    max_iterations: int = Field(default=60, ge=1)
+
+
+class LineConfig(BaseModel):
+    """Places between those that are modelled: a channel is interpolated to them, and the members stand there too.
+
+    Args:
+        channel: What the members at a place read, by its name in the first place.
+        knots: Position of each place that is modelled, increasing, by the channel's name there.
+        outputs: What is had at every place, by the names in the first place.
+        data: Data set with the reference at places: the output at place 17 is the output's name with 17 behind it.
+        judged: Outputs that are scored there; all by default.
+    """
+
+    model_config = STRICT
+
+    channel: str
+    knots: dict[str, float] = Field(min_length=2)
+    outputs: tuple[str, ...] = Field(min_length=1)
+    data: str
+    judged: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> LineConfig:
+        positions = list(self.knots.values())
+        if any(after <= before for before, after in pairwise(positions)):
+            raise FieldError(
+                "the knots are no line",
+                expected="increasing positions",
+                got=", ".join(f"{name}: {position:g}" for name, position in self.knots.items()),
+                remedy="give the knots in the order in which they stand",
+            )
+        strangers = [name for name in self.judged if name not in self.outputs]
+        if strangers:
+            raise FieldError(
+                f"judged names {', '.join(strangers)}, which is not had at a place",
+                expected=f"some of {', '.join(self.outputs)}",
+                got=", ".join(self.judged),
+                remedy="add it to the outputs",
+            )
+        return self
+
+    @property
+    def scored(self) -> tuple[str, ...]:
+        """Outputs that are scored at places."""
+        return self.judged or self.outputs
+
+
 class PublishedConfig(BaseModel):
     """Published figures of an output, beside ours.
 
@@ -179,7 +254,9 @@ class AssemblyConfig(BaseModel):
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
         limits: Limits of outputs.
         retrain: Members to train again on what the others put out.
+        grow: Growing the training data by what the whole is worst at.
         together: Training end to end.
+        line: Places between those that are modelled.
         stress: Random sequences on which the whole has to hold.
         published: Published figures by output.
         seed: Seed of everything random.
@@ -201,7 +278,9 @@ class AssemblyConfig(BaseModel):
     rest: dict[str, float | str] = Field(default_factory=dict)
     limits: dict[str, LimitConfig] = Field(default_factory=dict)
     retrain: RetrainConfig | None = None
+    grow: GrowConfig | None = None
     together: TogetherConfig | None = None
+    line: LineConfig | None = None
     stress: StressConfig | None = None
     published: dict[str, PublishedConfig] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
@@ -225,8 +304,13 @@ class AssemblyConfig(BaseModel):
             "published": tuple(self.published),
             "stress": (self.stress.output,) if self.stress else (),
             "together, targets": tuple(self.together.targets) if self.together else (),
+            "grow, outputs": self.grow.outputs if self.grow else (),
+            "line": (self.line.channel, *self.line.knots, *self.line.outputs) if self.line else (),
         }
-        named = {"retrain, members": self.retrain.members if self.retrain else ()}
+        named = {
+            "retrain, members": self.retrain.members if self.retrain else (),
+            "grow, members": self.grow.members if self.grow else (),
+        }
         for known, places in ((written, asked), (bases, named)):
             for where, names in places.items():
                 strangers = [name for name in names if name not in known]

@@ -9,10 +9,14 @@ from typing import Any
 import numpy as np
 
 from sysid.models import Cascade
+from sysid.reporting.numbers import number, quantity, seconds
 from sysid.reporting.thinning import thin
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.growth import Growth
+from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.stress import Stress
+from sysid.workbench.assembly.views import growth_chart, growth_table, line_chart, line_point, line_table
 
 COLUMNS = 300
 """Width of the charts in points: enough for the eye, and a page of some hundred kilobytes."""
@@ -34,6 +38,8 @@ class Outcome:
         timing: Seconds of a free run of the whole by case.
         cases: The cases.
         stressed: What came of the random sequences.
+        growth: What growing the training data brought, if it was asked for.
+        line: How the places do between those that are modelled, if they were asked for.
     """
 
     whole: Cascade
@@ -44,6 +50,8 @@ class Outcome:
     timing: Mapping[str, float]
     cases: Sequence[Trace]
     stressed: Stress | None
+    growth: Sequence[Growth] = ()
+    line: LineScores | None = None
 
 
 def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
@@ -58,12 +66,16 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
     """
     whole = found.whole
     tables = [_stage_table(config, name, found) for name in config.outputs]
+    if found.line is not None:
+        tables += [line_table(found.line, output) for output in found.line.mse]
     if found.stressed is not None:
         tables.append(_stress_table(found.stressed))
+    tables += [growth_table(one) for one in found.growth]
     tables.append(_time_table(found.timing, found.cases))
     return {
         "title": "The assembly",
         "headline": _headline(config, found.stages[found.chosen], found.chosen),
+        "points": _points(config, found),
         "sentences": [
             f"The whole has {len(whole.models)} models and {whole.n_parameters} parameters; it reads "
             f"{', '.join(whole.inputs)} and nothing else.",
@@ -72,7 +84,11 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
             *found.notes,
         ],
         "tables": tables,
-        "charts": [_chart(whole, trace, name) for name in config.outputs for trace in found.cases],
+        "charts": [
+            *(_chart(whole, trace, name) for name in config.outputs for trace in found.cases),
+            *([] if found.line is None else [line_chart(found.line, name) for name in found.line.mse]),
+            *map(growth_chart, found.growth),
+        ],
         "metrics": {
             stage: {f"{output}/{case}/mse": value for output, by in scores.items() for case, value in by.items()}
             for stage, scores in found.stages.items()
@@ -86,6 +102,50 @@ def _headline(config: AssemblyConfig, scores: Scores, chosen: str) -> str:
         worst = max(scores[output], key=lambda case: scores[output][case])
         parts.append(f"{output} at worst {scores[output][worst]:.3g} ({worst})")
     return f"From the command alone, {chosen}: mean squared error of {'; '.join(parts)}."
+
+
+def _points(config: AssemblyConfig, found: Outcome) -> list[tuple[str, str]]:
+    """How good, how good beside what is published, how fast, and where it is weak."""
+    scores = found.stages[found.chosen]
+    points = [("Accuracy", "; ".join(_spread(name, scores[name]) for name in config.outputs) + ".")]
+    beside = [_beside(name, scores[name], config) for name in config.outputs if name in config.published]
+    points += [("Published", f"{'; '.join(beside)}.")] if beside else []
+    lengths = {trace.name: len(trace) * trace.sample_time for trace in found.cases}
+    slow = max(found.timing, key=lambda case: found.timing[case] / lengths[case])
+    points.append(
+        (
+            "Speed",
+            f"A free run of {quantity(lengths[slow], 's')} ({slow}) takes {seconds(found.timing[slow])} on one core.",
+        )
+    )
+    points += [line_point(found.line)] if found.line else []
+    stressed = found.stressed
+    if stressed is not None:
+        points.append(
+            (
+                "Weakness",
+                f"Of {stressed.sequences} random sequences {stressed.lost} diverge and "
+                f"{number(100.0 * stressed.within)} % stay within {number(stressed.limit)} (root mean square of "
+                f"{stressed.output}); the worst is {stressed.worst[0][0]} with {number(stressed.worst[0][1])}.",
+            )
+        )
+    return points
+
+
+def _spread(output: str, by_case: Mapping[str, float]) -> str:
+    low, high = min(by_case, key=lambda case: by_case[case]), max(by_case, key=lambda case: by_case[case])
+    return f"{output} between {number(by_case[low])} ({low}) and {number(by_case[high])} ({high})"
+
+
+def _beside(output: str, by_case: Mapping[str, float], config: AssemblyConfig) -> str:
+    published = config.published[output]
+    ratios = [by_case[case] / value for case, value in published.mse.items() if case in by_case]
+    reached = sum(ratio <= published.target for ratio in ratios)
+    below = sum(ratio <= 1.0 for ratio in ratios)
+    return (
+        f"{output} at or below {published.source} on {below} of {len(ratios)} cases, at or below "
+        f"{published.target:g} of it, which was aimed at, on {reached}"
+    )
 
 
 def _stage_table(config: AssemblyConfig, output: str, found: Outcome) -> dict[str, Any]:

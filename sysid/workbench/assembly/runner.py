@@ -15,7 +15,7 @@ import numpy as np
 from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, FitProgress, FitResult
-from sysid.models import Cascade, cascade_from_dict
+from sysid.models import Cascade, Line, NARXModel, cascade_from_dict
 from sysid.reporting.judgement import parse_judgement
 from sysid.reporting.judgement_report import (
     JudgementResults,
@@ -28,6 +28,8 @@ from sysid.validation import evaluate_cascade
 from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
 from sysid.workbench.assembly.document import Outcome, document
+from sysid.workbench.assembly.growth import Growth, Round, grow
+from sysid.workbench.assembly.line import LineScores, line_of, score_line
 from sysid.workbench.assembly.members import Members, assembled, own_traces, whole_score, written
 from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
 from sysid.workbench.assembly.stress import stress
@@ -37,7 +39,9 @@ from sysid.workbench.record import is_final, read_fit, write_fit
 from sysid.workbench.store import RunFolder, code_digest, digest, read_json, strict, write_bytes, write_json
 from sysid.yaml_files import check, read_yaml
 
-ALONE, CHOSEN, RETRAINED, TOGETHER = "each alone", "chosen together", "retrained", "trained end to end"
+ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
+LINE = "line.json"
+GROWN, TOGETHER = "grown", "trained end to end"
 
 
 def run_assembly(request: RunRequest) -> int:
@@ -107,6 +111,8 @@ class _Run:
     notes: list[str] = field(default_factory=list)
     stages: dict[str, Cascade] = field(default_factory=dict)
     """The whole after each stage."""
+    growth: list[Growth] = field(default_factory=list)
+    """What growing the training data brought, where it was asked for."""
 
     def all(self) -> tuple[JudgementResults, Path]:
         """Every step, in order; the results and the page."""
@@ -118,15 +124,10 @@ class _Run:
         if self.config.selection is not None:
             selection = (*selection, *self._load(self.config.selection).with_role(Role.SELECTION))
         if not estimation or not selection:
-            raise ConfigError(
-                "the training data lack a role",
-                where=f"data set {training.name}",
-                expected="cases with role: estimation, and cases with role: selection",
-                got=", ".join(f"{name}: {role.value}" for name, role in training.roles.items()),
-                remedy="give some cases that role in the data set's dataset.yaml",
-            )
+            raise _lacks_a_role(training, "the training data lack a role")
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
+        models, key = self._grown(models, key, estimation, selection)
         self._together(models, key, estimation, selection)
         results = self._results(cases, selection)
         page = self._report()
@@ -270,6 +271,49 @@ class _Run:
         self.stages[RETRAINED] = assembled(self.config, models)
         return models, key
 
+    def _grown(
+        self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]
+    ) -> tuple[Members, str]:
+        asked = self.config.grow
+        if asked is None:
+            return models, key
+        pool = self._load(asked.data)
+        sources, held_out = pool.with_role(Role.ESTIMATION), pool.with_role(Role.SELECTION)
+        if not sources or not held_out:
+            raise _lacks_a_role(pool, "the pool lacks a role")
+
+        def fit(
+            member: MemberConfig, now: Members, traces: Sequence[Trace], number: int, before: str
+        ) -> tuple[NARXModel, str]:
+            found, own = self._fit(
+                f"{member.slug}-grown-{number}",
+                f"Training {member.mapping} on {len(traces)} traces, round {number}",
+                {
+                    "before": before, "member": member.mapping.output, "iterations": asked.max_iterations,
+                    "data": [trace.digest for trace in traces],
+                },
+                partial(
+                    retrain, self.config, member, now, estimation=traces, selection=selection,
+                    max_iterations=asked.max_iterations,
+                ),
+            )  # fmt: skip
+            return model_of(found), own
+
+        def report(done: Round) -> None:
+            step = f"Looking for the sequences that the whole is worst at, after round {done.number}"
+            detail = f"{100.0 * done.look.within:.3g} % within, 99 % under {done.look.rare:.3g}, {done.samples} samples"
+            self._tell(events.StepStarted(step=step))
+            self._tell(events.StepDone(step=step, stored=False, detail=detail))
+
+        grown = grow(
+            self.config, models, key, fit, estimation=estimation, selection=selection, pool=sources,
+            held_out=held_out, report=report,
+        )  # fmt: skip
+        self.growth.append(grown)
+        self.notes.append(grown.sentence)
+        self.stages[GROWN] = assembled(self.config, grown.models)
+        return grown.models, grown.key
+
     def _together(self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
         if self.config.together is None:
             return
@@ -315,12 +359,13 @@ class _Run:
             stressed = stress(whole, tuple(sequences), config.stress.output, config.stress.within)
             detail = f"{stressed.lost} of {stressed.sequences} diverged, {100 * stressed.within:.3g} % within"
             self._tell(events.StepDone(step=step, stored=False, detail=detail))
+        line = self._line(whole)
         self._export(whole, cases, evaluate_cascade(whole, cases))
         said = document(
             config,
             Outcome(
                 whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.notes,
-                timing=timing[chosen], cases=tuple(cases), stressed=stressed,
+                timing=timing[chosen], cases=tuple(cases), stressed=stressed, growth=tuple(self.growth), line=line,
             ),
         )  # fmt: skip
         results = JudgementResults(
@@ -337,6 +382,21 @@ class _Run:
         )
         write_judgement_results(self.store.path, results)
         return results
+
+    def _line(self, whole: Cascade) -> LineScores | None:
+        asked = self.config.line
+        if asked is None:
+            return None
+        line = line_of(asked, whole)
+        write_json(self.store.path / LINE, line.to_dict())
+        cases, step = self._load(asked.data), "Running every place of the line"
+        self._tell(events.StepStarted(step=step))
+        scores = score_line(asked, line, cases)
+        slowest = max(scores.timing.values())
+        self._tell(
+            events.StepDone(step=step, stored=False, detail=f"all places of the longest case in {slowest:.3g} s")
+        )
+        return scores
 
     def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any) -> None:
         from sysid.export import export_bundle
@@ -383,6 +443,16 @@ class _Run:
             )
 
 
+def _lacks_a_role(found: TraceSet, what: str) -> ConfigError:
+    return ConfigError(
+        what,
+        where=f"data set {found.name}",
+        expected="cases with role: estimation, and cases with role: selection",
+        got=", ".join(f"{name}: {role.value}" for name, role in found.roles.items()),
+        remedy="give some cases that role in the data set's dataset.yaml",
+    )
+
+
 def read_assembly(folder: Path) -> Cascade:
     """The assembly that a run chose.
 
@@ -395,13 +465,32 @@ def read_assembly(folder: Path) -> Cascade:
     Raises:
         ConfigError: If the run has not come so far.
     """
-    file = Path(folder) / "assembly.json"
+    return cascade_from_dict(_left(folder, "assembly.json", "the run has no assembly"))
+
+
+def read_line(folder: Path) -> Line:
+    """The line that a run left: every place between those that it modelled.
+
+    Args:
+        folder: Its run folder.
+
+    Returns:
+        The line.
+
+    Raises:
+        ConfigError: If the run has not come so far, or its pipeline has no ``line``.
+    """
+    return Line.from_dict(_left(folder, LINE, "the run has no line"))
+
+
+def _left(folder: Path, name: str, what: str) -> Any:
+    file = Path(folder) / name
     if not file.is_file():
         raise ConfigError(
-            "the run has no assembly",
+            what,
             where=folder,
-            expected="assembly.json, which a finished run of kind assembly leaves",
+            expected=f"{name}, which a finished run of kind assembly leaves",
             got="no such file",
             remedy="let the pipeline finish: sysid run NAME",
         )
-    return cascade_from_dict(read_json(file))
+    return read_json(file)

@@ -1,0 +1,144 @@
+"""The whole line from an assembly that is modelled at a few places: made from its members, and judged at the others."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.models import Cascade, Ends, Line
+from sysid.traces import Trace, TraceSet
+from sysid.workbench.assembly.config import LineConfig
+
+WORKERS = 2
+"""Threads of the timed runs."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LineScores:
+    """How the line does at places, seen and unseen.
+
+    Args:
+        mse: Mean squared error of the free run by output and case, at each place, in the output's unit squared.
+        places: By output, the places that the data have.
+        seen: By output, whether each is a knot.
+        timing: Seconds of a free run of all places together, by case.
+    """
+
+    mse: Mapping[str, Mapping[str, NDArray[np.float64]]]
+    places: Mapping[str, NDArray[np.float64]]
+    seen: Mapping[str, NDArray[np.bool_]]
+    timing: Mapping[str, float]
+
+
+def line_of(asked: LineConfig, whole: Cascade) -> Line:
+    """The line of an assembly: what the knots need runs along it, what the outputs need stands at every place.
+
+    Args:
+        asked: What stands where.
+        whole: The assembly.
+
+    Returns:
+        The line.
+
+    Raises:
+        ConfigError: If the outputs cannot be had from the channel at a place.
+    """
+    there = _needed(whole, asked.outputs, given=(asked.channel, *whole.inputs))
+    unread = [name for name in there.inputs if name != asked.channel and name not in whole.inputs]
+    if unread or asked.channel not in there.inputs:
+        raise ConfigError(
+            "the outputs cannot be had at a place of the line",
+            where="line, outputs",
+            expected=f"outputs that follow from {asked.channel} and the inputs of the whole",
+            got=f"{', '.join(asked.outputs)} from {', '.join(there.inputs)}",
+            remedy="name the channel that the places read, and outputs of members that stand there",
+        )
+    return Line(along=_needed(whole, tuple(asked.knots)), knots=asked.knots, at_place=there, channel=asked.channel)
+
+
+def _needed(whole: Cascade, outputs: Sequence[str], *, given: Sequence[str] = ()) -> Cascade:
+    """Members of a cascade that some outputs depend on, but for what is given."""
+    writer = {name: model for model in whole.models for name in Ends.of(model).outputs}
+    wanted, waiting = list[str](), [name for name in outputs if name not in given]
+    while waiting:
+        name = waiting.pop()
+        if name in writer and name not in wanted:
+            wanted.append(name)
+            waiting += [source for source in Ends.of(writer[name]).inputs if source not in given]
+    models = tuple(model for model in whole.models if set(Ends.of(model).outputs) & set(wanted))
+    channels = {name for model in models for end in (Ends.of(model),) for name in (*end.inputs, *end.outputs)}
+    limits = {name: limit for name, limit in whole.limits.items() if name in wanted}
+    rest = {name: level for name, level in whole.rest.items() if name in channels}
+    return Cascade(models=models, rest=rest, limits=limits)
+
+
+def places_of(cases: TraceSet, output: str) -> dict[float, str]:
+    """Places at which a data set has an output.
+
+    Args:
+        cases: The data set; the output at place 17 is the output's name with 17 behind it.
+        output: The output.
+
+    Returns:
+        Channel by position, in the order of the positions.
+    """
+    pattern = re.compile(rf"{re.escape(output)}(\d+(?:\.\d+)?)")
+    names = next(iter(cases)).channel_names
+    found = {float(match[1]): name for name in names if (match := pattern.fullmatch(name))}
+    return dict(sorted(found.items()))
+
+
+def score_line(asked: LineConfig, line: Line, cases: TraceSet) -> LineScores:
+    """Score a line at the places of a data set.
+
+    Args:
+        asked: What is judged.
+        line: The line.
+        cases: The reference at its places.
+
+    Returns:
+        The scores.
+
+    Raises:
+        ConfigError: If the data have an output at no place.
+    """
+    places = {name: places_of(cases, name) for name in asked.scored}
+    for name, found in places.items():
+        if not found:
+            raise ConfigError(
+                "the data have no place of the line",
+                where=f"data set {cases.name}",
+                expected=f"channels such as {name}17, the output at place 17",
+                got=", ".join(next(iter(cases)).channel_names),
+                remedy="add such channels to the data set, or take the output out of line, judged",
+            )
+    everywhere = sorted({position for found in places.values() for position in found})
+    mse: dict[str, dict[str, NDArray[np.float64]]] = {name: {} for name in asked.scored}
+    timing = {}
+    for trace in cases:
+        line.simulate_trace(trace, everywhere, workers=WORKERS)  # compiles
+        began = time.perf_counter()
+        run = line.simulate_trace(trace, everywhere, workers=WORKERS)
+        timing[trace.name] = time.perf_counter() - began
+        for name, found in places.items():
+            rows = [everywhere.index(position) for position in found]
+            mse[name][trace.name] = _errors(run[name][rows], trace, list(found.values()))
+    knots = list(line.knots.values())
+    return LineScores(
+        mse=mse,
+        places={name: np.array(list(found)) for name, found in places.items()},
+        seen={name: np.isin(list(found), knots) for name, found in places.items()},
+        timing=timing,
+    )
+
+
+def _errors(run: NDArray[np.float64], trace: Trace, channels: Sequence[str]) -> NDArray[np.float64]:
+    counted = trace.usable_samples
+    found: NDArray[np.float64] = np.mean((run - trace.columns(channels).T)[:, counted] ** 2, axis=1)
+    return found

@@ -1,0 +1,151 @@
+"""Growth and line as tables, charts and points of the report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sysid.reporting.numbers import number, seconds
+from sysid.workbench.assembly.growth import Growth
+from sysid.workbench.assembly.line import LineScores
+
+
+def growth_table(grown: Growth) -> dict[str, Any]:
+    """What each round brought.
+
+    Args:
+        grown: The growth.
+
+    Returns:
+        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+    """
+    return {
+        "caption": "How much data bought how much accuracy",
+        "head": [
+            ["Round", ""], ["Sequences added", ""], ["Samples", ""], [f"Under {grown.limit:g}", "% of sequences"],
+            ["Median error", "rms"], ["99 % under", "rms"], ["Selection", "geometric mean"],
+        ],
+        "rows": [
+            [
+                f"{one.number} (kept)" if one.number == grown.best else str(one.number),
+                float(len(one.added)), float(one.samples), 100.0 * one.look.within, one.look.median, one.look.rare,
+                one.score,
+            ]
+            for one in grown.rounds
+        ],
+        "note": f"Errors of {', '.join(grown.outputs)}, the largest counts, on sequences of the pool that train "
+        "nothing; the random sequences further on are others again.",
+    }  # fmt: skip
+
+
+def growth_chart(grown: Growth) -> dict[str, Any]:
+    """Error over samples trained on.
+
+    Args:
+        grown: The growth.
+
+    Returns:
+        A chart, as :class:`sysid.reporting.judgement.ChartRecord` has it.
+    """
+    samples = [float(one.samples) for one in grown.rounds]
+    return {
+        "title": "Error over data",
+        "caption": "Error on sequences of the pool that train nothing, over the samples that the members were "
+        "trained on: each round adds the sequences that the whole was worst at.",
+        "x": "samples trained on",
+        "y": "root mean square error of a sequence",
+        "lines": [
+            {"name": "99 % of the sequences under", "x": samples, "y": [one.look.rare for one in grown.rounds]},
+            {"name": "median", "x": samples, "y": [one.look.median for one in grown.rounds]},
+            {"name": "aimed at", "x": samples, "y": [grown.limit] * len(samples), "target": True},
+        ],
+    }
+
+
+def line_table(scores: LineScores, output: str) -> dict[str, Any]:
+    """Errors of an output at places that nothing was fitted at.
+
+    Args:
+        scores: The scores.
+        output: The output.
+
+    Returns:
+        A table.
+    """
+    unseen, places = ~scores.seen[output], scores.places[output]
+    rows: list[list[Any]] = []
+    for case, errors in scores.mse[output].items():
+        own = errors[unseen]
+        worst = places[unseen][np.argmax(own)] if len(own) else None
+        at_knots = errors[~unseen]
+        rows.append(
+            [
+                case,
+                float(own.mean()) if len(own) else None,
+                float(own.max()) if len(own) else None,
+                worst,
+                float(at_knots.mean()) if len(at_knots) else None,
+                1e3 * scores.timing[case],
+            ]
+        )
+    return {
+        "caption": f"{output} at {int(unseen.sum())} places that nothing was fitted at",
+        "head": [
+            ["Case", ""], ["Mean over unseen places", ""], ["Worst unseen place", ""], ["which", "place"],
+            ["Mean over the knots", ""], [f"All {len(places)} places", "ms"],
+        ],
+        "rows": rows,
+        "note": "Mean squared error of the free run from the inputs of the whole alone, in the output's unit squared; "
+        "wall time of one batched run of all places on two threads, after one that is not counted.",
+    }  # fmt: skip
+
+
+def line_chart(scores: LineScores, output: str) -> dict[str, Any]:
+    """Error over the place.
+
+    Args:
+        scores: The scores.
+        output: The output.
+
+    Returns:
+        A chart.
+    """
+    places = scores.places[output]
+    lines: list[dict[str, Any]] = [
+        {"name": case, "x": places.tolist(), "y": errors.tolist()} for case, errors in scores.mse[output].items()
+    ]
+    knots = places[scores.seen[output]]
+    if len(knots):
+        lines.append({"name": "fitted here", "x": knots.tolist(), "y": [0.0] * len(knots), "marks": True})
+    return {
+        "title": f"{output} along the line",
+        "caption": f"Mean squared error of {output} at every place, from the inputs of the whole alone.",
+        "x": "place",
+        "y": f"mean squared error of {output}",
+        "lines": lines,
+    }
+
+
+def line_point(scores: LineScores) -> tuple[str, str]:
+    """For the verdict.
+
+    Args:
+        scores: The scores.
+
+    Returns:
+        Keyword and sentence.
+    """
+    said = []
+    for output, by_case in scores.mse.items():
+        unseen, places = ~scores.seen[output], scores.places[output]
+        worst = max(by_case, key=lambda case: float(by_case[case][unseen].max(initial=0.0)))
+        errors = by_case[worst][unseen]
+        if len(errors):
+            said.append(
+                f"{output} at {len(errors)} places that nothing was fitted at is at worst "
+                f"{number(float(errors.max()))} ({worst}, place {places[unseen][np.argmax(errors)]:g})"
+            )
+    slow = max(scores.timing, key=lambda case: scores.timing[case])
+    said.append(f"all places of {slow} together take {seconds(scores.timing[slow])} on two threads")
+    return "Everywhere", f"{'; '.join(said)}."

@@ -1,0 +1,93 @@
+"""The line of an assembly: what runs along it, what stands at a place, and how places are scored."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from sysid.errors import ConfigError
+from sysid.traces import Channel, Role, Trace, TraceSet
+from sysid.workbench.assembly.config import LineConfig
+from sysid.workbench.assembly.line import line_of, places_of, score_line
+from sysid.workbench.assembly.members import assembled
+from sysid.workbench.assembly.views import line_chart, line_point, line_table
+from tests.workbench.assembly.test_members import TWO_PLACES, config, models, trace
+
+ASKED = LineConfig(channel="BP", knots={"BP": 1, "BP9": 9}, outputs=("AR",), data="places")
+
+
+def whole():
+    return assembled(config(), models())
+
+
+def places(n: int = 120) -> TraceSet:
+    """The whole's own line as the reference, at three places, with half a unit added at place 4."""
+    line = line_of(ASKED, whole())
+    traces = {}
+    for seed, name in enumerate(("A", "B")):
+        handle = trace(n=n, seed=seed)["STP"]
+        run = line.simulate(handle[:, None], [1.0, 4.0, 9.0])
+        names = ("STP", "AR1", "AR4", "AR9")
+        values = np.column_stack([handle, run["AR"].T + np.array([0.0, 0.5, 0.0])])
+        channels = tuple(Channel(name=one, unit="psi") for one in names)
+        traces[name] = Trace(name=name, sample_time=0.1, channels=channels, values=values)
+    return TraceSet(name="places", traces=tuple(traces.values()), roles=dict.fromkeys(traces, Role.VALIDATION))
+
+
+def test_what_the_knots_need_runs_along_and_what_the_outputs_need_stands_at_a_place():
+    line = line_of(ASKED, whole())
+    assert set(line.along.outputs) == {"BP", "BP9"}
+    assert line.at_place.outputs == ("AR",)
+    assert set(line.at_place.inputs) == {"BP", "STP"}
+    assert line.at_place.limits["AR"].high == "BP"
+    assert dict(line.knots) == {"BP": 1.0, "BP9": 9.0}
+
+
+def test_places_are_the_numbers_behind_an_output():
+    assert places_of(places(), "AR") == {1.0: "AR1", 4.0: "AR4", 9.0: "AR9"}
+
+
+def test_each_place_is_scored_by_itself():
+    line, cases = line_of(ASKED, whole()), places()
+    scores = score_line(ASKED, line, cases)
+    assert scores.places["AR"].tolist() == [1.0, 4.0, 9.0]
+    assert scores.seen["AR"].tolist() == [True, False, True]
+    for case in ("A", "B"):
+        assert_allclose(scores.mse["AR"][case], [0.0, 0.25, 0.0], atol=1e-12)
+    table = line_table(scores, "AR")
+    assert [row[:4] for row in table["rows"]] == [
+        [case, pytest.approx(0.25), pytest.approx(0.25), 4.0] for case in ("A", "B")
+    ]
+    assert [one["name"] for one in line_chart(scores, "AR")["lines"]] == ["A", "B", "fitted here"]
+    keyword, sentence = line_point(scores)
+    assert keyword == "Everywhere"
+    assert "at worst 0.250 (" in sentence
+
+
+def test_data_without_places_are_refused():
+    line = line_of(ASKED, whole())
+    cases = places()
+    bare = replace(cases, traces=tuple(replace(t, channels=t.channels[:1], values=t.values[:, :1]) for t in cases))
+    with pytest.raises(ConfigError, match="no place of the line"):
+        score_line(ASKED, line, bare)
+
+
+@pytest.mark.parametrize(
+    ("line", "match"),
+    [
+        pytest.param("knots: {BP: 9, BP9: 1}, outputs: [AR]", "no line", id="knots out of order"),
+        pytest.param("knots: {BP: 1, BP8: 9}, outputs: [AR]", "which no member writes", id="a stranger"),
+        pytest.param("knots: {BP: 1, BP9: 9}, outputs: [AR], judged: [BP]", "is not had at a place", id="judged"),
+    ],
+)
+def test_a_line_that_cannot_be_is_refused(line, match):
+    with pytest.raises(ConfigError, match=match):
+        config(TWO_PLACES + f"line: {{channel: BP, data: places, {line}}}\n")
+
+
+def test_outputs_that_do_not_follow_from_the_channel_are_refused():
+    with pytest.raises(ConfigError, match="cannot be had at a place"):
+        line_of(ASKED.model_copy(update={"channel": "BP9"}), whole())
