@@ -3,9 +3,10 @@
 The regressors of all inputs are laid side by side before the loop, and the body is left with few nodes: in a network
 of this size a node costs more than its arithmetic. Inside the loop cars lie along the last axis: to put rows of one
 number each behind one another costs as much as the products do, and a hundred cars take a quarter less time without.
-Measured on 20,000 samples of a 4/4/20 network and given up: the inputs' share of the product before the loop (one car
-a tenth faster, a hundred cars slower by a fifth: the products of all samples do not fit into the cache), the inputs'
-delay lines inside it (one car slower by a third), and several samples in one pass through the body (no gain).
+Measured on 20,000 samples of a 4/4/20 network and given up: the inputs' share of the product before the loop (no gain,
+a hundred cars slower by a third), the inputs' delay lines inside it (one car slower by a third), several samples in one
+pass through the body (no gain), and each past rate carried by itself (a twentieth faster, but onnxruntime's Scan mixes
+up numbers that go from step to step without a node).
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from onnx import numpy_helper
 from sysid.export.cell import Cell, LinearCell
 from sysid.export.flags import Flag
 from sysid.export.layout import DelayLine
+from sysid.export.onnx_blocks import in_blocks
 from sysid.export.onnx_body import Body, clip_range, lagged_body, limit_name, linear_body, scanned_limits
 from sysid.export.onnx_nodes import TO_END, Nodes
-from sysid.export.onnx_step import INT32, Made, ends, held_outputs, join_states, stage_part, stage_state
+from sysid.export.onnx_step import INT32, Made, held_outputs, join_states, stage_part, stage_state
 from sysid.export.rates import RateForm, Term
 from sysid.export.surrogate import Stage, Surrogate
 
@@ -53,7 +55,7 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     _columns(nodes, known[len(inputs) :], "y")
     join_states(nodes, made)
     _flags(nodes, surrogate, inputs, made)
-    return nodes.graph("sequence", *ends(nodes, surrogate, ["time", "batch"]))
+    return in_blocks(surrogate, nodes)
 
 
 class _Sequence:
