@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sysid.reporting.against import compare_runs as compare_runs
     from sysid.reporting.against_page import write_comparison as write_comparison
+    from sysid.reporting.benchmark_page import publish_benchmarks as publish_benchmarks
     from sysid.reporting.figures import case_figure as case_figure
     from sysid.reporting.pdf import write_pdf as write_pdf
     from sysid.reporting.publication import publish_run as publish_run
-    from sysid.reporting.publication import publish_text as publish_text
     from sysid.reporting.published import PublishedFigure as PublishedFigure
     from sysid.reporting.published import PublishedTable as PublishedTable
     from sysid.reporting.published import published_names as published_names
@@ -34,8 +34,8 @@ _HOME = {
     "case_figure": "figures",
     "compare_runs": "against",
     "parse_results": "results",
+    "publish_benchmarks": "benchmark_page",
     "publish_run": "publication",
-    "publish_text": "publication",
     "published_names": "published",
     "read_published": "published",
     "read_results": "results",

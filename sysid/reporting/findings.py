@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -69,11 +69,11 @@ class Finding(_Record):
 class Benchmark(_Record):
     """One benchmark: how it was run, on what, and what it found."""
 
-    name: str
     title: str = Field(description="One line.")
     protocol: str = Field(default="", description="How it measures, in paragraphs.")
     command: str = Field(description="The command that runs it again.")
     created: str = Field(default="", description="When it ended, ISO 8601.")
+    environment: dict[str, Any] = Field(default={}, description="As in environment.json.")
     load: float | None = Field(default=None, description="Load of the machine when it began; 0 is an idle one.")
     data: dict[str, str] = Field(default={}, description="SHA-256 of each file or data set that it read, by name.")
     findings: list[Finding] = []
@@ -85,7 +85,6 @@ class Benchmarks(_Record):
 
     schema_version: int = 1
     name: str
-    environment: dict[str, object]
     benchmarks: list[Benchmark]
 
     @property

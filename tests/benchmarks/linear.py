@@ -1,6 +1,6 @@
 """Times of the linear estimators: order search, finalists, a large transfer function, the cost of its gradient.
 
-    python -m tests.benchmarks.linear
+    python -m tests.benchmarks linear
 
 20,000 samples, two inputs; medians after one run that compiles. One BLAS thread; searches use two threads.
 """
@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import os
-import platform
 import time
 from collections.abc import Callable
 
@@ -25,11 +24,13 @@ from sysid.estimation.separable import PoleParameters, SeparableProvider
 from sysid.models import Domain, Mapping, TransferFunction
 from sysid.traces import Channel, Trace
 from sysid.validation.order_finalists import run_finalists
+from tests.benchmarks._findings import found
 
 SAMPLES = 20_000
 CHANNELS = tuple(Channel(name=name, unit="1") for name in ("u1", "u2", "y"))
 MAPPING = Mapping.parse("u1+u2 -> y")
 POLES = 20
+NOTE = "the published search had 252,301"
 
 
 def median(action: Callable[[int], object], repeats: int) -> float:
@@ -69,12 +70,13 @@ def searches() -> None:
     grid = OrderGrid(max_na=30, max_nb=30, max_nk=4)
     losses = search_orders(data, MAPPING, grid)
     seconds = median(lambda _: search_orders(data, MAPPING, grid), 5)
-    print(f"one-step losses of {len(losses):,} candidates: {seconds:.2f} s (target: 252,301 in 20 s)")
+    found(f"one-step losses of {len(losses):,} ARX candidates", seconds, "s", target=20.0, note=NOTE)
     began = time.perf_counter()
     search_orders(data, MAPPING, grid)
     finalists = run_finalists(losses, data, MAPPING, cases, count=500)
     seconds = time.perf_counter() - began
-    print(f"search and 500 finalists on five cases: {seconds:.1f} s (target: 180 s); {finalists.unstable} ran away")
+    note = f"{finalists.unstable} ran away"
+    found("the search and 500 finalists on five cases in free run", seconds, "s", target=180.0, note=note)
 
 
 def gradient() -> None:
@@ -96,10 +98,10 @@ def gradient() -> None:
     output = median(lambda _: record.columns(solution.ladders), 21) / passes
     tangents = median(lambda _: record.tangents(solution.ladders, columns, weights), 21) / passes
     scipy = median(lambda _: lfilter([1.0], [1.0, -0.5, 0.2], u[:, 0]), 101)
-    print(f"filter pass: output {1e6 * output:.0f} us, gradient {1e6 * tangents:.0f} us, lfilter {1e6 * scipy:.0f} us")
-    print(f"gradient over lfilter, per pass: {tangents / scipy:.2f} (target: 2)")
+    note = f"output {1e6 * output:.0f}, gradient {1e6 * tangents:.0f}, lfilter {1e6 * scipy:.0f} µs a pass"
+    found("gradient, divided by SciPy's lfilter, per filter pass", tangents / scipy, "x", target=2.0, note=note)
     step = median(lambda i: provider.linearise(theta + 1e-9 * (i + 2)), 7)
-    print(f"whole linearisation, 40 poles and 41 linear parameters: {1e3 * step:.0f} ms")
+    found("whole linearisation, 40 poles and 41 linear parameters", 1e3 * step, "ms")
 
 
 def large_fit() -> None:
@@ -111,14 +113,13 @@ def large_fit() -> None:
     seconds = time.perf_counter() - began
     y = data["y"]
     left = float(np.sqrt(fit.history["mse"][-1]) / y.std())
-    print(f"transfer function, 20 poles, two inputs: {seconds:.1f} s (target: 30 s)")
     steps = len(fit.history["mse"]) - 1
-    print(f"  {fit.status.name}, {steps} steps; residual {100 * left:.2f} % of the output, noise 1 %")
+    note = f"{fit.status.name}, {steps} steps; residual {100 * left:.2f} % of the output, noise 1 %"
+    found("transfer function, 20 poles, two inputs", seconds, "s", target=30.0, note=note)
 
 
 def main() -> None:
     """All of them."""
-    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     searches()
     gradient()
     large_fit()

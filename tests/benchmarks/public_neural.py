@@ -21,7 +21,6 @@ arXiv 2405.10779, and its references; there n is 5 on the tanks, 4 on the drives
 
 from __future__ import annotations
 
-import hashlib
 import os
 import sys
 import time
@@ -29,7 +28,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise, product
-from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -39,22 +37,11 @@ import numpy as np
 from sysid.estimation import FitResult, Training, fit_neural_state_space
 from sysid.models import AbstractModel, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Channel, Trace
+from tests.benchmarks._findings import found
+from tests.benchmarks._public import checked
 
 MAPPING = Mapping.parse("u -> y")
-FILES = {
-    "cascaded_tanks/dataBenchmark.csv": "ef2388ed822f3aef4aa80d6b0f2b466dd80b361786b3eafc7a2957c31ea323a7",
-    "ced/DATAUNIF.csv": "9114f637f22ca826f03f066270cf68bd8cad686739a7fa4b471c14ccdbf66889",
-    "silverbox/SNLS80mV.csv": "ae62d5a91230c10f76e6dd02c8a4fac3c9d4d8a95fbf50e87cb0c4885003e0f1",
-}
-
-
-def checked(name: str) -> Path:
-    """A file of the data folder, if its content is the published one."""
-    path = Path(os.environ["SYSID_DATA"]) / name
-    found = hashlib.sha256(path.read_bytes()).hexdigest()
-    if found != FILES[name]:
-        sys.exit(f"{path} is not the published file: its SHA-256 is {found}, expected {FILES[name]}")
-    return path
+SOURCE = "Champneys et al. 2024 and its references"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,10 +124,6 @@ def chosen_model(case: Case) -> AbstractModel:
     return found.model
 
 
-def line(what: str, value: float, target: str, published: str) -> None:
-    print(f"  TEST {what}: {value:.3f} (target {target}; published {published})", flush=True)
-
-
 def tanks() -> None:
     """Four blocks of the estimation record, each held out in turn."""
     data = np.genfromtxt(checked("cascaded_tanks/dataBenchmark.csv"), delimiter=",", names=True)
@@ -163,8 +146,9 @@ def tanks() -> None:
         iterations=200,
     )
     model = chosen_model(case)
-    line("n = 50", rmse(model, test, 50), "0.30", "neural 0.306 to 0.396")
-    line("n = 5", rmse(model, test, 5), "none", "as above, and grey box 0.191")
+    published = f"neural 0.306 to 0.396, grey box 0.191 (n = 5; {SOURCE})"
+    found("Cascaded Tanks, n = 50", rmse(model, test, 50), "V", target=0.30, published=published)
+    found("Cascaded Tanks, n = 5", rmse(model, test, 5), "V", published=published)
 
 
 def drives() -> None:
@@ -190,10 +174,11 @@ def drives() -> None:
         iterations=200,
     )
     model = chosen_model(case)
-    for record, target, published in zip(whole, ("0.100", "0.090"), ("0.096", "0.074"), strict=True):
-        test = piece(record, 400, 500)
-        line(f"record {record.name}, n = 10", rmse(model, test, 10), target, f"best {published}")
-        line(f"record {record.name}, n = 4", rmse(model, test, 4), "none", f"best {published}")
+    for record, target, best in zip(whole, (0.100, 0.090), ("0.096", "0.074"), strict=True):
+        test, published = piece(record, 400, 500), f"best {best} (n = 4; {SOURCE})"
+        name = f"Coupled Electric Drives, record {record.name}"
+        found(f"{name}, n = 10", rmse(model, test, 10), "ticks/s", target=target, published=published)
+        found(f"{name}, n = 4", rmse(model, test, 4), "ticks/s", published=published)
 
 
 def silverbox() -> None:
@@ -218,11 +203,12 @@ def silverbox() -> None:
     )
     model = chosen_model(case)
     for what, columns, target, published in (
-        ("arrow, no extrapolation", values[100:32_100], "0.30", "best 0.259"),
-        ("arrow, full", values[100:40_575], "1.0", "best 0.26 (polynomial state space), 0.60"),
-        ("multisine", multisine[split:], "none", "best 0.301"),
+        ("arrow, no extrapolation", values[100:32_100], 0.30, "best 0.259"),
+        ("arrow, full", values[100:40_575], 1.0, "best 0.26 (polynomial state space), 0.60"),
+        ("multisine", multisine[split:], None, "best 0.301"),
     ):
-        line(what, 1e3 * rmse(model, trace("test", columns, period, "V"), 50), target, published)
+        error = 1e3 * rmse(model, trace("test", columns, period, "V"), 50)
+        found(f"Silverbox {what}", error, "mV", target=target, published=f"{published} ({SOURCE})")
 
 
 if __name__ == "__main__":

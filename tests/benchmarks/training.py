@@ -1,6 +1,8 @@
 """The compiled reference and the training epoch, against their limits, on the machine at hand.
 
-Run with ``python tests/benchmarks/training.py``. Medians of seven after one run that warms up; one BLAS thread.
+    python -m tests.benchmarks training
+
+Medians of seven after one run that warms up; one BLAS thread.
 
 * The reference: 2,000 s of EST01's command, 3 and 101 vehicles, the first valve's pressures recorded.
 * One closed-loop epoch: 20,000 samples, 4/4/20 without feed-through, 281 parameters: free run, exact sensitivities and
@@ -17,6 +19,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +30,8 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.simulate import Probe, simulate
 from sysid.estimation.provider import Experiment, RecursionProvider
 from sysid.models import NARX, History, Recursion, Scaling, parameter_count
+from sysid.reporting.numbers import number
+from tests.benchmarks._findings import found
 
 EST01 = [
     [0, 90], [100, 84.2], [500, 64.2], [1100, 90], [4100, 84.2], [4500, 70], [4800, 64.2], [5300, 90], [7800, 84.2],
@@ -52,15 +57,28 @@ void run(const double *u, double *y, int n, const double *W, const double *b, co
 """
 
 
-def median_ms(call: Callable[[], object], repeats: int = 7) -> float:
-    """Median wall time in milliseconds."""
+@dataclass(frozen=True)
+class Took:
+    """Medians in milliseconds."""
+
+    wall: float
+    processor: float
+
+    @property
+    def note(self) -> str:
+        """How much of it is ours, where the machine has other work."""
+        return f"processor time {number(self.processor)} ms"
+
+
+def median_ms(call: Callable[[], object], repeats: int = 7) -> Took:
+    """Median times of a call, after one that warms up."""
     call()
     seconds = []
     for _ in range(repeats):
-        began = time.perf_counter()
+        wall, processor = time.perf_counter(), time.process_time()
         call()
-        seconds.append(time.perf_counter() - began)
-    return 1e3 * statistics.median(seconds)
+        seconds.append((time.perf_counter() - wall, time.process_time() - processor))
+    return Took(*(1e3 * statistics.median(column) for column in zip(*seconds, strict=True)))
 
 
 def reference() -> None:
@@ -68,8 +86,8 @@ def reference() -> None:
     command = Command.from_rows(EST01, time_unit="ds")
     probes = tuple(Probe(quantity=q, node=3) for q in ("pipe", "auxiliary", "cylinder"))
     for pairs, target in ((1, 0.2), (50, 5.0)):
-        ms = median_ms(lambda n=pairs: simulate(command, consist=Consist(pairs=n), probes=probes))
-        print(f"reference, {2 * pairs + 1} vehicles, 2,000 s: {ms / 1e3:.3f} s (target {target} s)")
+        took = median_ms(lambda n=pairs: simulate(command, consist=Consist(pairs=n), probes=probes))
+        found(f"reference, {2 * pairs + 1} vehicles, 2,000 s", took.wall / 1e3, "s", target=target, note=took.note)
 
 
 def provider() -> RecursionProvider:
@@ -121,12 +139,13 @@ def epoch() -> None:
     whole, loss = median_ms(lambda: source.linearise(theta)), median_ms(lambda: source.loss(theta))
     J = source.jacobian(theta)
     product = median_ms(lambda: J.T @ J)
-    print(f"epoch, {SAMPLES} samples, {len(theta)} parameters: {whole:.1f} ms (target 60 ms)")
-    print(f"  of it J^T J alone: {product:.1f} ms, {SAMPLES * len(theta) ** 2 / product / 1e6:.0f} Gflop/s")
     square = np.random.default_rng(2).standard_normal((1500, 1500))
-    ms = median_ms(lambda: square @ square)
-    print(f"  the machine's matrix product: {2 * 1500**3 / ms / 1e6:.0f} Gflop/s")
-    print(f"free run alone: {loss:.2f} ms")
+    machine = median_ms(lambda: square @ square)
+    found(f"epoch, {SAMPLES} samples, {len(theta)} parameters", whole.wall, "ms", target=60.0, note=whole.note)
+    share = SAMPLES * len(theta) ** 2 / product.wall / (2 * 1500**3 / machine.wall)
+    note = f"normal equations {product.wall:.1f} ms, {SAMPLES * len(theta) ** 2 / product.wall / 1e6:.0f} Gflop/s"
+    found("the normal equations' share of the machine's rate in a matrix product", 100.0 * share, "%", note=note)
+    found("free run alone", loss.wall, "ms", note=loss.note)
     form, inputs = source.at(theta), source.experiments[0].inputs
     for flags in (["-O2"], ["-O3", "-march=native"]):
         call = c_loop(form, inputs, flags)
@@ -134,8 +153,9 @@ def epoch() -> None:
             print("  no C compiler found")
             return
         largest = np.abs(call() - form.simulate(inputs, source.experiments[0].history)).max()
-        ms = median_ms(call)
-        print(f"  C loop {' '.join(flags)}: {ms:.2f} ms, ratio {loss / ms:.2f}, largest difference {largest:.1e}")
+        took = median_ms(call)
+        note = f"C {took.wall:.2f} ms, largest difference {largest:.1e}"
+        found(f"free run, divided by a C loop ({' '.join(flags)})", loss.wall / took.wall, "x", target=1.5, note=note)
 
 
 if __name__ == "__main__":
