@@ -209,8 +209,16 @@ def simulate(
     initial: Annotated[
         float | None, typer.Option(help="Output before the first sample; its declared level by default.")
     ] = None,
+    places: Annotated[
+        str | None, typer.Option(help="Places of a line, as 1:50; BUNDLE is then the run folder of its assembly.")
+    ] = None,
 ) -> None:
     """Run an exported model or cascade on a file of inputs or a command, fed with nothing but its own past."""
+    if places is not None:
+        from sysid.workbench.commands.simulate_line import simulate_line_command
+
+        simulate_line_command(bundle, command, places, out, time_unit=time_unit, unit=unit, plot=plot)
+        return
     from sysid.workbench.commands.simulate import simulate_command
 
     simulate_command(bundle, inputs, out, initial=initial, command=command, time_unit=time_unit, unit=unit, plot=plot)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.models import Cascade, Ends, Line
-from sysid.traces import Trace, TraceSet
+from sysid.traces import Channel, Trace, TraceSet
+from sysid.units import Reference
 from sysid.workbench.assembly.config import LineConfig
 
 WORKERS = 2
@@ -34,6 +36,79 @@ class LineScores:
     places: Mapping[str, NDArray[np.float64]]
     seen: Mapping[str, NDArray[np.bool_]]
     timing: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StoredLine:
+    """A line as a run leaves it: with the channels that go in and come out, in their units.
+
+    Args:
+        line: The line.
+        inputs: Channels of the inputs of the whole.
+        outputs: Channels that are had at every place.
+    """
+
+    line: Line
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+
+    @classmethod
+    def of(cls, asked: LineConfig, line: Line, case: Trace) -> StoredLine:
+        """A line with the channels of a trace.
+
+        Args:
+            asked: What is had at every place.
+            line: The line.
+            case: A trace with the inputs of the whole, and the outputs under the names of the first place or at some
+                place.
+
+        Returns:
+            The line with its channels.
+        """
+        outputs = []
+        for name in asked.outputs:
+            there = name if name in case.channel_names else next(iter(places_of(case, name).values()), None)
+            unit = Channel(name=name, unit=line.at_place.units[name])
+            outputs.append(replace(case.channel(there), name=name, description="") if there else unit)
+        return cls(line=line, inputs=tuple(case.channel(name) for name in line.inputs), outputs=tuple(outputs))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The line and its channels as JSON values."""
+        channels = {
+            side: [{"name": one.name, "unit": one.unit, "reference": one.reference.value} for one in some]
+            for side, some in (("inputs", self.inputs), ("outputs", self.outputs))
+        }
+        return {**self.line.to_dict(), "channels": channels}
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> StoredLine:
+        """What :meth:`to_dict` wrote.
+
+        Args:
+            fields: What it wrote.
+
+        Returns:
+            The line with its channels.
+
+        Raises:
+            ConfigError: If it is no line, or a field is missing.
+        """
+        line, channels = Line.from_dict(fields), fields.get("channels", {})
+        sides = {
+            side: tuple(
+                Channel(name=one["name"], unit=one["unit"], reference=Reference(one["reference"]))
+                for one in channels.get(side, ())
+            )
+            for side in ("inputs", "outputs")
+        }
+        if tuple(channel.name for channel in sides["inputs"]) != line.inputs or not sides["outputs"]:
+            raise ConfigError(
+                "the stored line lacks its channels",
+                expected=f"channels of the inputs {', '.join(line.inputs)}, and of some outputs",
+                got=", ".join(channel.name for channel in sides["inputs"]) or "none",
+                remedy="let the pipeline that makes it run again",
+            )
+        return cls(line=line, **sides)
 
 
 def line_of(asked: LineConfig, whole: Cascade) -> Line:
@@ -78,19 +153,18 @@ def _needed(whole: Cascade, outputs: Sequence[str], *, given: Sequence[str] = ()
     return Cascade(models=models, rest=rest, limits=limits)
 
 
-def places_of(cases: TraceSet, output: str) -> dict[float, str]:
-    """Places at which a data set has an output.
+def places_of(case: Trace, output: str) -> dict[float, str]:
+    """Places at which a trace has an output.
 
     Args:
-        cases: The data set; the output at place 17 is the output's name with 17 behind it.
+        case: The trace; the output at place 17 is the output's name with 17 behind it.
         output: The output.
 
     Returns:
         Channel by position, in the order of the positions.
     """
     pattern = re.compile(rf"{re.escape(output)}(\d+(?:\.\d+)?)")
-    names = next(iter(cases)).channel_names
-    found = {float(match[1]): name for name in names if (match := pattern.fullmatch(name))}
+    found = {float(match[1]): name for name in case.channel_names if (match := pattern.fullmatch(name))}
     return dict(sorted(found.items()))
 
 
@@ -108,7 +182,7 @@ def score_line(asked: LineConfig, line: Line, cases: TraceSet) -> LineScores:
     Raises:
         ConfigError: If the data have an output at no place.
     """
-    places = {name: places_of(cases, name) for name in asked.scored}
+    places = {name: places_of(next(iter(cases)), name) for name in asked.scored}
     for name, found in places.items():
         if not found:
             raise ConfigError(

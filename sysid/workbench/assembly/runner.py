@@ -15,7 +15,7 @@ import numpy as np
 from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, FitProgress, FitResult
-from sysid.models import Cascade, Line, NARXModel, cascade_from_dict
+from sysid.models import Cascade, NARXModel, cascade_from_dict
 from sysid.reporting.judgement import parse_judgement
 from sysid.reporting.judgement_report import (
     JudgementResults,
@@ -29,7 +29,7 @@ from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
 from sysid.workbench.assembly.document import Outcome, document
 from sysid.workbench.assembly.growth import Growth, Round, grow
-from sysid.workbench.assembly.line import LineScores, line_of, score_line
+from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.members import Members, assembled, own_traces, whole_score, written
 from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
 from sysid.workbench.assembly.stress import stress
@@ -113,6 +113,8 @@ class _Run:
     """The whole after each stage."""
     growth: list[Growth] = field(default_factory=list)
     """What growing the training data brought, where it was asked for."""
+    digests: dict[str, str] = field(default_factory=dict)
+    """SHA-256 of every data set that was read, by name."""
 
     def all(self) -> tuple[JudgementResults, Path]:
         """Every step, in order; the results and the page."""
@@ -151,6 +153,7 @@ class _Run:
             ),
         )
         self._tell(events.StepDone(step=step, stored=False, detail=f"{len(loaded)} traces"))
+        self.digests[loaded.name] = loaded.digest
         return loaded
 
     def _fit(
@@ -376,7 +379,11 @@ class _Run:
             created=time.strftime("%Y-%m-%dT%H:%M:%S%z"),
             environment=dict(environment()),
             seed=config.seed,
-            data=SceneRecord(name=cases.name),
+            data=SceneRecord(
+                name=cases.name,
+                digest=cases.digest,
+                others={name: found for name, found in self.digests.items() if name != cases.name},
+            ),
             subjects=[SubjectRecord(name=stage, parts=written(cascade)) for stage, cascade in self.stages.items()],
             judgement=parse_judgement(strict(said), where="assembly"),
         )
@@ -387,9 +394,8 @@ class _Run:
         asked = self.config.line
         if asked is None:
             return None
-        line = line_of(asked, whole)
-        write_json(self.store.path / LINE, line.to_dict())
-        cases, step = self._load(asked.data), "Running every place of the line"
+        line, cases, step = line_of(asked, whole), self._load(asked.data), "Running every place of the line"
+        write_json(self.store.path / LINE, StoredLine.of(asked, line, next(iter(cases))).to_dict())
         self._tell(events.StepStarted(step=step))
         scores = score_line(asked, line, cases)
         slowest = max(scores.timing.values())
@@ -468,19 +474,19 @@ def read_assembly(folder: Path) -> Cascade:
     return cascade_from_dict(_left(folder, "assembly.json", "the run has no assembly"))
 
 
-def read_line(folder: Path) -> Line:
+def read_line(folder: Path) -> StoredLine:
     """The line that a run left: every place between those that it modelled.
 
     Args:
         folder: Its run folder.
 
     Returns:
-        The line.
+        The line, with its channels.
 
     Raises:
         ConfigError: If the run has not come so far, or its pipeline has no ``line``.
     """
-    return Line.from_dict(_left(folder, LINE, "the run has no line"))
+    return StoredLine.from_dict(_left(folder, LINE, "the run has no line"))
 
 
 def _left(folder: Path, name: str, what: str) -> Any:

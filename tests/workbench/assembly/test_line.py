@@ -47,7 +47,7 @@ def test_what_the_knots_need_runs_along_and_what_the_outputs_need_stands_at_a_pl
 
 
 def test_places_are_the_numbers_behind_an_output():
-    assert places_of(places(), "AR") == {1.0: "AR1", 4.0: "AR4", 9.0: "AR9"}
+    assert places_of(next(iter(places())), "AR") == {1.0: "AR1", 4.0: "AR4", 9.0: "AR9"}
 
 
 def test_each_place_is_scored_by_itself():

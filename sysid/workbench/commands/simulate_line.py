@@ -1,0 +1,156 @@
+"""``sysid simulate RUN --command FILE --places 1:50``: every place of a line, from the inputs of the whole alone."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sysid.atomic import replacing
+from sysid.errors import ConfigError
+from sysid.export.command_table import read_command
+from sysid.ingest import write_trace
+from sysid.traces import Channel, Trace
+from sysid.workbench.assembly.line import StoredLine
+from sysid.workbench.assembly.runner import read_line
+from sysid.workbench.commands.run import console
+
+DRAWN = 5
+"""Places in the picture at most: more lines of one field are not told apart."""
+
+MOST = 10_000
+"""Places in one call: more are not meant."""
+
+
+def simulate_line_command(
+    folder: Path,
+    command: Path | None,
+    places: str,
+    out: Path,
+    *,
+    time_unit: str | None = None,
+    unit: str | None = None,
+    plot: Path | None = None,
+) -> None:
+    """Simulate a line and write time, inputs and every output at every place, as ``BC17`` for place 17.
+
+    Args:
+        folder: The run folder of an assembly with a line.
+        command: A command table.
+        places: ``1:50``, ``1:50:5`` or ``1,10,25.5``.
+        out: The file to write, ``.csv`` or ``.parquet``.
+        time_unit: Unit of the command's times, where it does not say.
+        unit: Unit of the command's values, likewise.
+        plot: A picture to draw; beside ``out`` by default.
+
+    Raises:
+        UserError: If the line or the command cannot be read, or the output not written.
+    """
+    if command is None:
+        raise ConfigError(
+            "nothing says what to simulate",
+            where="sysid simulate --places",
+            expected="--command with a table of a few rows",
+            got="no command",
+            remedy="give one",
+        )
+    stored, positions = read_line(folder), parse_places(places)
+    table = read_command(command, stored.inputs, time_unit=time_unit, unit=unit)
+    trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
+    write_trace(replace(trace, name=out.stem), out)
+    names = ", ".join(channel.name for channel in stored.outputs)
+    console().print(f"{len(trace)} samples of {names} at {len(positions)} places written to {out}", soft_wrap=True)
+    _draw(stored, trace, positions, plot or out.with_suffix(".png"), title=folder.name)
+
+
+def simulate_line(stored: StoredLine, given: Trace, positions: list[float]) -> Trace:
+    """Every place of a line as one trace.
+
+    Args:
+        stored: The line.
+        given: A trace with the inputs of the whole.
+        positions: The places.
+
+    Returns:
+        The inputs, then each output at each place, as ``BC17`` for place 17.
+
+    Raises:
+        ConfigError: If a place is not on the line.
+    """
+    run = stored.line.simulate_trace(given, positions)
+    inputs = [channel.name for channel in stored.inputs]
+    channels, columns = list(stored.inputs), [given.columns(inputs)]
+    for channel in stored.outputs:
+        channels += [replace(channel, name=_at(channel, place)) for place in positions]
+        columns.append(run[channel.name].T)
+    return Trace(
+        name=given.name,
+        sample_time=given.sample_time,
+        channels=tuple(channels),
+        values=np.column_stack(columns),
+        provenance=(*given.provenance, f"simulated in free run at {len(positions)} places of a line"),
+    )
+
+
+def _at(channel: Channel, place: float) -> str:
+    return f"{channel.name}{place:g}"
+
+
+def parse_places(text: str) -> list[float]:
+    """Places as they are written.
+
+    Args:
+        text: ``1:50`` for every whole number from 1 to 50, ``1:50:5`` for every fifth, ``1,10,25.5`` for these.
+
+    Returns:
+        The places, in the order in which they are named.
+
+    Raises:
+        ConfigError: If they cannot be read, are named twice, or are more than anybody means.
+
+    Example:
+        >>> parse_places("1:9:4,12.5")
+        [1.0, 5.0, 9.0, 12.5]
+    """
+    found: list[float] = []
+    number = r"\d+(?:\.\d+)?"
+    for part in text.replace(" ", "").split(","):
+        numbers = [float(one) for one in part.split(":")] if re.fullmatch(rf"{number}(:{number}){{0,2}}", part) else []
+        first, last, step = (*numbers, *numbers[-1:] * (2 - len(numbers)), 1.0)[:3] if numbers else (1.0, 0.0, 0.0)
+        if last < first or step <= 0.0 or (last - first) / step > MOST:
+            raise _cannot(text, part)
+        found += [first + step * i for i in range(int((last - first) / step + 1e-9) + 1)]
+    if len(set(found)) < len(found):
+        raise _cannot(text, "a place twice")
+    return found
+
+
+def _cannot(text: str, got: str) -> ConfigError:
+    return ConfigError(
+        "the places cannot be read",
+        where=f"option --places {text}",
+        expected="1:50, 1:50:5 or 1,10,25, each place once",
+        got=got or "nothing",
+        remedy="correct the places",
+    )
+
+
+def _draw(stored: StoredLine, trace: Trace, positions: list[float], plot: Path, *, title: str) -> None:
+    from sysid.reporting.simulation_figure import simulation_figure
+    from sysid.reporting.style import styled
+
+    drawn = [positions[i] for i in np.unique(np.linspace(0, len(positions) - 1, DRAWN).round().astype(int))]
+    inputs = tuple(channel.name for channel in stored.inputs)
+    names = [*inputs, *(_at(channel, place) for channel in stored.outputs for place in drawn)]
+    shown = replace(
+        trace, channels=tuple(trace.channel(name) for name in names), values=trace.columns(names), provenance=()
+    )
+    figure = simulation_figure(shown, inputs, outside=np.zeros(len(trace), dtype=bool), title=title)
+    try:
+        with replacing(plot) as draft, styled():
+            figure.savefig(draft, format=plot.suffix.lower().removeprefix("."), dpi=150)
+    except OSError as error:
+        raise ConfigError("the picture cannot be written", where=plot, got=str(error)) from error
+    console().print(f"places {', '.join(f'{place:g}' for place in drawn)} drawn in {plot}", soft_wrap=True)
