@@ -63,6 +63,7 @@ class JudgementRecord(_Record):
 
     title: str
     headline: str
+    points: list[tuple[str, str]] = Field(default=[], description="Keyword and sentence, for the verdict.")
     sentences: list[str] = []
     tables: list[TableRecord] = []
     charts: list[ChartRecord] = []

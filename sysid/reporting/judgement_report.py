@@ -13,7 +13,9 @@ from sysid.errors import ConfigError
 from sysid.reporting.document import Document
 from sysid.reporting.html import render_html
 from sysid.reporting.judgement import JudgementRecord, judgement_sections
+from sysid.reporting.parts import Section
 from sysid.reporting.results import RESULTS_FILE
+from sysid.reporting.tables import Cell, Table
 from sysid.reporting.verdict import Verdict
 
 SCHEMA_VERSION: Final = 1
@@ -23,7 +25,9 @@ class SceneRecord(BaseModel):
     """What the models were judged on."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
-    name: str = Field(description="The judge, which brings its own scenes.")
+    name: str = Field(description="The data set, or the judge, which brings its own scenes.")
+    digest: str = Field(default="", description="SHA-256 of the data set.")
+    others: dict[str, str] = Field(default={}, description="SHA-256 of the other data sets that were read, by name.")
 
 
 class SubjectRecord(BaseModel):
@@ -118,11 +122,31 @@ def judgement_document(results: JudgementResults) -> Document:
     Returns:
         The parts.
     """
+    judgement = results.judgement
     judged = tuple((subject.name, "; ".join(subject.parts)) for subject in results.subjects)
-    verdict = Verdict(headline=results.judgement.headline, tiles=(), points=judged, warnings=())
+    points = tuple(judgement.points) or judged
+    verdict = Verdict(headline=judgement.headline, tiles=(), points=points, warnings=())
     # The headline stands in the verdict already.
-    sections = judgement_sections([results.judgement.model_copy(update={"headline": ""})])
+    sections = judgement_sections([judgement.model_copy(update={"headline": ""})])
+    if points is not judged:
+        sections.append(_subjects(judged))
+    sections += _data(results.data)
     return Document(results=results, verdict=verdict, sections=tuple(sections))
+
+
+def _subjects(judged: tuple[tuple[str, str], ...]) -> Section:
+    rows = tuple((Cell(text=name, header=True), Cell(text=parts)) for name, parts in judged)
+    table = Table(caption="What was judged, and what it is made of.", head=(("", ""), ("models", "")), rows=rows)
+    return Section(anchor="judged", title="What was judged", parts=(table,))
+
+
+def _data(data: SceneRecord) -> list[Section]:
+    if not data.digest:
+        return []
+    digests = {data.name: data.digest, **data.others}
+    rows = tuple((Cell(text=name, header=True), Cell(text=digest)) for name, digest in digests.items())
+    table = Table(caption="Data sets that were read.", head=(("data set", ""), ("SHA-256", "")), rows=rows)
+    return [Section(anchor="data", title="Traces", parts=(table,))]
 
 
 def write_judgement_report(folder: Path, results: JudgementResults) -> Path:

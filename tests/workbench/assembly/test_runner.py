@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.reporting import publish_run
 from sysid.reporting.judgement_report import read_judgement_results
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.kinds import RunRequest, kind_of
@@ -49,6 +51,7 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
     assert error == pytest.approx(chosen[4], rel=1e-6)
     assert (folder / "report" / "index.html").is_file()
     assert "From the command alone" in capsys.readouterr().out
+    _is_published(folder, workspace / "reports")
 
     stamps = {file: file.stat().st_mtime_ns for file in folder.rglob("fit.json")}
     assert len(stamps) == 4
@@ -57,6 +60,27 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
     again = read_judgement_results(folder)
     assert again is not None
     assert again.judgement.tables[1] == lower
+
+
+def _is_published(folder: Path, reports: Path) -> None:
+    """``sysid publish`` takes the run as it takes one of fits."""
+    results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    page = publish_run(folder, reports)
+    text = page.read_text(encoding="utf-8")
+    assert page == reports / "tanks" / "README.md"
+    for words in (
+        f"**{results['judgement']['headline']}**",
+        "- **Published.** lower at or below Table 1 on ",
+        "- **Weakness.** Of 4 random sequences ",
+        "| run | `sysid run tanks` |",
+        f"| published | `sysid publish {folder} --as tanks` |",
+        f"| commit | {results['environment']['commit']} |",
+        f"| data | tanks, SHA-256 {results['data']['digest']} |",
+    ):
+        assert words in text, words
+    named = set(re.findall(r"\]\(([^)]+\.svg)\)", text))
+    assert named
+    assert {file.name for file in page.parent.glob("*.svg")} == named
 
 
 def test_the_chosen_stage_is_the_best_on_the_selection_traces(workspace: Path) -> None:
