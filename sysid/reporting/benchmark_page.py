@@ -79,9 +79,7 @@ def _section(benchmark: Benchmark) -> list[str]:
         "run": f"`{benchmark.command}`",
         "date": readable(benchmark.created),
         "commit": machine(benchmark.environment)["commit"],
-        "load": "not recorded"
-        if benchmark.load is None
-        else f"{benchmark.load:.1f} of {benchmark.environment.get('cores', '?')} cores when it began",
+        "load": "not recorded" if benchmark.load is None else f"{benchmark.load:.1f} when it began",
         **{f"data: {escape(name)}": f"SHA-256 {digest}" for name, digest in benchmark.data.items()},
     }
     lines = [f"## {arrow(benchmark.title)}", ""]

@@ -11,8 +11,10 @@ from typing import Any
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.reporting import publish_run, publish_text, read_results
-from sysid.reporting.publication import MARK
+from sysid.reporting import publish_run, read_results
+from sysid.reporting.judgement import parse_judgement
+from sysid.reporting.judgement_report import JudgementResults, SceneRecord, SubjectRecord, write_judgement_results
+from sysid.reporting.markdown import MARK
 
 PAIR = ("ARX", "NARX free run")
 
@@ -79,25 +81,37 @@ def test_a_folder_of_somebody_else_is_left_alone(page: tuple[Path, Path], tmp_pa
     assert (tmp_path / "mine" / "README.md").read_text(encoding="utf-8") == "# My own words\n"
 
 
-def test_what_benchmarks_print_is_published_with_what_they_ran_on(tmp_path: Path) -> None:
-    path = publish_text(
-        "runtime",
-        tmp_path,
-        parts={"training": "one epoch  37 ms\n"},
-        commands=["python -m tests.benchmarks training"],
-        created="2026-11-21T04:00:00+0000",
-        environment={"cpu": "A", "cores": 2, "sysid": "0.1.0", "commit": "9ffa098", "packages": {"numpy": "2.4"}},
+def test_what_a_judge_said_is_published_in_the_same_way(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    said: dict[str, Any] = {"title": "Stops", "headline": "It stops <late>.", "sentences": ["By a little."]}
+    said["tables"] = [{"caption": "By scene", "head": [["scene", ""], ["late", "m"]], "rows": [["hill", 1.25]]}]
+    write_judgement_results(
+        folder,
+        JudgementResults(
+            kind="stops",
+            pipeline="stopping",
+            command="sysid run stopping",
+            created="2026-11-21T04:00:00+00:00",
+            environment={"commit": "9ffa098", "cpu": "A", "cores": 2},
+            data=SceneRecord(name="of the judge stops"),
+            subjects=[SubjectRecord(name="one", parts=["valve: fit a of run b"])],
+            judgement=parse_judgement(said, where="test"),
+        ),
     )
-    text = path.read_text(encoding="utf-8")
+    text = publish_run(folder, tmp_path / "reports").read_text(encoding="utf-8")
     for words in (
-        "| run | `python -m tests.benchmarks training` |",
+        "**It stops &lt;late>.**",
+        "- **one.** valve: fit a of run b",
+        "| run | `sysid run stopping` |",
+        f"| published | `sysid publish {folder} --as stopping` |",
         "| date | 21 November 2026, 04:00 UTC |",
+        "| seed | none |",
         "| commit | 9ffa098 |",
         "| machine | A, 2 cores |",
-        "| versions | sysid 0.1.0, numpy 2.4 |",
-        "## training\n\n```text\none epoch  37 ms\n```",
+        "| data | of the judge stops |",
+        "| scene | late (m) |\n| --- | --- |\n| hill | 1.25 |",
     ):
-        assert words in text
+        assert words in text, words
 
 
 def test_the_reports_of_this_repository_are_made_by_the_command() -> None:
