@@ -105,6 +105,7 @@ def _lagged(stage: Stage) -> dict[str, Any]:
         "neurons": cell.neurons,
         "adds": cell.adds,
         "weights": form.hidden_weights.T,
+        "gates": form.gates.T if cell.gated else [],
         "bias": cell.hidden_bias,
         "readout": cell.readout,
         "linear": form.linear,

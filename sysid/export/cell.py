@@ -17,6 +17,9 @@ from sysid.models.wiring import Ends, Member
 class Cell:
     r"""``y = clip(w x + c + V tanh(W x + b))`` in scaled numbers, with the regressors of each column side by side.
 
+    With gates each neuron of a single output multiplies a linear function: ``(v + G x) . tanh(W x + b)`` in place of
+    ``V tanh(W x + b)``.
+
     Args:
         ends: Names, units and values at rest of what goes in and comes out.
         lags: Lags of every input, then of every output.
@@ -25,6 +28,7 @@ class Cell:
         readout: ``V``, shape ``(n_outputs, n_neurons)``.
         constant: ``c``, shape ``(n_outputs,)``.
         linear: ``w``, shape ``(n_outputs, n_regressors)``; zeros where the model has no linear part.
+        gates: ``G``, shape ``(n_neurons, n_regressors)``; without rows where the neurons have no gates.
         offset: Of every column, in its unit.
         scale: Of every column, in its unit.
         low: Lower bound of the outputs in scaled numbers; ``-inf`` for none.
@@ -38,6 +42,7 @@ class Cell:
     readout: NDArray[np.float64]
     constant: NDArray[np.float64]
     linear: NDArray[np.float64]
+    gates: NDArray[np.float64]
     offset: tuple[float, ...]
     scale: tuple[float, ...]
     low: float
@@ -66,8 +71,8 @@ class Cell:
             )
         ends = Ends.of(model)
         m, k, n = len(ends.outputs), part.neurons, part.lags.n_regressors
-        cuts = np.cumsum([k * n, k, m * k, m])
-        hidden, bias, readout, constant, linear = np.split(part.theta, cuts)
+        cuts = np.cumsum([k * n, k, m * k, m, m * n if part.linear else 0])
+        hidden, bias, readout, constant, linear, gates = np.split(part.theta, cuts)
         return cls(
             ends=ends,
             lags=part.lags.inputs,
@@ -76,6 +81,7 @@ class Cell:
             readout=readout.reshape(m, k),
             constant=constant,
             linear=linear.reshape(m, n) if part.linear else np.zeros((m, n)),
+            gates=gates.reshape(k if part.gated else 0, n),
             offset=part.offset,
             scale=part.scale,
             low=part.low,
@@ -96,6 +102,11 @@ class Cell:
     def neurons(self) -> int:
         """Number of neurons."""
         return len(self.hidden_bias)
+
+    @property
+    def gated(self) -> bool:
+        """Whether the neurons have gates."""
+        return len(self.gates) > 0
 
     @property
     def adds(self) -> bool:

@@ -114,17 +114,20 @@ def _network(nodes: Nodes, cell: Cell, form: RateForm, z: str, *, keeps: bool) -
     """The network's sums; the remainder, last among the regressors, is added by a weight of one."""
     n = cell.n_outputs
     pad = 0 if form.inputs else 1  # the loop needs a row to run over
-    weights, linear = (
-        np.concatenate([np.zeros((len(table), pad)), table], axis=1) for table in (form.hidden_weights, form.linear)
-    )
+    wide = ((0, 0), (pad, n if keeps else 0))
+    weights, gates, linear = (np.pad(table, wide) for table in (form.hidden_weights, form.gates, form.linear))
     if keeps:
-        weights, linear = np.pad(weights, ((0, 0), (0, n))), np.concatenate([linear, np.eye(n)], axis=1)
+        linear[:, -n:] = np.eye(n)
     if cell.neurons:
         bias = nodes.numbers("b", cell.hidden_bias[:, np.newaxis])
-        hidden = nodes.add("Gemm", [nodes.numbers("W", weights), z, bias], "hidden_sum")
+        hidden = nodes.add("Tanh", [nodes.add("Gemm", [nodes.numbers("W", weights), z, bias], "hidden_sum")], "hidden")
+        readout = cell.readout
+        if cell.gated:
+            opened = nodes.add("Gemm", [nodes.numbers("G", gates), z, nodes.numbers("v", readout.T)], "gates")
+            hidden, readout = nodes.add("Mul", [hidden, opened], "behind_gates"), np.ones_like(readout)
         # Side by side, neurons and regressors reach the outputs in one product.
-        z = nodes.add("Concat", [nodes.add("Tanh", [hidden], "hidden"), z], "neurons_and_regressors", axis=0)
-        linear = np.concatenate([cell.readout, linear], axis=1)
+        z = nodes.add("Concat", [hidden, z], "neurons_and_regressors", axis=0)
+        linear = np.concatenate([readout, linear], axis=1)
     constant = nodes.numbers("c", cell.constant[:, np.newaxis])
     return nodes.add("Gemm", [nodes.numbers("V_and_w", linear), z, constant], "change")
 

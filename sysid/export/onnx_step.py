@@ -136,7 +136,12 @@ def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str |
     if cell.neurons:
         hidden = [nodes.numbers("W", form.hidden_weights[:, order].T), nodes.numbers("b", cell.hidden_bias)]
         neurons = nodes.add("Tanh", [nodes.add("Gemm", [terms, *hidden], "hidden_sum")], "hidden")
-        output = nodes.add("Gemm", [neurons, nodes.numbers("V", cell.readout.T), output], "network")
+        readout = cell.readout
+        if cell.gated:
+            slopes = [nodes.numbers("G", form.gates[:, order].T), nodes.numbers("v", cell.readout[0])]
+            neurons = nodes.add("Mul", [neurons, nodes.add("Gemm", [terms, *slopes], "gates")], "behind_gates")
+            readout = np.ones_like(readout)
+        output = nodes.add("Gemm", [neurons, nodes.numbers("V", readout.T), output], "network")
     lost = None
     if cell.adds:
         columns = nodes.integers([layout.column(cell.n_inputs + j, 1) for j in range(cell.n_outputs)])

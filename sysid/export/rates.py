@@ -50,6 +50,7 @@ class RateForm:
         inputs: The inputs' terms.
         outputs: The outputs' terms.
         hidden_weights: Shape ``(n_neurons, n_terms)``, inputs before outputs.
+        gates: Shape ``(n_neurons, n_terms)``, or without rows.
         linear: Shape ``(n_outputs, n_terms)``; of what is added to the last outputs where the cell ``adds``. Elsewhere
             the outputs' terms are levels, lest a number that is not be carried on.
     """
@@ -57,6 +58,7 @@ class RateForm:
     inputs: tuple[Term, ...]
     outputs: tuple[Term, ...]
     hidden_weights: NDArray[np.float64]
+    gates: NDArray[np.float64]
     linear: NDArray[np.float64]
 
     @classmethod
@@ -83,7 +85,8 @@ class RateForm:
             >>> form.linear.tolist()
             [[0.5, 0.0, 0.75]]
         """
-        table = np.concatenate([cell.hidden_weights, cell.linear])
+        table = np.concatenate([cell.hidden_weights, cell.gates, cell.linear])
+        first = len(cell.hidden_weights) + len(cell.gates)  # of the linear parts
         longest = max(max(own, default=0) for own in cell.lags[cell.n_inputs :])
         found: list[tuple[tuple[Term, ...], NDArray[np.float64]]] = []
         at = 0
@@ -97,7 +100,7 @@ class RateForm:
             used = tuple(range(1, longest + 1)) if output >= 0 and blocks else own
             weights = _weights(columns if used == own else _spread(columns, own, longest))
             if output >= 0:
-                row = len(cell.hidden_weights) + output
+                row = first + output
                 weights[row, 0] = fsum([*columns[row].tolist(), -1.0])  # rounded once: nearly everything cancels
             found.append((_terms(channel, used), weights))
         inputs, outputs = found[: cell.n_inputs], found[cell.n_inputs :]
@@ -111,7 +114,8 @@ class RateForm:
             inputs=tuple(term for own, _ in inputs for term in own),
             outputs=tuple(terms),
             hidden_weights=whole[: cell.neurons],
-            linear=whole[cell.neurons :],
+            gates=whole[cell.neurons : first],
+            linear=whole[first:],
         )
 
 

@@ -86,6 +86,7 @@ class StageStep(nn.Module):
     hidden_bias: Tensor
     readout: Tensor
     linear: Tensor
+    gates: Tensor
     constant: Tensor
 
     def __init__(self, stage: Stage, dtype: torch.dtype = torch.float64) -> None:
@@ -97,6 +98,7 @@ class StageStep(nn.Module):
             "hidden_bias": cell.hidden_bias,
             "readout": cell.readout.T,
             "linear": cell.linear.T,
+            "gates": cell.gates.T,
             "constant": cell.constant,
         }
         for name, values in numbers.items():
@@ -106,7 +108,7 @@ class StageStep(nn.Module):
         self.register_buffer("regressor_columns", torch.tensor(regressors))
         self.register_buffer("state_columns", torch.tensor(layout.next_columns()))
         self.first, self.size = int(stage.first), int(layout.size)
-        self.bounded, self.limited = stage.bounded, stage.limited
+        self.bounded, self.limited, self.gated = stage.bounded, stage.limited, cell.gated
         self.low, self.high = float(cell.low), float(cell.high)
         self.limits = Limits(stage)
 
@@ -126,6 +128,8 @@ class StageStep(nn.Module):
         x = torch.cat([scaled, state], dim=1).index_select(1, self.regressor_columns)
         hidden = torch.tanh(torch.addmm(self.hidden_bias, x, self.hidden_weights))
         total = torch.addmm(torch.addmm(self.constant, x, self.linear), hidden, self.readout)
+        if self.gated:
+            total = total + (hidden * (x @ self.gates)).sum(dim=1, keepdim=True)
         y = torch.clamp(total, self.low, self.high)
         outputs = y * self.output_scale + self.output_offset
         reached = torch.zeros_like(y[:, :1], dtype=torch.bool)

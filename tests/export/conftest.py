@@ -71,7 +71,8 @@ def build_narx(
     """A NARX network with random weights, shrunk until its free run forgets where it started."""
     rng = np.random.default_rng(seed)
     lags = structure.lags(n_inputs)
-    theta = rng.normal(size=parameter_count(lags, structure.neurons, linear=structure.feedthrough))
+    count = parameter_count(lags, structure.neurons, linear=structure.feedthrough, gated=structure.gated)
+    theta = rng.normal(size=count)
     theta *= gain / np.sqrt(len(theta))
     theta[structure.neurons * lags.n_regressors :] *= 2.0
     return NARXModel(
@@ -111,6 +112,10 @@ MODELS: dict[str, Callable[[], AbstractModel]] = {
     "NARX, delays per input": lambda: build_narx(NARX(input_delays=[[0], [1, 2, 4]], output_delays="1:2", neurons=5)),
     "NARX against its bounds": lambda: build_narx(
         NARX(input_delays=2, output_delays=2, neurons=8), clamp=0.1, gain=3.0, seed=5
+    ),
+    "NARX, gates": lambda: build_narx(NARX(input_delays="0:1", output_delays=1, neurons=6, gated=True)),
+    "NARX, gates, sparse lags": lambda: build_narx(
+        NARX(input_delays=[[0], [1, 2, 5]], output_delays=[2, 3], neurons=4, gated=True)
     ),
     "NARX without bounds": lambda: build_narx(NARX(input_delays=2, output_delays=2, neurons=5), clamp=float("inf")),
 }
@@ -232,6 +237,7 @@ FEW_MODELS = (
     "ARX, no input used",
     "NARX 4/4/20",
     "NARX, linear part alone",
+    "NARX, gates",
     "NARX against its bounds",
 )
 WRAPPED = ("fmi2", "fmi3", "torch-export")
@@ -312,7 +318,8 @@ def wired_narx(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) 
     rng = np.random.default_rng(seed)
     parsed = Mapping.parse(mapping)
     n_inputs = len(parsed.inputs)
-    theta = rng.normal(size=parameter_count(structure.lags(n_inputs), structure.neurons, linear=True))
+    count = parameter_count(structure.lags(n_inputs), structure.neurons, linear=True, gated=structure.gated)
+    theta = rng.normal(size=count)
     return NARXModel(
         network=structure,
         theta=theta * 0.4 / np.sqrt(len(theta)),
@@ -368,7 +375,7 @@ def build_cascade() -> Cascade:
     return Cascade(
         models=(
             wired_narx("STP+FLOW -> BP", NARX(input_delays="0:3", output_delays=[1, 2, 5], neurons=6), 1),
-            wired_narx("BP -> AR", NARX(input_delays=2, output_delays=3, neurons=4), 2),
+            wired_narx("BP -> AR", NARX(input_delays=2, output_delays=3, neurons=4, gated=True), 2),
             wired_narx(
                 "BP+AR+STP -> BC", NARX(input_delays=[[0], [1, 3], [2]], output_delays=2, neurons=5), 3, clamp=0.05
             ),

@@ -159,12 +159,16 @@ def test_the_same_model_gives_the_same_bytes_whatever_was_written_before(format_
 
 lag_sets = st.sets(st.integers(1, 6), min_size=1, max_size=3).map(sorted)
 input_lag_sets = st.sets(st.integers(0, 6), min_size=1, max_size=3).map(sorted)
-structures = st.builds(
-    NARX,
-    input_delays=st.lists(input_lag_sets, min_size=2, max_size=2),
-    output_delays=lag_sets,
-    neurons=st.integers(1, 4),
-    feedthrough=st.booleans(),
+kinds = {"feedthrough": st.booleans()}, {"gated": st.just(True)}
+structures = st.one_of(
+    st.builds(
+        NARX,
+        input_delays=st.lists(input_lag_sets, min_size=2, max_size=2),
+        output_delays=lag_sets,
+        neurons=st.integers(1, 4),
+        **kind,
+    )
+    for kind in kinds
 )
 
 
