@@ -24,7 +24,7 @@ LENGTHS = {
         "VAL05": 309.6,
     },
     "abdx-selection": {f"SEL{k:02d}": 500.0 for k in range(1, 13)},
-    "abdx-combined-selection": {f"SEL{k:02d}": 600.0 for k in range(1, 13)},
+    "abdx-combined-selection": {f"SEL{k:02d}": 1500.0 for k in range(1, 9)},
     "ab-linear": {"EST01": 2700.0, "VAL01": 2700.0, "VAL02": 420.0, "VAL03": 720.0, "VAL04": 620.0, "VAL05": 720.0},
     "ab-linear-selection": {f"SEL{k:02d}": 1500.0 for k in range(1, 5)},
 }
