@@ -85,7 +85,7 @@ def build(mapping: str, structure: NARX, seed: int) -> NARXModel:
     parsed = Mapping.parse(mapping)
     n_inputs = len(parsed.inputs)
     lags = structure.lags(n_inputs)
-    theta = rng.normal(size=parameter_count(lags, structure.neurons, linear=True))
+    theta = rng.normal(size=parameter_count(lags, structure.neurons, linear=True, gated=structure.gated))
     theta *= 0.4 / np.sqrt(len(theta))
     theta[structure.neurons * lags.n_regressors :] *= 2.0
     return NARXModel(

@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.export_sanitizers
 
-1,000 random sequences each over a single model, one with long lags, and a whole cascade, in double and float, in range
-and far out of it, with infinities and numbers that are not. Ends with an error if anything is found.
+1,000 random sequences each over a single model, one with long lags, one with gates, and a whole cascade, in double and
+float, in range and far out of it, with infinities and numbers that are not. Ends with an error if anything is found.
 """
 
 from __future__ import annotations
@@ -97,6 +97,9 @@ def main() -> None:
         Surrogate.of(build("BP+AR -> BC", NARX(input_delays=4, output_delays=4, neurons=20), 2), RANGES),
         Surrogate.of(
             build("STP -> BP", NARX(input_delays=[0, 1, 2, 64], output_delays=[1, 128], neurons=5), 2), RANGES
+        ),
+        Surrogate.of(
+            build("BP+AR -> BC", NARX(input_delays="0:1", output_delays=2, neurons=12, gated=True), 2), RANGES
         ),
         cascade(),
     ]
