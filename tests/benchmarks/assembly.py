@@ -1,7 +1,8 @@
 """Run time of cascades against the compiled reference: one car and fifty, 3 and 101 vehicles, warm and cold.
 
 Run with ``python -m tests.benchmarks assembly``. Not collected by pytest. The cascades have random weights of the size
-of fitted ones (their run time does not depend on the values). The same 2,000 s of command go into everything; each
+of fitted ones (their run time does not depend on the values); ``--line=runs/whole-train`` measures a fitted line of
+that run folder at every place too. The same 2,000 s of command go into everything; each
 figure is the median of repeats after one run that warms up. Beside the wall time stands the processor time of all
 threads: on a machine that others use, ratios of processor times are the ones that hold. Divided among cores they are a
 projection, that of a machine which is otherwise idle.
@@ -17,6 +18,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -34,6 +36,7 @@ from sysid.models import (
     parameter_count,
     simulate_family,
 )
+from sysid.workbench.assembly.runner import read_line
 
 DURATION, CARS, WORKERS = 2000.0, 50, 2
 ROWS = [[0, 90], [100, 84], [300, 90], [500, 70], [800, 90], [1100, 64.2], [1300, 90], [1700, 0], [1800, 90]]
@@ -146,6 +149,21 @@ def command() -> np.ndarray:
     return rows[np.searchsorted(rows[:, 0], times, side="right") - 1, 1][:, np.newaxis]
 
 
+def fitted_line(folder: Path, u: np.ndarray, large: Taken) -> None:
+    """A fitted line at every place, beside the reference of 101 vehicles; its handle never asks for an emergency."""
+    line, places = read_line(folder).line, np.arange(1.0, CARS + 1.0)
+    inputs = np.maximum(u, 64.2)
+    batch = taken(lambda: line.simulate(inputs, places, workers=WORKERS), 7)
+    print(f"\n{folder.name}, fitted: {line.n_parameters} parameters")
+    show(f"{folder.name}, {CARS} places, {WORKERS} threads", batch)
+    figures = {
+        "50 cars, 2,000 s, two cores": f"{batch.wall:.3f} s wall, {batch.processor:.3f} s processor over both",
+        "50 cars against the reference of 101 vehicles": ratio(large, batch, cores=WORKERS),
+    }
+    for what, figure in figures.items():
+        print(f"  {what:<48} {figure:<60} (target {TARGETS[what]})")
+
+
 def main() -> None:
     """Print a table, and each figure beside its target."""
     print(f"load before: {', '.join(f'{value:.1f}' for value in os.getloadavg())} on {os.cpu_count()} cores\n")
@@ -188,6 +206,8 @@ def main() -> None:
         }
         for what, figure in figures.items():
             print(f"  {what:<48} {figure:<60} (target {TARGETS[what]})")
+    for folder in (word.removeprefix("--line=") for word in sys.argv[1:] if word.startswith("--line=")):
+        fitted_line(Path(folder), u, large)
     print(f"\ncold, kernels compiled before: {cold(None)}")
     with tempfile.TemporaryDirectory() as cache:
         print(f"cold, first run on a machine: {cold(cache)}")
