@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,25 +19,13 @@ from sysid.reporting.sweep_record import SWEEP_FILE, SweepRecord, Trial
 from sysid.workbench.events import SweepReady
 from sysid.workbench.store import digest
 from sysid.workbench.tracked import key
+from sysid.workbench.tracked_fit import Entities
 
 SUMMARY = "summary"
 """Value of the tag ``kind`` of the run that has the figures."""
 
 PAGE = 1000
 """Runs that are asked for at a time."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Entities:
-    """Classes of the tracking tool.
-
-    Args:
-        metric: Of a name, a value, a time and a step.
-        param: Of a name and a text.
-    """
-
-    metric: Callable[..., Any]
-    param: Callable[..., Any]
 
 
 def experiment_name(record: SweepRecord) -> str:

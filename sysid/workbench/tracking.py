@@ -11,7 +11,6 @@ from __future__ import annotations
 import logging
 import os
 import tempfile
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,13 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filelock import FileLock
 from numpy.typing import NDArray
 
-from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.export import zip_bundle
-from sysid.workbench import tracked, views
+from sysid.workbench import tracked, tracked_fit, views
 from sysid.workbench.events import (
     BundleReady,
     DataLoaded,
@@ -40,18 +37,15 @@ from sysid.workbench.events import (
 from sysid.workbench.judgement.logged import log_judgement
 from sysid.workbench.naming import slug
 from sysid.workbench.registry import parsed, register
-from sysid.workbench.tracked_sweep import Entities, experiment_name, log_sweep
+from sysid.workbench.sqlite_store import SQLITE, held
+from sysid.workbench.tracked_fit import Entities
+from sysid.workbench.tracked_sweep import experiment_name, log_sweep
 
 KEY_TAG = "sysid.key"
 """Tag that holds the digest of everything a fit and its figures depend on."""
 
 SEQUENCE_FILE = "sequence.onnx"
 """The exported file that runs a whole record, which is what a caller of a tracked model wants."""
-
-SQLITE = "sqlite:///"
-
-MAX_METRICS = 1000
-"""Metrics that MLflow takes in one batch (``mlflow.utils.validation.MAX_METRICS_PER_BATCH``)."""
 
 QUIET = {
     "MLFLOW_DISABLE_TELEMETRY": "true",
@@ -96,13 +90,7 @@ def connect(uri: str) -> Any:
             logging.getLogger(name).setLevel(logging.WARNING)
         if not uri.startswith(SQLITE):
             return MlflowClient(uri)
-        # Processes that touch a new SQLite store at the same moment break each other's migrations (measured: 7 of 8
-        # failed), and so does one that is killed among them: it is made under another name, by one, and renamed.
-        database = Path(uri.removeprefix(SQLITE))
-        with FileLock(database.with_name(f"{database.name}.lock")):
-            if not database.exists():
-                with replacing(database) as draft:
-                    _make_store(draft)
+        with held(Path(uri.removeprefix(SQLITE)), _make_store):
             return MlflowClient(uri)
 
 
@@ -190,7 +178,7 @@ class Tracker:
         if self.client is None or self.run is None or self.data is None:
             return
         experiment = self._experiment(str(ready.fit.model.mapping))
-        known = self._known_run(experiment, ready)
+        known = tracked_fit.known_run(self.client, experiment, ready, key_tag=KEY_TAG)
         if known is not None and ready.stored:
             self.run_ids[ready.config.name] = known
             return
@@ -205,31 +193,20 @@ class Tracker:
         status = "FAILED"
         try:
             self._describe(experiment, run_id, ready)
-            self._log_values(run_id, ready)
+            tracked_fit.log_values(self.client, run_id, ready, self.run, _entities())
             self._log_data(run_id)
-            for name, picture in tracked.pictures(ready):
-                # Twice: the charts show pictures by key, and the page that compares runs those files that all of
-                # them have in their topmost folder.
-                self.client.log_image(run_id, picture, key=name, step=0)
-                self.client.log_image(run_id, picture, artifact_file=f"{name.replace('/', ' - ')}.png")
-            _show(self.client, experiment, [tracked.key(name) for name in ready.evaluation.cases])
+            tracked_fit.log_pictures(self.client, run_id, ready)
+            views.show(self.client, experiment, [tracked.key(name) for name in ready.evaluation.cases])
             status = "FINISHED"
         finally:
             self.client.set_terminated(run_id, status=status)
 
     def _describe(self, experiment: str, run_id: str, ready: FitReady, *, exported: bool = False) -> None:
-        """What the fit is, in words, with links to what belongs to it."""
-        if self.run is None:
-            return
-        here = f"#/experiments/{experiment}/runs"
-        links = {}
-        parent = self.run_ids.get(ready.config.initial or "")
-        if parent is not None:
-            links[f"started from {ready.config.initial}"] = f"{here}/{parent}"
-            self.client.set_tag(run_id, "initial_run", parent)
-        if exported:
-            links |= {words: f"{here}/{run_id}/artifacts/{words}" for words in ("bundle", "report")}
-        self.client.set_tag(run_id, "mlflow.note.content", tracked.description(ready, self.run, links))
+        if self.run is not None:
+            parent = self.run_ids.get(ready.config.initial or "")
+            tracked_fit.describe(
+                self.client, experiment, run_id, ready, self.run, initial_run=parent, exported=exported
+            )
 
     def _experiment(self, name: str) -> str:
         """The experiment of a mapping, made or brought back if need be."""
@@ -252,27 +229,6 @@ class Tracker:
         if found.lifecycle_stage == "deleted":
             self.client.restore_experiment(found.experiment_id)
         return str(found.experiment_id)
-
-    def _known_run(self, experiment: str, ready: FitReady) -> str | None:
-        """The run that tracks this very fit already; what a killed process left half logged is closed."""
-        found = self.client.search_runs([experiment], filter_string=f"tags.`{KEY_TAG}` = '{ready.key}'")
-        for run in found:
-            if run.info.status == "RUNNING":
-                self.client.set_terminated(run.info.run_id, status="KILLED")
-        return next((str(run.info.run_id) for run in found if run.info.status == "FINISHED"), None)
-
-    def _log_values(self, run_id: str, ready: FitReady) -> None:
-        from mlflow.entities import Metric, Param
-
-        if self.run is None:
-            return
-        now = int(time.time() * 1000)
-        values = [Metric(name, value, now, 0) for name, value in tracked.metrics(ready).items()]
-        values += [Metric("learning_curve_mse", mse, now, step) for step, mse in tracked.learning_curve(ready)]
-        params = [Param(name, value[:6000]) for name, value in tracked.parameters(ready, self.run).items()]
-        for first in range(0, len(values), MAX_METRICS):
-            batch = values[first : first + MAX_METRICS]
-            self.client.log_batch(run_id, metrics=batch, params=params if first == 0 else ())
 
     def _log_data(self, run_id: str) -> None:
         from mlflow.data.code_dataset_source import CodeDatasetSource
@@ -356,25 +312,16 @@ class Tracker:
         return {"u": columns[:, None, :], "state": np.zeros((1, state.type.tensor_type.shape.dim[1].dim_value))}
 
     def _log_judgement(self, ready: JudgementReady) -> None:
-        from mlflow.entities import Metric
-
         if self.client is None:
             self.client = connect(self.uri)
-        log_judgement(self.client, ready, key_tag=KEY_TAG, experiment=self._experiment(ready.kind), metric=Metric)
+        experiment, metric = self._experiment(ready.kind), _entities().metric
+        log_judgement(self.client, ready, key_tag=KEY_TAG, experiment=experiment, metric=metric)
 
     def _log_sweep(self, ready: SweepReady) -> None:
-        from mlflow.entities import Metric, Param
-
         if self.client is None:
             self.client = connect(self.uri)
         experiment = self._experiment(experiment_name(ready.record))
-        log_sweep(
-            self.client,
-            ready,
-            key_tag=KEY_TAG,
-            experiment=experiment,
-            entities=Entities(metric=Metric, param=Param),
-        )
+        log_sweep(self.client, ready, key_tag=KEY_TAG, experiment=experiment, entities=_entities())
 
     def _log_report(self, ready: ReportReady) -> None:
         run_id = self.run_ids.get(ready.of.config.name)
@@ -440,16 +387,11 @@ def _signature(network: Any) -> Any:
     return ModelSignature(inputs=schema(network.graph.input), outputs=schema(network.graph.output))
 
 
-def _show(client: Any, experiment: str, cases: list[str]) -> None:
-    """Let the page of an experiment show first what matters first, and all cases known so far."""
-    found = client.get_experiment(experiment)
-    known = [case for case in found.tags.get(views.CASES_TAG, "").split("|") if case]
-    both = list(dict.fromkeys([*known, *cases]))
-    value = views.view_tag(both, found.creation_time)
-    if both != known or found.tags.get(views.TAG) != value:
-        # A tag takes 5000 characters; a list of cases as long as that is not one that anybody looks through.
-        client.set_experiment_tag(experiment, views.CASES_TAG, "|".join(both)[: views.TAG_LIMIT])
-        client.set_experiment_tag(experiment, views.TAG, value)
+def _entities() -> Entities:
+    """The classes that those who may not import MLflow need of it."""
+    from mlflow.entities import Metric, Param
+
+    return Entities(metric=Metric, param=Param)
 
 
 def latest_experiment(uri: str) -> str | None:
@@ -468,5 +410,5 @@ def latest_experiment(uri: str) -> str | None:
         if not newest:
             return None
         # The page that is opened names the view, which an experiment made by other means has not got yet.
-        _show(client, newest[0].info.experiment_id, [])
+        views.show(client, newest[0].info.experiment_id, [])
         return str(newest[0].info.experiment_id)

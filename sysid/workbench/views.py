@@ -153,3 +153,21 @@ def _line(metric: str) -> dict[str, Any]:
 
 def _images(key: str) -> dict[str, Any]:
     return {"type": "IMAGE", "imageKeys": [key], "step": 0, "runsCountToCompare": 10}
+
+
+def show(client: Any, experiment: str, cases: Sequence[str]) -> None:
+    """Let the page of an experiment show first what matters first, and all cases known so far.
+
+    Args:
+        client: A client of the tracking store.
+        experiment: Its identifier.
+        cases: Names of cases that are new perhaps.
+    """
+    found = client.get_experiment(experiment)
+    known = [case for case in found.tags.get(CASES_TAG, "").split("|") if case]
+    both = list(dict.fromkeys([*known, *cases]))
+    value = view_tag(both, found.creation_time)
+    if both != known or found.tags.get(TAG) != value:
+        # A list of cases as long as a tag may be is not one that anybody looks through.
+        client.set_experiment_tag(experiment, CASES_TAG, "|".join(both)[:TAG_LIMIT])
+        client.set_experiment_tag(experiment, TAG, value)
