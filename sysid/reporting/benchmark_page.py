@@ -107,7 +107,7 @@ def _table(findings: Sequence[Finding]) -> list[str]:
         "target": [finding.target_text for finding in findings],
         "": [_WORDS[finding.met] if finding.met is not None else _open(finding) for finding in findings],
         "published": [finding.published for finding in findings],
-        "peer, same run": [finding.peer for finding in findings],
+        "peer": [finding.peer for finding in findings],
         "note": [finding.note for finding in findings],
     }
     filled = {name: texts for name, texts in columns.items() if any(texts)}

@@ -14,6 +14,7 @@ from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.reporting.numbers import number
 from sysid.reporting.results import Number
+from sysid.reporting.scores import Score
 
 FINDINGS_FILE: Final = "findings.json"
 """Beside the page of a published benchmark: the same figures for programs."""
@@ -77,6 +78,7 @@ class Benchmark(_Record):
     load: float | None = Field(default=None, description="Load of the machine when it began; 0 is an idle one.")
     data: dict[str, str] = Field(default={}, description="SHA-256 of each file or data set that it read, by name.")
     findings: list[Finding] = []
+    scores: list[Score] = Field(default=[], description="Errors by case of the peers' models, where it scored some.")
     printed: str = Field(default="", description="Everything that it printed.")
 
 

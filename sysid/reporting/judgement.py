@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sysid.errors import ConfigError
 from sysid.reporting.parts import Part, Section, identifier, picture
+from sysid.reporting.scores import Score
 from sysid.reporting.style import MARKERS, PALETTE, TARGET, new_figure, series_style, styled
 from sysid.reporting.tables import Cell, Table, figure_cell
 
@@ -67,6 +68,7 @@ class JudgementRecord(_Record):
     sentences: list[str] = []
     tables: list[TableRecord] = []
     charts: list[ChartRecord] = []
+    scores: list[Score] = Field(default=[], description="Errors by case of what was chosen, for a scorecard.")
     metrics: dict[str, dict[str, float]] = Field(default={}, description="By model, numbers to track with it.")
 
 

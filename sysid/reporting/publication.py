@@ -25,6 +25,7 @@ from sysid.reporting.markdown import (
 )
 from sysid.reporting.published import read_published
 from sysid.reporting.results import Results, read_results
+from sysid.reporting.scores import Score, score_of, write_scores
 from sysid.reporting.tables import scored_cases
 
 LEFT_OUT: Final = ("fit-", "frequency-response", "residuals")
@@ -36,6 +37,7 @@ class _Source:
     """What a page is made from: the report, and the drawings that belong into it."""
 
     document: Document
+    scores: list[Score]
     shown: Callable[[str], bool]
 
 
@@ -49,7 +51,7 @@ def publish_run(run_folder: Path, into: Path, *, name: str | None = None, worksp
         workspace: Where the user's own tables of published figures lie; ``None`` is the current folder.
 
     Returns:
-        The page, ``<into>/<name>/README.md``, with its figures beside it.
+        The page, ``<into>/<name>/README.md``, with its figures beside it, and ``scores.json`` for programs.
 
     Raises:
         ConfigError: If the folder holds no results, or there is another page of that name that is not ours.
@@ -65,6 +67,8 @@ def publish_run(run_folder: Path, into: Path, *, name: str | None = None, worksp
         draft.mkdir()
         text = _page(source, chosen, f"sysid publish {run_folder} --as {chosen}", draft)
         (draft / PAGE).write_text(text, encoding="utf-8", newline="\n")
+        if source.scores:
+            write_scores(draft, source.scores)
         if target.exists():
             target.rename(Path(scratch) / "before")
         draft.rename(target)
@@ -74,12 +78,14 @@ def publish_run(run_folder: Path, into: Path, *, name: str | None = None, worksp
 def _source(folder: Path, workspace: Path | None) -> _Source:
     judged = read_judgement_results(folder)
     if judged is not None:
-        return _Source(document=judgement_document(judged), shown=lambda _: True)
+        return _Source(document=judgement_document(judged), scores=judged.judgement.scores, shown=lambda _: True)
     stored = read_results(folder)
     published = None if stored.published is None else read_published(stored.published, workspace=workspace)
     results = with_published(stored, published)
     return _Source(
-        document=build_document(folder, results, published), shown=lambda drawing: _worst_case(drawing, results)
+        document=build_document(folder, results, published),
+        scores=score_of(results),
+        shown=lambda drawing: _worst_case(drawing, results),
     )
 
 

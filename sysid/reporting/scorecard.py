@@ -1,66 +1,129 @@
-"""A scorecard in Markdown: our free-run errors and the published ones, from the results of runs and not from memory.
+"""The scorecard: our errors, the published ones and the best peer's, from published reports and not from memory.
 
-``python -m sysid.reporting.scorecard runs/service-brake runs/combined-brake`` prints it.
+    python -m sysid.reporting.scorecard reports/service-brake reports/public-benchmarks [--into README.md]
+
+With ``--into`` it stands between the line ``<!-- scorecard: (the command) -->`` and ``<!-- end of the scorecard -->``.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
-from sysid.reporting.comparison import with_published
-from sysid.reporting.numbers import number, seconds
-from sysid.reporting.published import read_published
-from sysid.reporting.results import FitRecord, Results, read_results
+from sysid.atomic import replacing
+from sysid.errors import ConfigError
+from sysid.reporting.findings import FINDINGS_FILE, Finding, read_findings
+from sysid.reporting.markdown import escape, rows_lines
+from sysid.reporting.numbers import number
+from sysid.reporting.scores import SCORES_FILE, Score, read_scores
+
+PLACE: Final = re.compile(r"(<!-- scorecard: (?P<command>[^\n]*) -->\n).*?(<!-- end of the scorecard -->)", re.DOTALL)
 
 
-def scorecard(run_folders: Sequence[Path]) -> str:
-    """One table for each run: the chosen fit by case, with the published figure and the ratio of the two.
+def scorecard(folders: Sequence[Path]) -> str:
+    """Two tables: errors of the free run by case, and what benchmarks found beside published figures.
 
     Args:
-        run_folders: Folders of finished runs.
+        folders: Folders of published reports.
 
     Returns:
         Markdown.
 
     Raises:
-        ConfigError: If a folder holds no results.
+        ConfigError: If figures are damaged, or a folder has none.
     """
-    tables = []
-    for folder in run_folders:
-        stored = read_results(Path(folder))
-        table = None if stored.published is None else read_published(stored.published)
-        tables.append(_table(with_published(stored, table)))
-    return "\n\n".join(tables) + "\n"
+    ours: list[Score] = []
+    peers: list[Score] = []
+    findings: list[Finding] = []
+    for folder in map(Path, folders):
+        if (folder / FINDINGS_FILE).exists():
+            found = read_findings(folder)
+            findings += found.findings
+            peers += [score for benchmark in found.benchmarks for score in benchmark.scores]
+        if (folder / SCORES_FILE).exists() or not (folder / FINDINGS_FILE).exists():
+            ours += read_scores(folder)
+    tables = [_errors(ours, peers), _benchmarks(findings)]
+    return "\n\n".join("\n".join(table) for table in tables if table) + "\n"
 
 
-def _table(results: Results) -> str:
-    fit = results.best_fit or results.fits[0]
-    title = f"{fit.mapping.replace('->', '→')}, free-run mse [{fit.unit}²]"
-    rows = [
-        [title, *fit.cases, "training", f"{number(_simulated(fit))} s take"],
-        ["---"] * (len(fit.cases) + 3),
-        [
-            f"{fit.label}, {fit.loop.value} loop",
-            *(number(case.free_run.mse, missing="diverged") for case in fit.cases.values()),
-            seconds(fit.train_time_s),
-            seconds(max(fit.cases.values(), key=lambda case: case.simulated_s).run_time_s),
-        ],
-    ]
-    published = [(case.published or {}).get("free_run") for case in fit.cases.values()]
-    known = [figure for figure in published if figure is not None]
-    if known:
-        source = ", ".join(dict.fromkeys(f"{figure.source}: {figure.label}" for figure in known))
-        cells = ["" if figure is None else number(figure.value) for figure in published]
-        ratios = ["" if figure is None else number(figure.ratio, digits=2) for figure in published]
-        rows += [[f"published ({source})", *cells, "", ""], ["ours divided by it", *ratios, "", ""]]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+def place(text: str, path: Path) -> str:
+    """A page with the scorecard where it belongs.
+
+    Args:
+        text: The scorecard.
+        path: The page.
+
+    Returns:
+        The page's text.
+
+    Raises:
+        ConfigError: If the page has no place for it.
+    """
+    page = path.read_text(encoding="utf-8")
+    if PLACE.search(page) is None:
+        raise ConfigError(
+            "the page has no place for the scorecard",
+            where=path,
+            expected="<!-- scorecard: (the command) --> and <!-- end of the scorecard -->, on lines of their own",
+            got="no such lines",
+            remedy="add the two lines where it shall stand",
+        )
+    return PLACE.sub(lambda found: f"{found[1]}\n{text}\n{found[3]}", page)
 
 
-def _simulated(fit: FitRecord) -> float:
-    return max(case.simulated_s for case in fit.cases.values())
+def _errors(ours: Sequence[Score], peers: Sequence[Score]) -> list[str]:
+    """Three rows a mapping: ours, what is published, the best of the peers."""
+    if not ours:
+        return []
+    cases = list(dict.fromkeys(case for score in ours for case in score.mse))
+    rows = [["free run, mean squared error", *cases], ["---"] * (len(cases) + 1)]
+    for score in ours:
+        scale, squared = _scale(score), f"{score.unit}²"
+        unit = squared if scale == 1.0 else f"10⁻³ {squared}"
+        rows.append([f"**{escape(score.mapping)}** [{unit}]: {escape(score.model)}", *_cells(score.mse, cases, scale)])
+        if score.published:
+            rows.append([f"published ({escape(score.source)})", *_cells(score.published, cases, scale)])
+        rivals = [peer for peer in peers if (peer.mapping, peer.unit) == (score.mapping, score.unit)]
+        if rivals:
+            best = min(rivals, key=Score.typical)
+            rows.append([f"best of {len(rivals)} peers: {escape(best.model)}", *_cells(best.mse, cases, scale)])
+    return rows_lines(rows)
+
+
+def _scale(score: Score) -> float:
+    """Small errors are printed in thousandths."""
+    return 1.0 if score.typical(without=()) > 1.0 else 1e3
+
+
+def _cells(errors: dict[str, float], cases: Sequence[str], scale: float) -> list[str]:
+    return [number(scale * errors[case], missing="diverges") if case in errors else "" for case in cases]
+
+
+def _benchmarks(findings: Sequence[Finding]) -> list[str]:
+    """What has a target and stands beside others."""
+    kept = [one for one in findings if one.target is not None and (one.published or one.peer)]
+    if not kept:
+        return []
+    rows = [["benchmark", "ours", "published", "peer"], ["---"] * 4]
+    rows += [[escape(text) for text in (one.what, one.ours_text, one.published, one.peer)] for one in kept]
+    return rows_lines(rows)
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the scorecard, or write it into a page."""
+    folders = [Path(argument) for argument in arguments if not argument.startswith("--")]
+    pages = folders[-1:] if "--into" in arguments else []
+    text = scorecard([folder for folder in folders if folder not in pages])
+    for page in pages:
+        changed = place(text, page)
+        with replacing(page) as draft:
+            draft.write_text(changed, encoding="utf-8", newline="\n")
+    if not pages:
+        sys.stdout.write(text)
 
 
 if __name__ == "__main__":
-    sys.stdout.write(scorecard([Path(argument) for argument in sys.argv[1:]]))
+    main(sys.argv[1:])

@@ -19,6 +19,7 @@ import time
 from pathlib import Path
 
 from sysid.reporting.findings import Benchmark, Finding
+from sysid.reporting.scores import Score
 from tests.benchmarks._findings import FILE_VARIABLE
 
 HERE = Path(__file__).parent
@@ -89,6 +90,7 @@ def record(name: str, options: list[str]) -> Benchmark | None:
         load=load,
         data={key: digest for entry in said for key, digest in entry.get("data", {}).items()},
         findings=[Finding.model_validate(entry["finding"]) for entry in said if "finding" in entry],
+        scores=[Score.model_validate(entry["score"]) for entry in said if "score" in entry],
         printed="".join(lines),
     )
 

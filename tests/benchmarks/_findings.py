@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sysid.reporting.findings import Finding
+from sysid.reporting.scores import Score
 
 FILE_VARIABLE = "SYSID_FINDINGS"
 """Environment variable with the file that entries are added to; without it they are only printed."""
@@ -41,6 +42,15 @@ def read(name: str, digest: str) -> None:
         digest: Its SHA-256.
     """
     _keep({"data": {name: digest}})
+
+
+def scored(score: Score) -> None:
+    """Keep the errors of a peer's model by case.
+
+    Args:
+        score: The errors.
+    """
+    _keep({"score": score.model_dump(mode="json")})
 
 
 def _keep(entry: dict[str, Any]) -> None:

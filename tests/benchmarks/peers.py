@@ -39,8 +39,9 @@ import numpy as np
 from sysid.estimation import FitProgress, Training, fit_narx
 from sysid.ingest import load_dataset
 from sysid.models import NARX, Mapping
+from sysid.reporting.scores import Score
 from sysid.traces import Channel, Trace
-from tests.benchmarks._findings import found, read
+from tests.benchmarks._findings import found, read, scored
 
 PINNED = ("jax-sysid==1.1.0", "fastcan==0.6.0", "pyrenn==0.1")
 WORKER = Path(__file__).with_name("_peers_worker.py")
@@ -234,10 +235,17 @@ def judge(problem: Problem, learned: Learned, curves: list[tuple[np.ndarray, np.
     at_best = reached((learned.seconds, errors), best)
     undercut = statistics.median(reached(curve, best) for curve in curves)
     arrived = bool(np.isfinite(theirs))
-    unseen = [
-        f"{name} {value * problem.scale**2:.3g}" if np.isfinite(value) else f"{name} diverges"
-        for name, value in learned.unseen.items()
-    ]
+    elsewhere = {name: value * problem.scale**2 for name, value in learned.unseen.items()}
+    unseen = [f"{name} {value:.3g}" if np.isfinite(value) else f"{name} diverges" for name, value in elsewhere.items()]
+    if elsewhere:
+        scored(
+            Score(
+                mapping=str(problem.mapping),
+                unit=problem.trace.channel(problem.mapping.output).unit,
+                model=f"{learned.tool}, {cap:g} s of training on {problem.trace.name}",
+                mse={problem.trace.name: best, **elsewhere},
+            )
+        )
     found(
         f"{problem.name}: time of {learned.tool} to {problem.target:.3g} {problem.unit}, divided by ours",
         (theirs if arrived else cap) / ours,

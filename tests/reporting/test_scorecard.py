@@ -1,32 +1,88 @@
-"""The scorecard: what it prints is what the run stored."""
+"""The scorecard: what it prints is what published reports hold, and the README holds what it prints."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.reporting import publish_benchmarks, publish_run, read_results
+from sysid.reporting.findings import Benchmark, Finding
 from sysid.reporting.numbers import number
-from sysid.reporting.results import read_results
-from sysid.reporting.scorecard import scorecard
+from sysid.reporting.scorecard import main, place, scorecard
+from sysid.reporting.scores import Score, read_scores
+
+ROOT = Path(__file__).resolve().parents[2]
+NAN = float("nan")
 
 
-def test_every_figure_of_the_chosen_fit_stands_under_its_case(make_run: Callable[..., Path], tmp_path: Path) -> None:
-    folder = make_run(tmp_path / "run", samples=200, names=("ARX", "NARX free run"))
-    fit = read_results(folder).best_fit
-    assert fit is not None
-    head, _, ours = ([cell.strip() for cell in line.split("|")[1:-1]] for line in scorecard([folder]).splitlines())
-    for case, record in fit.cases.items():
-        assert ours[head.index(case)] == number(record.free_run.mse)
-    assert ours[0] == "NARX 4/4/20, closed loop"
+def rows(text: str) -> list[list[str]]:
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line]
 
 
-def test_published_figures_stand_below_with_the_ratio(
-    make_run: Callable[..., Path], workspace: Path, tmp_path: Path, monkeypatch
-) -> None:
+@pytest.fixture
+def report(make_run: Callable[..., Path], workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A published run with published figures, and the run beside it."""
     monkeypatch.chdir(workspace)
-    folder = make_run(
+    run = make_run(
         tmp_path / "run", samples=200, names=("ARX", "NARX free run"), edit=lambda run: run.update(published="tanks")
     )
-    text = scorecard([folder, folder])
-    assert text.count("| published (Table 1: NARX 4/4/20, best)") == 2
-    assert text.count("| ours divided by it |") == 2
+    return publish_run(run, tmp_path / "reports").parent
+
+
+def test_ours_and_the_published_figures_stand_under_their_cases(report: Path, tmp_path: Path) -> None:
+    fit = read_results(tmp_path / "run").best_fit
+    assert fit is not None
+    head, _, ours, published = rows(scorecard([report]))
+    assert ours[0].startswith("**pump+valve → level** [10⁻³ psi²]: NARX 4/4/20, trained in closed loop")
+    for case, record in fit.cases.items():
+        assert ours[head.index(case)] == number(1e3 * record.free_run.mse)
+    assert published[0] == "published (Table 1: NARX 4/4/20, best)"
+    assert published[head.index("VAL01")] == number(1e3 * read_scores(report)[0].published["VAL01"])
+
+
+def test_the_best_peer_is_the_one_with_the_least_geometric_mean_that_never_diverges(
+    report: Path, tmp_path: Path
+) -> None:
+    peers = [
+        Score(mapping="pump+valve -> level", unit="psi", model=model, mse={"EST01": 1.0, "VAL01": a, "VAL02": b})
+        for model, a, b in (("lucky once", 1e-6, NAN), ("steady", 0.1, 0.4), ("worse", 1.0, 0.5))
+    ]
+    other = Score(mapping="pump+valve -> level", unit="bar", model="of another unit", mse={"VAL01": 1e-9})
+    benchmark = Benchmark(title="Peers", command="peers", scores=[*peers, other])
+    folder = publish_benchmarks("peers", tmp_path / "reports", [benchmark]).parent
+    last = rows(scorecard([report, folder]))[-1]
+    assert last[0] == "best of 3 peers: steady"
+    assert last[2:4] == ["100", "400"]
+
+
+def test_benchmarks_stand_beside_what_others_have(tmp_path: Path) -> None:
+    findings = [
+        Finding(what="Tanks", ours=0.276, unit="V", target=0.3, published="0.306 (best)", peer="0.285"),
+        Finding(what="without a target", ours=1.0, published="2"),
+        Finding(what="without others", ours=1.0, target=2.0),
+    ]
+    benchmark = Benchmark(title="Public", command="public", findings=findings)
+    folder = publish_benchmarks("public", tmp_path, [benchmark]).parent
+    assert rows(scorecard([folder]))[2:] == [["Tanks", "0.276 V", "0.306 (best)", "0.285"]]
+
+
+def test_it_goes_between_its_two_lines(report: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("Before\n<!-- scorecard: here -->\nold\n<!-- end of the scorecard -->\nAfter\n", encoding="utf-8")
+    main([str(report), "--into", str(page)])
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("Before\n<!-- scorecard: here -->\n\n| free run")
+    assert text.endswith("\n\n<!-- end of the scorecard -->\nAfter\n")
+    assert "old" not in text
+    assert place(scorecard([report]), page) == text
+    page.write_text("Nothing\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="no place for the scorecard"):
+        main([str(report), "--into", str(page)])
+
+
+def test_a_report_without_figures_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="scores of the report cannot be read"):
+        scorecard([tmp_path])
