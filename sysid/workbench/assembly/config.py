@@ -138,6 +138,7 @@ class StressConfig(BaseModel):
         data: Data set with the sequences.
         output: Output that is judged.
         within: Root mean square error in its unit that a sequence should stay under.
+        states: Name of an annotator, for errors state by state.
     """
 
     model_config = STRICT
@@ -145,6 +146,7 @@ class StressConfig(BaseModel):
     data: str
     output: str
     within: float = Field(gt=0.0)
+    states: str | None = None
 
 
 class GrowConfig(BaseModel):

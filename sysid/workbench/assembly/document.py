@@ -16,7 +16,7 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.stress import Stress
-from sysid.workbench.assembly.views import growth_chart, growth_table, line_chart, line_point, line_table
+from sysid.workbench.assembly.views import growth_chart, growth_table, line_chart, line_point, line_table, stress_tables
 
 COLUMNS = 300
 """Width of the charts in points: enough for the eye, and a page of some hundred kilobytes."""
@@ -38,6 +38,7 @@ class Outcome:
         timing: Seconds of a free run of the whole by case.
         cases: The cases.
         stressed: What came of the random sequences.
+        worst: The sequences that the whole did worst on, for their charts.
         growth: What growing the training data brought, if it was asked for.
         line: How the places do between those that are modelled, if they were asked for.
     """
@@ -50,6 +51,7 @@ class Outcome:
     timing: Mapping[str, float]
     cases: Sequence[Trace]
     stressed: Stress | None
+    worst: Sequence[Trace] = ()
     growth: Sequence[Growth] = ()
     line: LineScores | None = None
 
@@ -69,7 +71,7 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
     if found.line is not None:
         tables += [line_table(found.line, output) for output in found.line.mse]
     if found.stressed is not None:
-        tables.append(_stress_table(found.stressed))
+        tables += stress_tables(found.stressed)
     tables += [growth_table(one) for one in found.growth]
     tables.append(_time_table(found.timing, found.cases))
     return {
@@ -88,7 +90,9 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
             *(_chart(whole, trace, name) for name in config.outputs for trace in found.cases),
             *([] if found.line is None else [line_chart(found.line, name) for name in found.line.mse]),
             *map(growth_chart, found.growth),
+            *([] if found.stressed is None else [_chart(whole, one, found.stressed.output) for one in found.worst]),
         ],
+        "scores": [_score(config, name, found) for name in config.outputs],
         "metrics": {
             stage: {f"{output}/{case}/mse": value for output, by in scores.items() for case, value in by.items()}
             for stage, scores in found.stages.items()
@@ -132,6 +136,19 @@ def _points(config: AssemblyConfig, found: Outcome) -> list[tuple[str, str]]:
     return points
 
 
+def _score(config: AssemblyConfig, output: str, found: Outcome) -> dict[str, Any]:
+    """The errors of an output by case, for a scorecard."""
+    whole, published = found.whole, config.published.get(output)
+    return {
+        "mapping": f"{'+'.join(whole.inputs)} -> {output}",
+        "unit": found.cases[0].channel(output).unit,
+        "model": f"{len(whole.models)} models as one, {whole.n_parameters} parameters",
+        "mse": dict(found.stages[found.chosen][output]),
+        "published": {} if published is None else dict(published.mse),
+        "source": "" if published is None else published.source,
+    }
+
+
 def _spread(output: str, by_case: Mapping[str, float]) -> str:
     low, high = min(by_case, key=lambda case: by_case[case]), max(by_case, key=lambda case: by_case[case])
     return f"{output} between {number(by_case[low])} ({low}) and {number(by_case[high])} ({high})"
@@ -173,21 +190,6 @@ def _stage_table(config: AssemblyConfig, output: str, found: Outcome) -> dict[st
 
 def _share(value: float | None, target: float) -> float | None:
     return None if value is None else value * target
-
-
-def _stress_table(found: Stress) -> dict[str, Any]:
-    rows: list[list[Any]] = [
-        [f"{100.0 * q:g} % of the sequences at most", value] for q, value in found.quantiles.items()
-    ]
-    rows.append([f"share of sequences under {found.limit:g}", found.within])
-    rows.append(["sequences that diverged", float(found.lost)])
-    rows += [[f"worst: {name}", value] for name, value in found.worst]
-    return {
-        "caption": f"{found.output} on {found.sequences} random sequences of the reference",
-        "head": [["", ""], ["Root mean square error", "in its unit"]],
-        "rows": rows,
-        "note": "A sequence diverged if a network was held at its bound, far outside what it was trained on.",
-    }
 
 
 def _time_table(timing: Mapping[str, float], cases: Sequence[Trace]) -> dict[str, Any]:

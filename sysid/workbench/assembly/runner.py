@@ -26,13 +26,14 @@ from sysid.reporting.judgement_report import (
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation import evaluate_cascade
 from sysid.workbench import events
+from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
 from sysid.workbench.assembly.document import Outcome, document
 from sysid.workbench.assembly.growth import Growth, Round, grow
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.members import Members, assembled, own_traces, whole_score, written
 from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
-from sysid.workbench.assembly.stress import stress
+from sysid.workbench.assembly.stress import Stress, stress
 from sysid.workbench.environment import environment
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.record import is_final, read_fit, write_fit
@@ -355,20 +356,15 @@ class _Run:
         chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
         whole = self.stages[chosen]
         write_json(self.store.path / "assembly.json", whole.to_dict())
-        stressed = None
-        if config.stress is not None:
-            step, sequences = "Running the whole on random sequences", self._load(config.stress.data)
-            self._tell(events.StepStarted(step=step))
-            stressed = stress(whole, tuple(sequences), config.stress.output, config.stress.within)
-            detail = f"{stressed.lost} of {stressed.sequences} diverged, {100 * stressed.within:.3g} % within"
-            self._tell(events.StepDone(step=step, stored=False, detail=detail))
+        stressed, worst = self._stressed(whole)
         line = self._line(whole)
         self._export(whole, cases, evaluate_cascade(whole, cases))
         said = document(
             config,
             Outcome(
                 whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.notes,
-                timing=timing[chosen], cases=tuple(cases), stressed=stressed, growth=tuple(self.growth), line=line,
+                timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst, growth=tuple(self.growth),
+                line=line,
             ),
         )  # fmt: skip
         results = JudgementResults(
@@ -389,6 +385,19 @@ class _Run:
         )
         write_judgement_results(self.store.path, results)
         return results
+
+    def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...]]:
+        """What came of the random sequences, and those that the whole did worst on."""
+        asked = self.config.stress
+        if asked is None:
+            return None, ()
+        annotator = None if asked.states is None else find_annotator(asked.states, where="stress, states")
+        step, sequences = "Running the whole on random sequences", self._load(asked.data)
+        self._tell(events.StepStarted(step=step))
+        found = stress(whole, tuple(sequences), asked.output, asked.within, annotator=annotator)
+        detail = f"{found.lost} of {found.sequences} diverged, {100 * found.within:.3g} % within"
+        self._tell(events.StepDone(step=step, stored=False, detail=detail))
+        return found, tuple(sequences[name] for name, _ in found.worst)
 
     def _line(self, whole: Cascade) -> LineScores | None:
         asked = self.config.line

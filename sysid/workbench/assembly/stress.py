@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.models import Cascade
 from sysid.traces import Trace
+from sysid.workbench.annotation import Annotator
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
 WORST = 10
@@ -27,6 +29,8 @@ class Stress:
         within: The share of sequences under the limit.
         limit: The limit, in the output's unit.
         worst: Names of the sequences with the largest errors, the worst first, and their errors.
+        by_state: Root mean square error over the samples of a state in a sequence, by state and by quantile over the
+            sequences that are in it; empty without states.
     """
 
     output: str
@@ -36,6 +40,7 @@ class Stress:
     within: float
     limit: float
     worst: tuple[tuple[str, float], ...]
+    by_state: dict[str, dict[float, float]] = field(default_factory=dict)
 
 
 def stress(
@@ -44,6 +49,8 @@ def stress(
     output: str,
     limit: float,
     report: Callable[[int], None] = lambda _: None,
+    *,
+    annotator: Annotator | None = None,
 ) -> Stress:
     """Run a cascade over sequences of the reference.
 
@@ -53,14 +60,20 @@ def stress(
         output: Output that is judged.
         limit: Root mean square error that a sequence should stay under, in its unit.
         report: Told how many are done.
+        annotator: Says in which state each sample of a sequence is; ``None`` for no figures by state.
 
     Returns:
         What came of it.
     """
     errors, lost = np.empty(len(traces)), 0
+    states: dict[str, list[float]] = {}
     for i, trace in enumerate(traces):
         run = cascade.simulate_trace(trace)
-        errors[i] = np.sqrt(np.mean((run[output] - trace[output]) ** 2))
+        squared = (run[output] - trace[output]) ** 2
+        errors[i] = np.sqrt(np.mean(squared))
+        if annotator is not None:
+            for label, error in _by_state(squared, trace, annotator):
+                states.setdefault(label, []).append(error)
         lost += any(one.lost > 0 for one in run.activity.values()) or not np.isfinite(errors[i])
         report(i + 1)
     order = np.argsort(-np.nan_to_num(errors, nan=np.inf))
@@ -72,4 +85,13 @@ def stress(
         within=float(np.mean(errors < limit)),
         limit=limit,
         worst=tuple((traces[i].name, float(errors[i])) for i in order[:WORST]),
+        by_state={label: {q: float(np.quantile(found, q)) for q in QUANTILES} for label, found in states.items()},
     )
+
+
+def _by_state(squared: NDArray[np.float64], trace: Trace, annotator: Annotator) -> Iterator[tuple[str, float]]:
+    """Root mean square error over the samples of each state that a sequence is in."""
+    numbers = annotator(trace)[annotator.channel].astype(np.int64)
+    counts, sums = np.bincount(numbers), np.bincount(numbers, weights=squared)
+    for number in np.flatnonzero(counts):
+        yield annotator.labels[number], float(np.sqrt(sums[number] / counts[number]))

@@ -1,4 +1,4 @@
-"""Growth and line as tables, charts and points of the report."""
+"""Stress, growth and line as tables, charts and points of the report."""
 
 from __future__ import annotations
 
@@ -9,6 +9,43 @@ import numpy as np
 from sysid.reporting.numbers import number, seconds
 from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.line import LineScores
+from sysid.workbench.assembly.stress import Stress
+
+
+def stress_tables(found: Stress) -> list[dict[str, Any]]:
+    """What came of the random sequences, and state by state where there are states.
+
+    Args:
+        found: What came of them.
+
+    Returns:
+        One or two tables, as :class:`sysid.reporting.judgement.TableRecord` has them.
+    """
+    rows: list[list[Any]] = [
+        [f"{100.0 * q:g} % of the sequences at most", value] for q, value in found.quantiles.items()
+    ]
+    rows.append([f"share of sequences under {found.limit:g}", found.within])
+    rows.append(["sequences that diverged", float(found.lost)])
+    rows += [[f"worst: {name}", value] for name, value in found.worst]
+    tables: list[dict[str, Any]] = [
+        {
+            "caption": f"{found.output} on {found.sequences} random sequences of the reference",
+            "head": [["", ""], ["Root mean square error", "in its unit"]],
+            "rows": rows,
+            "note": "A sequence diverged if a network was held at its bound, far outside what it was trained on.",
+        }
+    ]
+    if found.by_state:
+        tables.append(
+            {
+                "caption": f"{found.output} on the random sequences, state by state",
+                "head": [["State", ""], *([f"{100.0 * q:g} % at most", "rms"] for q in found.quantiles)],
+                "rows": [[label, *by.values()] for label, by in found.by_state.items()],
+                "note": "Root mean square error over the samples of a state in a sequence, in the output's unit; "
+                "quantiles over the sequences that are in the state.",
+            }
+        )
+    return tables
 
 
 def growth_table(grown: Growth) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.members import assembled, in_place, own_traces, simulated_inputs, whole_score
 from sysid.workbench.assembly.stages import choose_together
 from sysid.workbench.assembly.stress import stress
+from sysid.workbench.assembly.views import stress_tables
 from sysid.yaml_files import check, parse_yaml
 from tests.models.cascades import network
 from tests.workbench.assembly.conftest import PIPELINE
@@ -111,6 +112,31 @@ def test_stress_counts_what_is_lost_and_names_the_worst():
     assert found.quantiles[1.0] == pytest.approx(max(errors))
     assert found.worst[0][1] == pytest.approx(max(errors))
     assert len(found.worst) == 10
+
+
+class Halves:
+    """An annotator: the first half of a trace is one state, the second another; a third never occurs."""
+
+    channel, labels = "state", ("early", "never", "late")
+
+    def __call__(self, trace: Trace) -> Trace:
+        numbers = np.repeat([0.0, 2.0], len(trace) // 2)
+        channels = (*trace.channels, Channel(name="state", unit="1"))
+        return replace(trace, channels=channels, values=np.column_stack([trace.values, numbers]))
+
+
+def test_stress_says_what_the_errors_of_each_state_are():
+    whole = assembled(config(), models())
+    sequences = [trace(seed=s) for s in range(5)]
+    found = stress(whole, sequences, "AR", 1.0, annotator=Halves())
+    halves = [((whole.simulate_trace(t)["AR"] - t["AR"]) ** 2).reshape(2, -1).mean(axis=1) ** 0.5 for t in sequences]
+    for label, errors in zip(("early", "late"), np.transpose(halves), strict=True):
+        assert found.by_state[label][0.5] == pytest.approx(np.median(errors))
+        assert found.by_state[label][1.0] == pytest.approx(errors.max())
+    assert "never" not in found.by_state
+    plain, by_state = stress_tables(found)
+    assert [row[0] for row in by_state["rows"]] == ["early", "late"]
+    assert stress_tables(stress(whole, sequences, "AR", 1.0)) == [plain]
 
 
 @pytest.mark.parametrize(
