@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "any_sums": any(stage["adds"] for stage in stages),
         "rest_lines": _rest_lines(surrogate),
         "rest_spaces": _rest_spaces(surrogate),
+        "late": [{**asdict(late), "name": surrogate.channels[late.column].name} for late in surrogate.late],
         "levels": [level_text(surrogate, port.level) for port in surrogate.channels],
         "levels_in_words": [_words(port.level) for port in surrogate.channels],
     }
@@ -92,13 +94,17 @@ def _side(surrogate: Surrogate, side: Side) -> dict[str, Any]:
 def _lagged(stage: Stage) -> dict[str, Any]:
     cell, layout = stage.lagged
     form = RateForm.of(cell)
-    used = [bool(line.length) or 0 in own for line, own in zip(layout.inputs, cell.lags, strict=False)]
+    late = [source > stage.targets[-1] for source in stage.sources]
+    used = [
+        not later and (bool(line.length) or 0 in own)
+        for later, line, own in zip(late, layout.inputs, cell.lags, strict=False)
+    ]
 
     def sample(channel: int, lag: int) -> str:
         return f"past[{layout.lines[channel].column(lag)}]" if lag else f"u{channel}"
 
     terms = (*form.inputs, *form.outputs)
-    newest = [f"u{i}" for i in range(cell.n_inputs)] + [f"y[{j}]" for j in range(cell.n_outputs)]
+    newest = ["" if later else f"u{i}" for i, later in enumerate(late)] + [f"y[{j}]" for j in range(cell.n_outputs)]
     return {
         "kind": "lagged",
         "n": len(terms),

@@ -12,14 +12,13 @@ from typing import Any
 from onnx import TensorProto, helper
 
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.onnx_step import ends
+from sysid.export.onnx_step import ends, within_a_body
 from sysid.export.surrogate import Surrogate
 
 CELLS = 25_600
 """Samples times cars of a block."""
 LEAST = 64
 """Samples of a block at least, however many cars there are."""
-_ENDS = ("u", "state", "y", "state_out", "flags")
 
 
 def in_blocks(surrogate: Surrogate, nodes: Nodes) -> Any:
@@ -61,11 +60,7 @@ def _sequence(nodes: Nodes, name: str, kind: int) -> str:
 
 def _body(surrogate: Surrogate, nodes: Nodes, size: str, kinds: dict[str, int]) -> Any:
     """One block: its samples in, its outputs at the end of what the blocks before it gave."""
-    own = {name: f"block_{name}" for name in _ENDS}
-    for node in nodes.nodes:
-        for names in (node.input, node.output):
-            names[:] = [own.get(name, name) for name in names]
-    inner = nodes.within("block_")
+    inner = within_a_body(nodes, "block_")
     first = inner.add("Mul", ["block", size], "first")
     span = [first, inner.add("Add", [first, size], "stop"), inner.integers([0])]
     inner.add("Slice", ["u", *span], "u")

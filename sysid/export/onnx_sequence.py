@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
-from onnx import numpy_helper
+from onnx import helper, numpy_helper
 
 from sysid.export.cell import Cell, LinearCell
 from sysid.export.flags import Flag
@@ -24,7 +24,17 @@ from sysid.export.layout import DelayLine
 from sysid.export.onnx_blocks import in_blocks
 from sysid.export.onnx_body import Body, clip_range, lagged_body, limit_name, linear_body, scanned_limits
 from sysid.export.onnx_nodes import TO_END, Nodes
-from sysid.export.onnx_step import INT32, Made, held_outputs, join_states, stage_part, stage_state
+from sysid.export.onnx_step import (
+    INT32,
+    Made,
+    ends,
+    held_outputs,
+    join_states,
+    stage_part,
+    stage_state,
+    step_nodes,
+    within_a_body,
+)
 from sysid.export.rates import RateForm, Term
 from sysid.export.surrogate import Stage, Surrogate
 
@@ -34,7 +44,8 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
 
     Inputs ``u (time, batch, n_inputs)`` in units and ``state (batch, n_state)``; outputs ``y (time, batch,
     n_outputs)`` in their units, ``state_out (batch, n_state)``, so that a run in pieces equals one long run, and
-    ``flags (time, batch, 1)``. Each stage of a cascade runs over all samples before the next one does.
+    ``flags (time, batch, 1)``. Each stage of a cascade runs over all samples before the next one does; where models
+    read each other in a circle, the whole step is the body of one loop.
 
     Args:
         surrogate: What to write.
@@ -43,6 +54,8 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     Returns:
         The ``GraphProto``.
     """
+    if surrogate.late:
+        return _step_after_step(surrogate, dtype)
     nodes = Nodes(dtype)
     inputs = _channels(nodes, "u", [f"u{i}" for i in range(len(surrogate.inputs))])
     known, made = list(inputs), []
@@ -56,6 +69,16 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     join_states(nodes, made)
     _flags(nodes, surrogate, inputs, made)
     return in_blocks(surrogate, nodes)
+
+
+def _step_after_step(surrogate: Surrogate, dtype: DTypeLike) -> Any:
+    """A loop over the samples around the graph of a step."""
+    step = within_a_body(step_nodes(surrogate, dtype), "step_")
+    (u, state), (y, state_out, flags) = ends(step, surrogate, ["batch"])
+    body = step.graph("one_step", [state, u], [state_out, y, flags])
+    nodes, outputs = Nodes(dtype), ["state_out", "y", "flags"]
+    nodes.nodes.append(helper.make_node("Scan", ["state", "u"], outputs, name="loop", body=body, num_scan_inputs=1))
+    return nodes.graph("sequence", *ends(nodes, surrogate, ["time", "batch"]))
 
 
 class _Sequence:

@@ -43,7 +43,21 @@ class Made:
 
 
 def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
-    """The graph of one step.
+    """The graph of one step; see :func:`step_nodes`.
+
+    Args:
+        surrogate: What to write.
+        dtype: Of the numbers.
+
+    Returns:
+        The ``GraphProto``.
+    """
+    nodes = step_nodes(surrogate, dtype)
+    return nodes.graph("step", *ends(nodes, surrogate, ["batch"]))
+
+
+def step_nodes(surrogate: Surrogate, dtype: DTypeLike) -> Nodes:
+    """The nodes of one step.
 
     Inputs ``u (batch, n_inputs)`` in units and ``state (batch, n_state)``; outputs ``y (batch, n_outputs)`` in their
     units, ``state_out (batch, n_state)`` and ``flags (batch, 1)``.
@@ -53,7 +67,7 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         dtype: Of the numbers.
 
     Returns:
-        The ``GraphProto``.
+        The nodes, from ``u`` and ``state`` to the outputs.
     """
     nodes = Nodes(dtype)
     known, made = "u", []
@@ -61,17 +75,36 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         part = stage_part(nodes, surrogate, k)
         inputs = known
         n_known = stage.targets[0]
-        if stage.sources != tuple(range(n_known)):
-            inputs = part.add("Gather", [known, nodes.integers(list(stage.sources))], "u", axis=-1)
+        if stage.known_sources != tuple(range(n_known)):
+            inputs = part.add("Gather", [known, nodes.integers(list(stage.known_sources))], "u", axis=-1)
         add_stage = _linear_stage if isinstance(stage.cell, LinearCell) else _stage
         one = add_stage(part, stage, inputs, *stage_state(part, surrogate, stage))
         made.append(_within_limits(part, stage, one, known))
         if k + 1 < len(surrogate.stages):
             known = part.add("Concat", [known, made[-1].outputs], "known", axis=-1)
     nodes.add("Concat", [one.outputs for one in made], "y", axis=-1)
-    join_states(nodes, made)
+    _late(nodes, surrogate, join_states(nodes, made, "state_out" if not surrogate.late else "state_before_late"))
     _flags(nodes, surrogate, made)
-    return nodes.graph("step", *ends(nodes, surrogate, ["batch"]))
+    return nodes
+
+
+def _late(nodes: Nodes, surrogate: Surrogate, state: str) -> None:
+    """Put what was computed after it was read into the next state."""
+    late = surrogate.late
+    if not late:
+        return
+    channels = nodes.add("Concat", ["u", "y"], "channels", axis=-1)
+    values = nodes.add("Gather", [channels, nodes.integers([one.column for one in late])], "late", axis=-1)
+    offset, scale = (
+        nodes.numbers(f"late_{side}", [getattr(one, side) for one in late]) for side in ("offset", "scale")
+    )
+    scaled = nodes.add("Div", [nodes.add("Sub", [values, offset], "late_centred"), scale], "late_scaled")
+    size = surrogate.state_length(nodes.dtype)
+    columns = list(range(size))
+    for i, one in enumerate(late):
+        columns[one.place] = size + i
+    both = nodes.add("Concat", [state, scaled], "state_and_late", axis=-1)
+    nodes.add("Gather", [both, nodes.integers(columns)], "state_out", axis=-1)
 
 
 def stage_part(nodes: Nodes, surrogate: Surrogate, k: int) -> Nodes:
@@ -104,10 +137,10 @@ def _cut(nodes: Nodes, surrogate: Surrogate, first: int, size: int, name: str) -
     return nodes.add("Slice", ["state", *bounds], name)
 
 
-def join_states(nodes: Nodes, made: Sequence[Made]) -> None:
-    """Lay the stages' states end to end as ``state_out``, the remainders after them."""
+def join_states(nodes: Nodes, made: Sequence[Made], name: str = "state_out") -> str:
+    """Lay the stages' states end to end, the remainders after them; gives back the name."""
     states = [one.state for one in made] + [one.remainder for one in made if one.remainder]
-    nodes.add("Concat", states, "state_out", axis=1)
+    return nodes.add("Concat", states, name, axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -276,6 +309,23 @@ def ends(nodes: Nodes, surrogate: Surrogate, leading: list[str]) -> tuple[list[A
             nodes.value("flags", [*leading, 1], FLAGS_TEXT, dtype=np.int32),
         ],
     )
+
+
+def within_a_body(nodes: Nodes, prefix: str) -> Nodes:
+    """The same nodes as part of another graph's loop, with other names for what goes in and comes out.
+
+    Args:
+        nodes: From ``u`` and ``state`` to ``y``, ``state_out`` and ``flags``.
+        prefix: Put before these names.
+
+    Returns:
+        The nodes; new names get the prefix too.
+    """
+    own = {name: f"{prefix}{name}" for name in ("u", "state", "y", "state_out", "flags")}
+    for node in nodes.nodes:
+        for names in (node.input, node.output):
+            names[:] = [own.get(name, name) for name in names]
+    return nodes.within(prefix)
 
 
 def _channels(ports: tuple[Port, ...]) -> str:

@@ -1,8 +1,9 @@
 """What exporters lower: one model, or several wired output to input, as stages run one after the other.
 
 A single model is a surrogate of one stage. A cascade is several: each stage reads inputs of the whole or outputs of
-earlier stages, in their units, within the same sample. Exporters know stages only, so that whatever can be written as
-stages runs in every format. How models are wired is :class:`sysid.models.Cascade`'s to say.
+earlier stages, in their units, within the same sample. In a circle a stage also reads past samples of what a later
+stage computes; these are put into its state at the end of the step (:class:`Late`). Exporters know stages only, so that
+whatever can be written as stages runs in every format. How models are wired is :class:`sysid.models.Cascade`'s to say.
 """
 
 from __future__ import annotations
@@ -76,13 +77,30 @@ class Side:
     column: int | None = None
 
 
+@dataclass(frozen=True, kw_only=True)
+class Late:
+    """A number of the state that is a channel which a later stage computes.
+
+    Args:
+        place: Its place in the state of the whole.
+        column: The channel, in ``[inputs of the whole | outputs of the whole]``.
+        offset: In the channel's unit.
+        scale: In the channel's unit.
+    """
+
+    place: int
+    column: int
+    offset: float
+    scale: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
     """One model of a surrogate.
 
     Args:
         model: The model.
-        sources: For each of its inputs the column in ``[inputs of the whole | outputs of earlier stages]``.
+        sources: For each of its inputs the column in ``[inputs of the whole | outputs of the whole]``.
         targets: For each of its outputs the column.
         limits: For each of its outputs the declared limits: the upper before the lower, which wins where they cross.
         first: Where its state begins in the state of the whole.
@@ -118,6 +136,23 @@ class Stage:
         if isinstance(self.cell, LinearCell):
             return self.cell.form
         raise ConfigError("not a state space", got=self.cell.ends.outputs)
+
+    @property
+    def known_sources(self) -> tuple[int, ...]:
+        """Columns that are known when it runs; the first one in place of those that are computed later.
+
+        What stands there is not read: of a channel that is computed later, a stage uses past samples only.
+        """
+        return tuple(source if source < self.targets[0] else 0 for source in self.sources)
+
+    @property
+    def late(self) -> tuple[Late, ...]:
+        """Numbers of its state that are set once the whole step is computed."""
+        return tuple(
+            Late(place=self.first + line.first, column=source, offset=line.offset, scale=line.scale)
+            for source, line in zip(self.sources, self.state.lines, strict=False)
+            if source > self.targets[-1] and line.length
+        )
 
     @property
     def remainders(self) -> int:
@@ -172,13 +207,12 @@ class Surrogate:
             The surrogate.
 
         Raises:
-            ConfigError: If a model is of a kind that cannot be written, or models read each other in a circle.
+            ConfigError: If a model is of a kind that cannot be written.
         """
         if isinstance(source, Cascade):
             models, wiring, limits = source.models, source.wiring, source.limits
         else:
             models, wiring, limits = (source,), Wiring.of([source]), {}
-        _check_no_circle(models, wiring)
         ranges, starts = ranges or {}, starts or {}
         identifiers, levels = _identifiers(wiring.channels), _levels(source, wiring)
         inputs = tuple(
@@ -230,6 +264,11 @@ class Surrogate:
         return tuple(
             replace(line, first=stage.first + line.first) for stage in self.stages for line in stage.state.lines
         )
+
+    @property
+    def late(self) -> tuple[Late, ...]:
+        """Numbers of the state that are set once a step is computed; none without a circle."""
+        return tuple(late for stage in self.stages for late in stage.late)
 
     @property
     def state_size(self) -> int:
@@ -307,18 +346,6 @@ class Surrogate:
             "remainders_float32": self.remainders,
         }
         return text | ({"state_spaces": [{"first": at, **state.to_dict()} for at, state in spaces]} if spaces else {})
-
-
-def _check_no_circle(models: Sequence[Member], wiring: Wiring) -> None:
-    """Stages run one after the other; what a later one put out a sample ago is not among their inputs."""
-    back = [str(model.mapping) for model in models if wiring.feeds_back(cell_of(model).ends)]
-    if back:
-        raise ConfigError(
-            "models that read each other in a circle cannot be exported as stages",
-            expected="models of which each reads inputs and outputs of models before it",
-            got=f"{', '.join(back)} read what is computed after them",
-            remedy="export models without a circle, or one model of several outputs (VectorNARX) in their place",
-        )
 
 
 def _stages(models: Sequence[Member], wiring: Wiring, limits: Dict[str, Limit]) -> tuple[Stage, ...]:

@@ -104,7 +104,7 @@ class StageStep(nn.Module):
         for name, values in numbers.items():
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
         regressors = [layout.column(channel, lag) for channel, own in enumerate(cell.lags) for lag in own]
-        self.register_buffer("sources", torch.tensor(stage.sources))
+        self.register_buffer("sources", torch.tensor(stage.known_sources))
         self.register_buffer("regressor_columns", torch.tensor(regressors))
         self.register_buffer("state_columns", torch.tensor(layout.next_columns()))
         self.first, self.size = int(stage.first), int(layout.size)
@@ -170,7 +170,7 @@ class LinearStep(nn.Module):
         }
         for name, values in numbers.items():
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
-        self.register_buffer("sources", torch.tensor(stage.sources))
+        self.register_buffer("sources", torch.tensor(stage.known_sources))
         self.first, self.size = int(stage.first), form.n_state
         self.bounded, self.limited = stage.bounded, stage.limited
         self.low, self.high = float(form.low), float(form.high)
@@ -212,6 +212,10 @@ class SurrogateStep(nn.Module):
 
     declared_low: Tensor
     declared_high: Tensor
+    late_places: Tensor
+    late_columns: Tensor
+    late_offset: Tensor
+    late_scale: Tensor
 
     def __init__(self, surrogate: Surrogate, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
@@ -223,6 +227,12 @@ class SurrogateStep(nn.Module):
         )
         self.register_buffer("declared_low", torch.tensor([port.low for port in surrogate.inputs], dtype=dtype))
         self.register_buffer("declared_high", torch.tensor([port.high for port in surrogate.inputs], dtype=dtype))
+        late = surrogate.late
+        self.circular = len(late) > 0
+        self.register_buffer("late_places", torch.tensor([one.place for one in late], dtype=torch.int64))
+        self.register_buffer("late_columns", torch.tensor([one.column for one in late], dtype=torch.int64))
+        self.register_buffer("late_offset", torch.tensor([one.offset for one in late], dtype=dtype))
+        self.register_buffer("late_scale", torch.tensor([one.scale for one in late], dtype=dtype))
         self.outside_bit, self.bound_bit = int(Flag.OUTSIDE_RANGE), int(Flag.AT_BOUND)
         self.lost_bit, self.limit_bit = int(Flag.NOT_A_NUMBER), int(Flag.AT_LIMIT)
 
@@ -252,7 +262,11 @@ class SurrogateStep(nn.Module):
         flags = flags + torch.isnan(known).any(dim=1, keepdim=True).to(torch.int32) * self.lost_bit
         flags = flags + torch.cat(limited, dim=1).any(dim=1, keepdim=True).to(torch.int32) * self.limit_bit
         n_inputs = u.size(1)
-        return known[:, n_inputs:], torch.cat(states, dim=1), flags
+        following = torch.cat(states, dim=1)
+        if self.circular:
+            late = (known.index_select(1, self.late_columns) - self.late_offset) / self.late_scale
+            following = following.index_copy(1, self.late_places, late)
+        return known[:, n_inputs:], following, flags
 
 
 class SurrogateSequence(nn.Module):

@@ -407,7 +407,26 @@ def build_limited() -> Cascade:
     )
 
 
-CASCADES = {"three models": build_cascade, "every kind, limits and levels": build_limited}
+def build_circle() -> Cascade:
+    """Models that read each other through the past, one of them with two outputs and one with gates, and limits."""
+    return Cascade(
+        models=(
+            wired_narx("STP+AR+ER -> BP", NARX(input_delays=[[0, 1], [1, 3], [1]], output_delays=2, neurons=5), 1),
+            wired_vector(
+                "BP+BC -> AR+ER", VectorNARX(input_delays=[[0], [2]], output_delays=[[1, 2], [1]], neurons=4), 2
+            ),
+            wired_narx("AR -> BC", NARX(input_delays="0:1", output_delays=1, neurons=3, gated=True), 3, clamp=0.05),
+        ),
+        rest={"BP": "STP", "AR": 30.0},
+        limits={"AR": Limit(low=12.0, high="BP"), "ER": Limit(low=38.0)},
+    )
+
+
+CASCADES = {
+    "three models": build_cascade,
+    "every kind, limits and levels": build_limited,
+    "in a circle": build_circle,
+}
 
 
 @pytest.fixture(scope="session")
