@@ -301,9 +301,9 @@ def _onto_grid(record: Record, wanted: Wanted, grid: GridOptions, repairs: Repai
 
 
 def _gap_error(record: Record, timing: Timing) -> TraceError:
-    first = int(timing.gaps[0])
+    first, gaps = int(timing.gaps[0]), "1 gap" if len(timing.gaps) == 1 else f"{len(timing.gaps)} gaps"
     return TraceError(
-        f"{timing.missing} samples are missing in {len(timing.gaps)} gaps",
+        f"{timing.missing} samples are missing in {gaps}",
         where=record.where(first),
         expected=f"the next sample {timing.median_step:g} s later",
         got=f"{record.stamps[first + 1] - record.stamps[first]:g} s later",

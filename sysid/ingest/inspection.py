@@ -19,6 +19,7 @@ from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
+_STEP_NAMES = frozenset({"ts", "dt", "sample_time", "sampling_time", "sampletime"})
 _UNITS_IN_NAMES = frozenset(
     {"bar", "mbar", "barg", "bara", "Pa", "hPa", "kPa", "MPa", "psi", "psig", "psia", "V", "mV", "A", "mA"}
     | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
@@ -106,15 +107,16 @@ class FileFinding:
         if timing is None:
             found.append("no time stamps")
         else:
-            found += [f"{len(timing.backward)} backward time stamps"] if len(timing.backward) else []
-            found += [f"{len(timing.duplicates)} duplicate time stamps"] if len(timing.duplicates) else []
-            found += [f"{timing.missing} samples missing in {len(timing.gaps)} gaps"] if timing.missing else []
+            found += [_count(len(timing.backward), "backward time stamp")] if len(timing.backward) else []
+            found += [_count(len(timing.duplicates), "duplicate time stamp")] if len(timing.duplicates) else []
+            gaps = _count(len(timing.gaps), "gap")
+            found += [f"{_count(timing.missing, 'sample')} missing in {gaps}"] if timing.missing else []
             found += [f"uneven time stamps, up to {timing.jitter:.3g} s off"] if self.needed.jitter else []
         for column in self.columns:
             if column.problem:
                 found.append(f"{column.name}: {column.problem}")
                 continue
-            found += [f"{column.name}: {column.missing} missing values"] if column.missing else []
+            found += [f"{column.name}: {_count(column.missing, 'missing value')}"] if column.missing else []
             found += [f"{column.name}: never changes"] if column.constant else []
         return tuple(found)
 
@@ -210,7 +212,7 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, bool]:
         return TimeOptions(column=table.time, unit="datetime", format=files.time.format), False
     name = files.time.column or table.time or _rising(table.columns)
     if name is None:
-        return TimeOptions(step=1.0), True
+        return TimeOptions(step=_step_in_a_column(table.columns) or 1.0), True
     column = table.find(name)
     unit = files.time.unit or column.unit or _unit_in_name(name)
     if unit is not None:
@@ -220,6 +222,15 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, bool]:
     # Few records are sampled slower than every 5 s, and few clocks count finer than they sample.
     guess = "s" if step < 5.0 else "ms" if step < 5e3 else "us"
     return TimeOptions(column=column.name, unit=guess), True
+
+
+def _step_in_a_column(columns: Sequence[RawColumn]) -> float | None:
+    """The sample time, where it stands in a column of its own, as public benchmarks have it: ``Ts`` with one value."""
+    for column in columns:
+        values = np.unique(column.values[np.isfinite(column.values)])
+        if column.name.lower() in _STEP_NAMES and len(values) == 1 and values[0] > 0.0:
+            return float(values[0])
+    return None
 
 
 def _rising(columns: Sequence[RawColumn]) -> str | None:
@@ -248,7 +259,9 @@ def _needs(known: np.ndarray, timing: Timing) -> tuple[float, dict[str, str | No
 
 def _column(column: RawColumn) -> ColumnFinding:
     finite = column.values[np.isfinite(column.values)]
-    problem = column.problem.what if column.problem is not None else "" if len(finite) else "no values at all"
+    problem = "" if column.problem is None else column.problem.what
+    if not problem and len(finite) < min(2, len(column.values)):
+        problem = f"one value only, {finite[0]:g}" if len(finite) else "no values at all"
     in_file = column.unit if column.unit is not None and is_unit(column.unit) else None
     unit_text = in_file or _unit_in_name(column.name) or "1"
     unit, in_name = split_reference(unit_text)
@@ -266,6 +279,10 @@ def _column(column: RawColumn) -> ColumnFinding:
         missing=len(column.values) - len(finite),
         problem=problem,
     )
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _unit_in_name(name: str) -> str | None:

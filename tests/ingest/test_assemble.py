@@ -77,7 +77,7 @@ REFUSED: dict[str, tuple[dict[str, Any], type[UserError], str]] = {
     "gaps": (
         {"stamps": GAP},
         TraceError,
-        r"3 samples are missing in 1 gaps.*sample 4 \(line 6\).*0\.1 s later.*0\.4 s later.*gaps: linear.*gaps: mask",
+        r"3 samples are missing in 1 gap.*sample 4 \(line 6\).*0\.1 s later.*0\.4 s later.*gaps: linear.*gaps: mask",
     ),
     "duplicate time stamps": (
         {"stamps": DUPLICATE},

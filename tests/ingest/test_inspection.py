@@ -66,12 +66,12 @@ def test_every_problem_is_told_and_its_repair_proposed(write: Write) -> None:
     assert found.problems == (
         "1 ragged rows dropped, first at line 14",
         "1 samples without a time stamp",
-        "1 backward time stamps",
-        "1 duplicate time stamps",
+        "1 backward time stamp",
+        "1 duplicate time stamp",
         "4 samples missing in 2 gaps",
         "uneven time stamps, up to 0.277 s off",
         "still: never changes",
-        "holes: 1 missing values",
+        "holes: 1 missing value",
     )
     assert found.needed.model_dump() == {
         "ragged": "drop", "stamps": "drop", "backward": "sort", "duplicates": "drop",
@@ -106,6 +106,15 @@ def test_a_file_without_time_gets_a_step_to_be_corrected(write: Write) -> None:
     assert (found.time.step, found.time_guessed, found.problems) == (1.0, True, ("no time stamps",))
     assert "time: {step: 1.0}  # guessed" in propose_dataset(found)
     assert len(proposed(path)["run"]) == 20
+
+
+def test_a_sample_time_in_a_column_of_its_own_is_taken_and_is_no_channel(write: Write) -> None:
+    path = write("run.csv", "u [V],y [V],Ts\n0,0,4\n" + rows(19, lambda i: f"{i % 4},{i % 3},"))
+    found = inspect_file(path)
+    assert (found.time.step, found.time_guessed) == (4.0, True)
+    assert found.problems == ("no time stamps", "Ts: one value only, 4")
+    assert proposed(path)["run"].channel_names == ("u", "y")
+    assert len(proposed(path)["run"].usable_samples) == 20
 
 
 def test_a_column_of_remarks_is_left_out_and_told(write: Write) -> None:

@@ -133,7 +133,9 @@ def _picture(found: FileFinding) -> str:
 
 def _show_dataset(traces: TraceSet, path: Path) -> None:
     target = console()
-    target.print(f"{traces.name}: {path}, one sample every {traces.sample_time:g} s", soft_wrap=True)
+    here = Path.cwd().resolve()
+    shown = path.resolve().relative_to(here) if path.resolve().is_relative_to(here) else path
+    target.print(f"{traces.name}: {shown}, one sample every {traces.sample_time:g} s", soft_wrap=True)
     table = Table(header_style="bold")
     for heading in ("case", "role", "samples", "seconds", *(channel.label for channel in traces.channels)):
         table.add_column(escape(heading), justify="left" if heading in {"case", "role"} else "right")
