@@ -217,7 +217,9 @@ def simulate(
     if places is not None:
         from sysid.workbench.commands.simulate_line import simulate_line_command
 
-        simulate_line_command(bundle, command, places, out, time_unit=time_unit, unit=unit, plot=plot)
+        simulate_line_command(
+            bundle, command, places, out, time_unit=time_unit, unit=unit, plot=plot, inputs=inputs, initial=initial
+        )
         return
     from sysid.workbench.commands.simulate import simulate_command
 

@@ -77,6 +77,18 @@ def _check(inputs: Path | None, command: Path | None, initial: float | None, plo
             got=f"--initial {initial}",
             remedy="give the output's value before the first sample, or leave --initial out",
         )
+    check_picture(plot)
+
+
+def check_picture(plot: Path | None) -> None:
+    """Refuse a picture of a kind that cannot be drawn.
+
+    Args:
+        plot: The picture; ``None`` for none.
+
+    Raises:
+        ConfigError: If its ending is of another kind.
+    """
     if plot is not None and plot.suffix.lower() not in PICTURES:
         raise ConfigError(
             "no picture of this kind can be drawn",

@@ -16,6 +16,7 @@ from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.runner import read_line
 from sysid.workbench.commands.run import console
+from sysid.workbench.commands.simulate import check_picture
 
 DRAWN = 5
 """Places in the picture at most: more lines of one field are not told apart."""
@@ -33,6 +34,8 @@ def simulate_line_command(
     time_unit: str | None = None,
     unit: str | None = None,
     plot: Path | None = None,
+    inputs: Path | None = None,
+    initial: float | None = None,
 ) -> None:
     """Simulate a line and write time, inputs and every output at every place, as ``BC17`` for place 17.
 
@@ -44,18 +47,22 @@ def simulate_line_command(
         time_unit: Unit of the command's times, where it does not say.
         unit: Unit of the command's values, likewise.
         plot: A picture to draw; beside ``out`` by default.
+        inputs: Not for a line: refused.
+        initial: Not for a line: refused.
 
     Raises:
         UserError: If the line or the command cannot be read, or the output not written.
     """
-    if command is None:
+    if command is None or inputs is not None or initial is not None:
+        given = {"no command": command is None, f"inputs {inputs}": inputs, f"--initial {initial}": initial is not None}
         raise ConfigError(
-            "nothing says what to simulate",
+            "that is not how a line is simulated",
             where="sysid simulate --places",
-            expected="--command with a table of a few rows",
-            got="no command",
-            remedy="give one",
+            expected="--command with a table of a few rows, and neither inputs nor --initial",
+            got=", ".join(what for what, yes in given.items() if yes),
+            remedy="give the command alone",
         )
+    check_picture(plot)
     stored, positions = read_line(folder), parse_places(places)
     table = read_command(command, stored.inputs, time_unit=time_unit, unit=unit)
     trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
