@@ -27,6 +27,7 @@ from sysid.workbench.config import FitConfig, Pipeline, PipelineConfig, read_pip
 from sysid.workbench.fields import TrainingConfig
 from sysid.workbench.pipeline import report_key
 from sysid.workbench.record import read_fit, read_scores
+from sysid.workbench.screen import duration
 from sysid.workbench.store import RunFolder
 
 CALIBRATION_ITERATIONS = 6
@@ -109,7 +110,8 @@ def _fit(step: str, fit: FitConfig, config: PipelineConfig, data: steps.Data, st
     iterations = planned_iterations(training)
     side_by_side = min(training.workers, training.starts, os.cpu_count() or 1)
     seconds = around + min(iterations * iteration / side_by_side, training.max_time_s)
-    basis = f"at most: {iterations:.0f} iterations of {1e3 * iteration:.1f} ms, {side_by_side} at a time"
+    trained = f"{iterations:.0f} iterations of {1e3 * iteration:.1f} ms, {side_by_side} at a time"
+    basis = f"at most: {duration(around)}, then {trained}"
     return PlannedStep(step=step, stored=False, seconds=seconds, basis=basis)
 
 

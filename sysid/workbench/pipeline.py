@@ -17,6 +17,7 @@ from sysid.workbench import events, steps
 from sysid.workbench.config import FitConfig, Pipeline
 from sysid.workbench.environment import environment
 from sysid.workbench.evidence import residuals
+from sysid.workbench.naming import nearby
 from sysid.workbench.record import (
     export_record,
     is_final,
@@ -257,7 +258,7 @@ class _Run:
             began = time.perf_counter()
             page = report.write_report(self.store.path)
             self.store.mark_done("report", key, [page], seconds=time.perf_counter() - began)
-        self._tell(events.StepDone(step=step, stored=stored, detail=str(page)))
+        self._tell(events.StepDone(step=step, stored=stored, detail=str(nearby(page))))
         self._tell(events.ReportReady(page=page, results=self.store.results, of=best.ready))
 
     def _write_results(

@@ -51,7 +51,7 @@ def test_nothing_is_written(done: Path, capsys: pytest.CaptureFixture[str]) -> N
     for words in (
         "Fitting ARX, ARX [1; 1 1; 1 1]",
         "stored",
-        "at most: 9 iterations of",
+        "then 9 iterations of",
         "Exporting closed loop as onnx",
     ):
         assert words in told
@@ -73,7 +73,7 @@ def test_a_few_iterations_foretell_many(workspace: Path) -> None:
     change("neurons: 2", "neurons: 12")
     read = read_pipeline(PIPELINE)
     (step,) = [one for one in planned() if "closed loop" in one.step]
-    found = re.fullmatch(r"at most: 300 iterations of (.+) ms, 1 at a time", step.basis)
+    found = re.fullmatch(r"at most: .+, then 300 iterations of (.+) ms, 1 at a time", step.basis)
     assert found
     moments: list[float] = []
     data = steps.load_data(read.config, beside=PIPELINE.resolve().parent, progress=lambda _: None)

@@ -18,6 +18,7 @@ from sysid.reporting.svg import svg
 from sysid.traces import TraceSet
 from sysid.units import Reference
 from sysid.workbench.commands.run import console
+from sysid.workbench.naming import nearby
 from sysid.workbench.schemas import schema_line
 from sysid.workbench.store import write_bytes
 
@@ -133,9 +134,7 @@ def _picture(found: FileFinding) -> str:
 
 def _show_dataset(traces: TraceSet, path: Path) -> None:
     target = console()
-    here = Path.cwd().resolve()
-    shown = path.resolve().relative_to(here) if path.resolve().is_relative_to(here) else path
-    target.print(f"{traces.name}: {shown}, one sample every {traces.sample_time:g} s", soft_wrap=True)
+    target.print(f"{traces.name}: {nearby(path)}, one sample every {traces.sample_time:g} s", soft_wrap=True)
     table = Table(header_style="bold")
     for heading in ("case", "role", "samples", "seconds", *(channel.label for channel in traces.channels)):
         table.add_column(escape(heading), justify="left" if heading in {"case", "role"} else "right")

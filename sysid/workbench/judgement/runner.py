@@ -25,7 +25,7 @@ from sysid.workbench.judgement.judge import Judge, find_judge
 from sysid.workbench.judgement.sources import Fetch, Found, find_model
 from sysid.workbench.kept_steps import do_steps
 from sysid.workbench.kinds import RunRequest
-from sysid.workbench.naming import slug
+from sysid.workbench.naming import nearby, slug
 from sysid.workbench.store import RunFolder, digest, strict, write_bytes, write_json
 from sysid.yaml_files import check, read_yaml
 
@@ -78,7 +78,7 @@ def run_judgement(request: RunRequest) -> int:
         screen.close()
     target.print()
     target.print(results.judgement.headline, soft_wrap=True)
-    target.print(f"Report:  {page}\nResults: {run.store.results}", soft_wrap=True)
+    target.print(f"Report:  {nearby(page)}\nResults: {nearby(run.store.results)}", soft_wrap=True)
     if tracker is not None and tracker.failures:
         target.print(
             "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
@@ -176,7 +176,7 @@ class _Run:
                 write_report(folder)
             except ConfigError as error:
                 self._tell(Warned(text=f"the report of {folder} is not written again: {error.what}"))
-        self._tell(StepDone(step=step, stored=False, detail=str(page)))
+        self._tell(StepDone(step=step, stored=False, detail=str(nearby(page))))
         return page
 
     def _track(self, results: JudgementResults, found: Mapping[str, Sequence[Found]], page: Path) -> None:
