@@ -83,6 +83,17 @@ def test_the_winner_is_the_best_in_full_and_goes_through_the_steps_of_any_fit(fo
     assert read_sweep(results) == record
 
 
+def test_a_look_on_the_whole_record_changes_no_trial_that_goes_on(workspace: Path, swept: Swept) -> None:
+    text = SWEEP.replace("pruning: [{iterations: 3, keep: 0.5}]\n", "").replace("{formats: [onnx]}", "null")
+    full = {trial.number: trial for trial in run(workspace, text).record.trials}
+    assert 0 < len(swept.record.tried_in_full) < len(full)
+    for trial in swept.record.tried_in_full:
+        alone = full[trial.number]
+        assert (trial.iterations, trial.status) == (alone.iterations, alone.status)
+        errors, theirs = ({n: case.free_run_mse for n, case in one.cases.items()} for one in (trial, alone))
+        assert errors == theirs, trial.label
+
+
 def test_what_was_chosen_by_hand_stands_beside_the_winner(swept: Swept) -> None:
     (hand,) = swept.record.beside
     assert (hand.label, hand.dropped_at) == ("NARX 1/1/2", None)
