@@ -24,6 +24,7 @@ from sysid.reporting.results import Results, read_results
 from sysid.traces import Trace, TraceSet
 from sysid.workbench import steps
 from sysid.workbench.config import FitConfig, Pipeline, PipelineConfig, read_pipeline
+from sysid.workbench.data import Data, load_data
 from sysid.workbench.fields import TrainingConfig
 from sysid.workbench.pipeline import report_key
 from sysid.workbench.record import read_fit, read_scores
@@ -76,7 +77,7 @@ def plan(pipeline: Pipeline, folder: Path, *, fresh: bool = False) -> tuple[Plan
     """
     config, store = pipeline.config, RunFolder(path=folder.resolve())
     began = time.perf_counter()
-    data = steps.load_data(config, beside=pipeline.path.parent, progress=lambda _: None)
+    data = load_data(config, beside=pipeline.path.parent, progress=lambda _: None)
     loading = PlannedStep(
         step=f"Loading the traces, {len(data.traces)} cases of {data.traces.name}",
         stored=False,
@@ -98,7 +99,7 @@ def plan(pipeline: Pipeline, folder: Path, *, fresh: bool = False) -> tuple[Plan
     return (*planned, *_last(config, store, scores, done=done and not fresh))
 
 
-def _fit(step: str, fit: FitConfig, config: PipelineConfig, data: steps.Data, store: RunFolder) -> PlannedStep:
+def _fit(step: str, fit: FitConfig, config: PipelineConfig, data: Data, store: RunFolder) -> PlannedStep:
     seconds = _last_time(fit, data, store)
     if seconds is not None:
         return PlannedStep(step=step, stored=False, seconds=seconds, basis="as last time")
@@ -115,7 +116,7 @@ def _fit(step: str, fit: FitConfig, config: PipelineConfig, data: steps.Data, st
     return PlannedStep(step=step, stored=False, seconds=seconds, basis=basis)
 
 
-def _last_time(fit: FitConfig, data: steps.Data, store: RunFolder) -> float | None:
+def _last_time(fit: FitConfig, data: Data, store: RunFolder) -> float | None:
     """Seconds of the fit of this name, if the folder's last run asked for the same of records as long."""
     try:
         last = read_pipeline(store.path / "pipeline.yaml").config
@@ -134,7 +135,7 @@ def _last_time(fit: FitConfig, data: steps.Data, store: RunFolder) -> float | No
     return float(seconds)
 
 
-def _calibrate(fit: FitConfig, config: PipelineConfig, data: steps.Data) -> tuple[float, float]:
+def _calibrate(fit: FitConfig, config: PipelineConfig, data: Data) -> tuple[float, float]:
     """Seconds around the iterations, which are spent once, and seconds of one iteration of one start."""
     few = {"max_iterations": CALIBRATION_ITERATIONS, "starts": 1, "max_time_s": CALIBRATION_LIMIT_S}
     moments: list[float] = []
@@ -156,8 +157,8 @@ def _with(fit: FitConfig, changes: dict[str, Any]) -> TrainingConfig:
     return TrainingConfig(**{**given, **changes})
 
 
-def _linear(fit: FitConfig, config: PipelineConfig, data: steps.Data) -> float:
-    few = steps.Data(traces=_shortened(data.traces), selection=())
+def _linear(fit: FitConfig, config: PipelineConfig, data: Data) -> float:
+    few = Data(traces=_shortened(data.traces), selection=())
     seconds = 0.0
     for _ in range(2):  # the first one compiles
         began = time.perf_counter()

@@ -11,8 +11,8 @@ from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
 from sysid.traces import Role
 from sysid.validation import analyse_residuals, judge_linearity
 from sysid.workbench.config import PipelineConfig
+from sysid.workbench.data import Data
 from sysid.workbench.events import FitReady
-from sysid.workbench.steps import Data
 
 GROUPS: Final = {"estimation": (Role.ESTIMATION,), "unseen": (Role.VALIDATION, Role.TEST)}
 """Cases whose residuals are analysed together, by their role."""

@@ -15,6 +15,7 @@ from sysid.reporting.published import read_published
 from sysid.reporting.results import Results, parse_results, read_results, write_results
 from sysid.workbench import events, steps
 from sysid.workbench.config import FitConfig, Pipeline
+from sysid.workbench.data import Data, load_data
 from sysid.workbench.environment import environment
 from sysid.workbench.evidence import residuals
 from sysid.workbench.naming import nearby
@@ -151,13 +152,13 @@ class _Run:
     def _done(self, step: str, key: str) -> bool:
         return not self.fresh and self.store.is_done(step, key)
 
-    def _load(self) -> steps.Data:
+    def _load(self) -> Data:
         step = "Loading the traces"
         self._tell(events.StepStarted(step=step))
         if self.pipeline.config.report.published is not None:
             # A misspelt name is told before the fits are done, not after.
             read_published(self.pipeline.config.report.published)
-        data = steps.load_data(
+        data = load_data(
             self.pipeline.config,
             beside=self.pipeline.path.parent,
             progress=lambda text: self._tell(events.StepProgress(step=step, fraction=None, detail=text)),
@@ -168,7 +169,7 @@ class _Run:
         self._tell(events.DataLoaded(traces=data.traces, selection=tuple(trace.name for trace in data.selection)))
         return data
 
-    def _fit(self, fit: FitConfig, data: steps.Data, earlier: Mapping[str, _Fitted]) -> _Fitted:
+    def _fit(self, fit: FitConfig, data: Data, earlier: Mapping[str, _Fitted]) -> _Fitted:
         config, folder = self.pipeline.config, self.store.fit(fit.slug)
         initial = earlier[fit.initial] if fit.initial else None
         given = self.given.get(fit.name)
@@ -210,7 +211,7 @@ class _Run:
         return _Fitted(ready=ready, fit_key=key, final=final)
 
     def _score(
-        self, fit: FitConfig, result: FitResult, data: steps.Data, fit_key: str, *, reuse: bool, final: bool
+        self, fit: FitConfig, result: FitResult, data: Data, fit_key: str, *, reuse: bool, final: bool
     ) -> tuple[str, steps.Scores, bool]:
         """The key of the figures, the figures, and whether they were stored."""
         config, folder, step = self.pipeline.config, self.store.fit(fit.slug), f"scores-{fit.slug}"
@@ -223,7 +224,7 @@ class _Run:
             self.store.mark_done(step, key, files)
         return key, scores, False
 
-    def _export(self, best: _Fitted, data: steps.Data) -> tuple[dict[str, Any], ...]:
+    def _export(self, best: _Fitted, data: Data) -> tuple[dict[str, Any], ...]:
         config, folder = self.pipeline.config, self.store.path / "bundle"
         step = f"Exporting {best.ready.config.name}"
         key = steps.export_key(best.ready.key, config)
@@ -263,7 +264,7 @@ class _Run:
 
     def _write_results(
         self,
-        data: steps.Data,
+        data: Data,
         fitted: Mapping[str, _Fitted],
         *,
         choice: steps.Choice | None,

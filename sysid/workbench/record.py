@@ -16,9 +16,10 @@ from sysid.reporting.results import SCHEMA_VERSION
 from sysid.traces import Role
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
 from sysid.workbench.config import PipelineConfig
+from sysid.workbench.data import Data
 from sysid.workbench.events import FitReady
 from sysid.workbench.evidence import linearity
-from sysid.workbench.steps import Choice, Data, Scores
+from sysid.workbench.steps import Choice, Scores
 from sysid.workbench.store import read_arrays, read_json, write_arrays, write_json
 
 SIGNALS = ("time", "target", "simulated", "predicted")

@@ -15,6 +15,7 @@ from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
 from sysid.workbench import events, steps
 from sysid.workbench.config import FitConfig, Pipeline, PipelineConfig
+from sysid.workbench.data import Data, load_data
 from sysid.workbench.pipeline import GivenFit, run_pipeline
 from sysid.workbench.store import RunFolder, write_bytes
 from sysid.workbench.sweep import publish, strategy
@@ -235,10 +236,10 @@ class _Run:
         """The pipeline of the first point: what all points share."""
         return self.config.pipeline([FitConfig(name=WINNER, structure=space.points()[0].structure)])
 
-    def _load(self) -> steps.Data:
+    def _load(self) -> Data:
         step = "Loading the traces"
         self.tell(events.StepStarted(step=step))
-        data = steps.load_data(
+        data = load_data(
             self._first(self.config.space()),
             beside=self.sweep.path.parent,
             progress=lambda text: self.tell(events.StepProgress(step=step, fraction=None, detail=text)),

@@ -17,7 +17,8 @@ from sysid.estimation.checkpoint import Checkpoint
 from sysid.models import NARX, AbstractModel, Start
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.config import FitConfig, PipelineConfig
-from sysid.workbench.steps import Data, fit_traces
+from sysid.workbench.data import Data
+from sysid.workbench.steps import fit_traces
 
 FAILED = "FAILED"
 """Status of a trial whose fit raised an error."""

@@ -13,6 +13,7 @@ import pytest
 from sysid.workbench import steps
 from sysid.workbench.cli import run_cli
 from sysid.workbench.config import read_pipeline
+from sysid.workbench.data import load_data
 from sysid.workbench.dry_run import PlannedStep, plan
 from tests.workbench.test_bad_inputs import contents
 
@@ -76,7 +77,7 @@ def test_a_few_iterations_foretell_many(workspace: Path) -> None:
     found = re.fullmatch(r"at most: .+, then 300 iterations of (.+) ms, 1 at a time", step.basis)
     assert found
     moments: list[float] = []
-    data = steps.load_data(read.config, beside=PIPELINE.resolve().parent, progress=lambda _: None)
+    data = load_data(read.config, beside=PIPELINE.resolve().parent, progress=lambda _: None)
     fit = read.config.fits[2].model_copy(update={"initial": None})
     steps.fit_traces(fit, read.config, data, None, lambda _: moments.append(time.perf_counter()))
     taken = 1e3 * statistics.median(after - before for before, after in itertools.pairwise(moments))

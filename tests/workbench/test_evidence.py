@@ -15,17 +15,18 @@ from sysid.traces import Role
 from sysid.validation import analyse_residuals
 from sysid.workbench import steps
 from sysid.workbench.config import PipelineConfig, parse_pipeline
+from sysid.workbench.data import Data, load_data
 from sysid.workbench.events import FitReady
 from sysid.workbench.evidence import linearity, residuals
 from sysid.workbench.record import write_residuals
 
-Fitted = tuple[PipelineConfig, steps.Data, dict[str, FitResult]]
+Fitted = tuple[PipelineConfig, Data, dict[str, FitResult]]
 
 
 @pytest.fixture
 def fitted(workspace: Path) -> Fitted:
     config = parse_pipeline((workspace / "pipelines" / "first.yaml").read_text(encoding="utf-8"))
-    data = steps.load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
+    data = load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
     fits = {fit.name: steps.fit_traces(fit, config, data, None, lambda _: None) for fit in config.fits[:2]}
     return config, data, fits
 

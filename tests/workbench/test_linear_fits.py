@@ -11,6 +11,7 @@ from sysid.estimation import Loop
 from sysid.models import Domain, TransferFunction
 from sysid.workbench import steps
 from sysid.workbench.config import find_pipeline, parse_pipeline, read_pipeline
+from sysid.workbench.data import load_data
 
 ARX = "structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}"
 TF = "structure: {kind: TransferFunction, poles: [1, 1], zeros: [0, 0], delays: [1, 1]}"
@@ -24,7 +25,7 @@ def text(workspace: Path) -> str:
 
 def test_a_transfer_function_is_fitted_by_its_estimator(workspace: Path) -> None:
     config = parse_pipeline(text(workspace).replace(ARX, TF))
-    data = steps.load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
+    data = load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
     (fit,) = [fit for fit in config.fits if isinstance(fit.structure, TransferFunction)]
     result = steps.fit_traces(fit, config, data, None, lambda _: None)
     assert result.model.structure == fit.structure
@@ -36,7 +37,7 @@ def test_a_transfer_function_is_fitted_by_its_estimator(workspace: Path) -> None
 def test_its_key_knows_orders_seed_and_selection(workspace: Path) -> None:
     def key(source: str) -> str:
         config = parse_pipeline(source)
-        data = steps.load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
+        data = load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
         (fit,) = [fit for fit in config.fits if isinstance(fit.structure, TransferFunction)]
         return steps.fit_key(fit, config, data, None)
 

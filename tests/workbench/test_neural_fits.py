@@ -10,6 +10,7 @@ from sysid.errors import UserError
 from sysid.models import NeuralStateSpace
 from sysid.workbench import steps
 from sysid.workbench.config import parse_pipeline
+from sysid.workbench.data import load_data
 
 ARX = "structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}"
 NSS = "structure: {kind: NSS, states: 1, neurons: 3}, training: {max_iterations: 30}"
@@ -21,7 +22,7 @@ def text(workspace: Path, new: str) -> str:
 
 def test_a_neural_state_space_is_fitted_by_its_estimator(workspace: Path) -> None:
     config = parse_pipeline(text(workspace, NSS))
-    data = steps.load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
+    data = load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
     fit = config.fits[0]
     result = steps.fit_traces(fit, config, data, None, lambda _: None)
     assert result.model.structure == NeuralStateSpace(states=1, neurons=3)

@@ -17,6 +17,7 @@ from sysid.reporting.results import Results, read_results
 from sysid.validation import evaluate
 from sysid.workbench import events, steps
 from sysid.workbench.config import read_pipeline
+from sysid.workbench.data import load_data
 from sysid.workbench.pipeline import run_pipeline
 from sysid.workbench.record import read_fit, read_scores
 from sysid.workbench.store import RunFolder, code_digest
@@ -111,7 +112,7 @@ def test_stored_results_are_the_computed_ones(workspace: Path) -> None:
     folder = RunFolder(path=workspace / "run").fit("closed-loop")
     fit, scores = read_fit(folder), read_scores(folder)
     read = read_pipeline(workspace / "pipelines" / "first.yaml")
-    data = steps.load_data(read.config, beside=read.path.parent, progress=lambda _: None)
+    data = load_data(read.config, beside=read.path.parent, progress=lambda _: None)
     again = evaluate(fit.model, data.traces, Start())
     for name, case in again.cases.items():
         np.testing.assert_array_equal(scores.evaluation.cases[name].simulated, case.simulated)

@@ -16,10 +16,11 @@ from sysid.traces import Role
 from sysid.validation import CaseResult, Evaluation, Figures
 from sysid.workbench import steps
 from sysid.workbench.config import PipelineConfig, parse_pipeline
+from sysid.workbench.data import Data, load_data
 
 
-def load(config: PipelineConfig, workspace: Path) -> steps.Data:
-    return steps.load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
+def load(config: PipelineConfig, workspace: Path) -> Data:
+    return load_data(config, beside=workspace / "pipelines", progress=lambda _: None)
 
 
 def pipeline_text(workspace: Path) -> str:

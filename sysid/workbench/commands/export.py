@@ -9,6 +9,7 @@ from sysid.export.bundle import zip_bundle
 from sysid.workbench import steps
 from sysid.workbench.commands.run import console
 from sysid.workbench.config import ExportConfig, FitConfig, Pipeline, find_pipeline, read_pipeline
+from sysid.workbench.data import Data, load_data
 from sysid.workbench.record import read_fit, read_scores
 from sysid.workbench.store import RunFolder
 
@@ -40,7 +41,7 @@ def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Pat
             remedy="name one of them with --fit",
         )
     chosen = config.fits[names.index(fit)]
-    data = steps.load_data(config, beside=read.path.parent, progress=lambda _: None)
+    data = load_data(config, beside=read.path.parent, progress=lambda _: None)
     _check_stored(store, read, chosen, data)
     folder = out or store.path / f"bundle-{chosen.slug}"
     bundle = steps.export(
@@ -59,7 +60,7 @@ def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Pat
         target.print(f"Packed: {zip_bundle(folder)}", soft_wrap=True)
 
 
-def _check_stored(store: RunFolder, pipeline: Pipeline, chosen: FitConfig, data: steps.Data) -> None:
+def _check_stored(store: RunFolder, pipeline: Pipeline, chosen: FitConfig, data: Data) -> None:
     """Refuse a fit that was never run, or run before the pipeline, its data or the code changed."""
     keys: dict[str, str] = {}
     for fit in pipeline.config.fits:
