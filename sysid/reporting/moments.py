@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.reporting.signals import CaseSignals
+
+READABLE: Final = 12.0
+"""How many times the error the target may move in a window: beyond, the two lines cannot be told apart."""
+
+NARROWEST: Final = 10
+"""Samples on each side of a moment that are always shown."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +52,8 @@ def worst_moments(signals: Dict[str, CaseSignals], count: int, *, share: float =
     Args:
         signals: By case.
         count: How many at most.
-        share: Half the length of a window, as a share of its case; it is at least 20 samples.
+        share: Half the length of a window, as a share of its case; it is at least 20 samples. What is shown of it is
+            less where the target moves so far that the error could not be seen.
 
     Returns:
         The moments, worst first; a sample where the free run is not finite is worse than any other.
@@ -67,10 +75,18 @@ def _moments_of_case(case: str, signal: CaseSignals, count: int, share: float) -
         sample = int(np.argmax(size))
         if size[sample] <= 0.0:
             break
-        first, last = max(0, sample - half), min(len(size) - 1, sample + half)
+        around = _readable(signal.target, sample, half, size[sample])
+        first, last = max(0, sample - around), min(len(size) - 1, sample + around)
         found.append(_moment(case, signal, sample, (first, last)))
         _blank(size, max(0, sample - 2 * half), sample + 2 * half)
     return found
+
+
+def _readable(target: NDArray[np.float64], sample: int, half: int, error: float) -> int:
+    """Half a window in which the error can be seen beside what the target does there."""
+    while half > NARROWEST and np.ptp(target[max(0, sample - half) : sample + half + 1]) > READABLE * error:
+        half = max(NARROWEST, int(0.8 * half))
+    return half
 
 
 def _blank(size: NDArray[np.float64], first: int, last: int) -> None:

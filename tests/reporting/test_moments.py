@@ -31,6 +31,17 @@ def test_neighbours_of_a_moment_are_part_of_it() -> None:
     assert (moments[0].first, moments[0].last) == (480, 520)
 
 
+def test_a_window_is_so_narrow_that_the_error_can_be_seen() -> None:
+    ramp = 0.1 * np.arange(4000.0)
+    simulated = ramp.copy()
+    simulated[2000] += 0.5
+    (moment,) = worst_moments({"A": CaseSignals(time=ramp, target=ramp, simulated=simulated, predicted=ramp)}, 1)
+    shown = slice(moment.first, moment.last + 1)
+    assert np.ptp(ramp[shown]) <= 12 * 0.5
+    assert np.ptp(ramp[shown]) > 6 * 0.5
+    assert moment.first < 2000 < moment.last
+
+
 def test_a_window_stays_inside_its_case() -> None:
     (first, last) = worst_moments({"A": _case({0: 1.0, 999: 2.0})}, 5)
     assert (first.first, first.last) == (979, 999)
