@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.reporting import publish_benchmarks, publish_run, read_results
 from sysid.reporting.findings import Benchmark, Finding
 from sysid.reporting.numbers import number
-from sysid.reporting.scorecard import main, place, scorecard
+from sysid.reporting.scorecard import PLACE, main, place, scorecard
 from sysid.reporting.scores import Score, read_scores
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -86,3 +87,13 @@ def test_it_goes_between_its_two_lines(report: Path, tmp_path: Path) -> None:
 def test_a_report_without_figures_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="scores of the report cannot be read"):
         scorecard([tmp_path])
+
+
+def test_the_readme_holds_what_the_reports_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    found = PLACE.search((ROOT / "README.md").read_text(encoding="utf-8"))
+    assert found is not None
+    words = shlex.split(found["command"])
+    assert words[:3] == ["python", "-m", "sysid.reporting.scorecard"]
+    folders = [Path(word) for word in words[3 : words.index("--into")]]
+    assert place(scorecard(folders), ROOT / "README.md") == (ROOT / "README.md").read_text(encoding="utf-8")
