@@ -19,8 +19,8 @@ def test_a_row_for_each_file_and_number_of_cars():
         results([RunTimeRecord(cars=1, seconds=0.0612, ratio=12.5), RunTimeRecord(cars=100, seconds=0.18, ratio=0.37)])
     )
     assert [[cell.text for cell in row] for row in table.rows] == [
-        ["onnx", "network", "bundle/sequence.onnx", "1", "61.2", "12.5"],
-        ["onnx", "network", "bundle/sequence.onnx", "100", "180", "0.370"],
+        ["onnx", "network", "bundle/sequence.onnx", "1", "61.2", "4.90", "12.5"],
+        ["onnx", "network", "bundle/sequence.onnx", "100", "180", "4.86", "0.370"],
     ]
 
 
