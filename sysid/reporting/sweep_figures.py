@@ -22,6 +22,9 @@ COLOURS = "cividis"
 MAX_PANELS = 12
 """Maps beside each other; with more, each is too small to read."""
 
+NAME_SIZE = np.array([62.0, 12.0])
+"""Width and height of a structure's name on a figure, in pixels."""
+
 MAX_LINES = 600
 """Lines of parallel coordinates: beyond these they are one grey."""
 
@@ -145,12 +148,12 @@ def pareto_figure(record: SweepRecord, names: Sequence[str] | None = None) -> Fi
         if record.beside:
             style = {"color": TARGET, "marker": "x", "markersize": 7.0}
             _pairs(axes, record, record.beside, (second, first), label="chosen by hand", **style)
-        for trial in _few(front):
-            place = (_value(record, trial, second), _value(record, trial, first))
-            axes.annotate(trial.label, place, textcoords="offset points", xytext=(4, 4), fontsize=7)
         _log(axes, [_value(record, trial, first) for trial in full])
         if all(_value(record, trial, second) > 0.0 for trial in full):
             axes.set_xscale("log")
+        named = [(_value(record, trial, second), _value(record, trial, first), trial.label) for trial in front]
+        for x, y, label in _apart(axes, named):
+            axes.annotate(label, (x, y), textcoords="offset points", xytext=(4, 4), fontsize=7)
         axes.set_xlabel(record.words(second))
         axes.set_ylabel(record.words(first))
         axes.legend(loc="upper right")
@@ -257,11 +260,18 @@ def _ticks(axes: Axes, record: SweepRecord, x: str, y: str) -> None:
         ticks(list(shown), [values[i].strip("'") for i in shown], fontsize=7)
 
 
-def _few(trials: Sequence[Trial], n: int = 7) -> list[Trial]:
-    """Some of the trials, spread over all: names that overlap cannot be read."""
-    return (
-        [trials[i] for i in sorted({round(i * (len(trials) - 1) / max(1, n - 1)) for i in range(n)})] if trials else []
-    )
+def _apart(axes: Axes, named: Sequence[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
+    """Those of the named points whose names can be read: the ends first, then whatever does not meet a name before."""
+    axes.get_xlim(), axes.get_ylim()  # settles the scales, which matplotlib leaves until it draws
+    order = [*named[:1], *named[-1:], *named[1:-1]]
+    kept: list[tuple[float, float, str]] = []
+    places: list[NDArray[np.float64]] = []
+    for point in order:
+        place = axes.transData.transform(point[:2])
+        if all((np.abs(place - other) > NAME_SIZE).any() for other in places):
+            kept.append(point)
+            places.append(place)
+    return kept
 
 
 def _unit(raw: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str], list[float]]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from sysid.errors import ConfigError
 from sysid.reporting.numbers import quantity, times
@@ -130,6 +132,29 @@ def test_the_front_is_what_nobody_beats() -> None:
     }
     assert {t.number for t in found.front()} == unbeaten
     assert 0 < len(unbeaten) < len(points)
+
+
+def test_names_on_the_front_do_not_meet() -> None:
+    rng = np.random.default_rng(0)
+    steps = np.cumsum(rng.uniform(0.001, 0.1, 40))
+    along = [
+        trial(
+            n + 1, 1, 1, label=f"NARX 5/5/{n}", selection_free_run_mse=float(np.exp(-s)), cases=timed(1e-3 * np.exp(s))
+        )
+        for n, s in enumerate(steps)
+    ]
+    figure = pareto_figure(record(trials=along, winner=1, beside=[], points=40))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    (axes,) = figure.axes
+    boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
+    assert len(boxes) > 3
+    assert {axes.texts[0].get_text(), axes.texts[1].get_text()} == {"NARX 5/5/0", "NARX 5/5/39"}
+    assert not [(a, b) for a, b in itertools.combinations(boxes, 2) if a.overlaps(b)]
+
+
+def timed(seconds: float) -> dict[str, TrialCase]:
+    return {"VAL01": TrialCase(role="validation", free_run_mse=1.0, one_step_mse=1.0, run_time_s=seconds)}
 
 
 def test_what_it_took_is_told() -> None:
