@@ -151,16 +151,17 @@ def _prelude(
 
 
 def _offset(experiments: Sequence[Experiment], mapping: Mapping, training: Training) -> list[Experiment]:
-    """The experiments once more with each offset of their inputs."""
+    """The experiments once more with each offset of their channels."""
     copies = []
+    channels = (*mapping.inputs, mapping.output)
     for offset in training.offsets:
-        strangers = sorted(set(offset) - set(mapping.inputs))
+        strangers = sorted(set(offset) - set(channels))
         if strangers:
-            raise ChannelError(strangers, mapping.inputs, where="offsets")
-        by = np.array([float(offset.get(name, 0.0)) for name in mapping.inputs])
+            raise ChannelError(strangers, channels, where="offsets")
+        *by, up = (float(offset.get(name, 0.0)) for name in channels)
         for e in experiments:
-            history = History(inputs=e.history.inputs + by, output=e.history.output)
-            copies.append(replace(e, inputs=e.inputs + by, history=history))
+            history = History(inputs=e.history.inputs + np.array(by), output=e.history.output + up)
+            copies.append(replace(e, inputs=e.inputs + np.array(by), output=e.output + up, history=history))
     return copies
 
 

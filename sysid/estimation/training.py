@@ -34,8 +34,8 @@ class Training:
         workers: Starts that run at the same time.
         basis: ``levels and rates`` trains on each channel's newest sample and its rates of change, ``plain`` on the
             lagged samples as they are. The finished model is over lagged samples either way.
-        offsets: Constant offsets, by input channel and in its unit, with each of which the estimation traces are used
-            once more. A record says little about what its absolute levels do and what their changes do when the two
+        offsets: Constant offsets, by channel and in its unit, with each of which the estimation traces are used once
+            more; the output among them where it moves with the inputs, as reservoirs that feed each other do. A record says little about what its absolute levels do and what their changes do when the two
             always go together; copies that differ in level alone tell the network which to follow, and how far a
             sensor may be off.
         regularisation: ``None`` lets the evidence weigh the weights' sizes against the residuals, group by group. A

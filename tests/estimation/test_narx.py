@@ -9,7 +9,7 @@ import pytest
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import Loop, Status, Training, fit_narx
-from sysid.models import NARX, Mapping
+from sysid.models import NARX, Mapping, Start, StartKind
 from sysid.traces import Channel, Trace
 
 TANK = Mapping(inputs=("pump",), output="level")
@@ -155,17 +155,19 @@ def test_masked_samples_do_not_train():
     assert np.mean(counted**2) < 1e-2 * np.var(clean["level"])
 
 
-def test_offsets_are_copies_of_the_record_that_differ_in_level_alone():
+@pytest.mark.parametrize("offset", [{"pump": 0.3}, {"pump": 0.3, "level": -0.1}], ids=["input", "output too"])
+def test_offsets_are_copies_of_the_record_that_differ_in_level_alone(offset):
     shifted = tank(1)
-    values = shifted.values.copy()
-    values[:, 0] += 0.3
+    values = shifted.values + np.array([offset.get(channel.name, 0.0) for channel in shifted.channels])
     copy = Trace(name="copy", sample_time=0.5, channels=shifted.channels, values=values)
-    by_hand = fit_narx([tank(1), copy], TANK, SMALL, Training(max_iterations=15))
-    by_option = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=15, offsets=[{"pump": 0.3}]))
+    rest = float(shifted["level"][0])
+    start = {"start": Start(kind=StartKind.MEASURED, n_measured=2), "rest_output": rest}
+    by_hand = fit_narx([tank(1), copy], TANK, SMALL, Training(max_iterations=15), **start)
+    by_option = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=15, offsets=[offset]), **start)
     np.testing.assert_allclose(by_option.model.theta, by_hand.model.theta, rtol=1e-9)
 
 
-def test_an_offset_of_what_is_no_input_is_refused():
+def test_an_offset_of_a_channel_that_is_not_in_the_mapping_is_refused():
     with pytest.raises(ChannelError, match="did you mean pump"):
         fit_narx([tank(1)], TANK, SMALL, Training(offsets=[{"pumb": 0.3}]))
 
