@@ -22,10 +22,11 @@ from sysid.models import Cascade, Start
 from sysid.traces import Role, Trace, TraceSet
 from sysid.units import Reference
 
-SCHEMA_VERSION = 3
-"""Raised when a reader of an earlier version would misread the file. Every version from 1 on can be read: 2 added what
-lies beside the exported files (``attachments``), and parity over random sequences; 3 has several outputs and models in
-place of one (``outputs``, ``stages``), and float32 files whose state is longer by the remainders."""
+SCHEMA_VERSION = 4
+"""Raised when a reader of an earlier version cannot read the file, or would misread it. Every version from 1 on can be
+read: 2 added what lies beside the exported files (``attachments``), and parity over random sequences; 3 has several
+outputs and models in place of one (``outputs``, ``stages``), and float32 files whose state is longer by the remainders;
+4 has networks with gates, and models that read each other in a circle."""
 SCHEMA = "model.schema.json"
 """The JSON schema of ``model.json``, which travels in every bundle."""
 MANIFEST = "model.json"

@@ -94,7 +94,7 @@ def test_manifest_that_is_none(folder, text, match):
 
 def test_newer_schema(folder):
     rewrite(folder, lambda manifest: manifest.update(schema_version=SCHEMA_VERSION + 1), sealed=True)
-    with pytest.raises(BundleError, match=r"(?s)newer version.*up to 3.*got:\s+4.*pip install --upgrade"):
+    with pytest.raises(BundleError, match=rf"(?s)newer version.*up to {SCHEMA_VERSION}.*got:\s+{SCHEMA_VERSION + 1}.*pip install --upgrade"):
         read_bundle(folder)
 
 
