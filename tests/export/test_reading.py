@@ -94,7 +94,8 @@ def test_manifest_that_is_none(folder, text, match):
 
 def test_newer_schema(folder):
     rewrite(folder, lambda manifest: manifest.update(schema_version=SCHEMA_VERSION + 1), sealed=True)
-    with pytest.raises(BundleError, match=rf"(?s)newer version.*up to {SCHEMA_VERSION}.*got:\s+{SCHEMA_VERSION + 1}.*pip install --upgrade"):
+    numbers = rf"up to {SCHEMA_VERSION}.*got:\s+{SCHEMA_VERSION + 1}"
+    with pytest.raises(BundleError, match=rf"(?s)newer version.*{numbers}.*pip install --upgrade"):
         read_bundle(folder)
 
 
