@@ -35,9 +35,9 @@ class Training:
         basis: ``levels and rates`` trains on each channel's newest sample and its rates of change, ``plain`` on the
             lagged samples as they are. The finished model is over lagged samples either way.
         offsets: Constant offsets, by channel and in its unit, with each of which the estimation traces are used once
-            more; the output among them where it moves with the inputs, as reservoirs that feed each other do. A record says little about what its absolute levels do and what their changes do when the two
-            always go together; copies that differ in level alone tell the network which to follow, and how far a
-            sensor may be off.
+            more; the output among them where it moves with the inputs, as reservoirs that feed each other do. A record
+            says little about what its absolute levels do and what their changes do when the two always go together;
+            copies that differ in level alone tell the network which to follow, and how far a sensor may be off.
         regularisation: ``None`` lets the evidence weigh the weights' sizes against the residuals, group by group. A
             number is that weight, the same for all and never changed: 0 is plain Levenberg-Marquardt (``trainlm``).
         prelude: Samples on which a random start is trained one step ahead before the free run (``prelude.py``): cheap
