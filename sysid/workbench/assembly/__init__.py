@@ -8,6 +8,9 @@
 ``line``      the places between those that are modelled
 ``stress``    the whole on many random sequences, against the reference
 ``document``  what came of it, as tables and charts
-``runner``    the run: every result on disk before it is announced
+``context``   where a run stores, whom it tells, what it loads and fits
+``course``    the stages in a run, every fit on disk before it is announced
+``finish``    scored, proven, exported, reported and tracked
+``runner``    the run, and what it leaves
 ============  ===================================================================================
 """

@@ -1,0 +1,125 @@
+"""What the steps of a run have in common: where it stores, whom it tells, what it loads and fits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sysid.content import content_folders
+from sysid.estimation import FitProgress, FitResult
+from sysid.traces import TraceSet
+from sysid.workbench import events
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.record import is_final, read_fit, write_fit
+from sysid.workbench.store import RunFolder, code_digest, digest, strict
+
+CODE = ("estimation", "models", "kernels")
+"""Rooms whose code a fit depends on."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Context:
+    """One run.
+
+    Args:
+        config: The pipeline.
+        text: Its YAML.
+        beside: Folder of the YAML, where data sets are looked for first.
+        store: Folder of the run.
+        command: What was typed.
+        fresh: Whether everything is done again, whatever is stored.
+        watchers: Told of every event.
+        digests: SHA-256 of every data set that was read, by name.
+    """
+
+    config: AssemblyConfig
+    text: bytes
+    beside: Path
+    store: RunFolder
+    command: str
+    fresh: bool
+    watchers: Sequence[events.Watcher]
+    digests: dict[str, str] = field(default_factory=dict)
+
+    def tell(self, event: events.Event) -> None:
+        """Tell the watchers.
+
+        Args:
+            event: What happened.
+        """
+        for watch in self.watchers:
+            watch(event)
+
+    def load(self, name: str) -> TraceSet:
+        """Load a data set.
+
+        Args:
+            name: Its name, or its folder beside the pipeline.
+
+        Returns:
+            Its traces.
+        """
+        from sysid.ingest import load_dataset
+
+        step, local = f"Loading {name}", self.beside / name
+        self.tell(events.StepStarted(step=step))
+        loaded = load_dataset(
+            local if local.exists() else name,
+            search=(self.beside.parent / "datasets", *content_folders("datasets")),
+            progress=lambda case, index, count: self.tell(
+                events.StepProgress(step=step, fraction=index / count, detail=f"{case} ({index + 1} of {count})")
+            ),
+        )
+        self.tell(events.StepDone(step=step, stored=False, detail=f"{len(loaded)} traces"))
+        self.digests[loaded.name] = loaded.digest
+        return loaded
+
+    def fit(
+        self,
+        name: str,
+        title: str,
+        terms: Mapping[str, Any],
+        work: Callable[[Callable[[FitProgress], None]], FitResult],
+    ) -> tuple[FitResult, str]:
+        """A fit that is stored under what it depends on.
+
+        Args:
+            name: Of its folder.
+            title: Of the step.
+            terms: What it depends on, beside the code.
+            work: Does it; given whom to tell after every iteration.
+
+        Returns:
+            The fit, and the digest of what it depends on.
+        """
+        key = digest(strict({"code": code_digest(*CODE), "terms": dict(terms)}))
+        folder = self.store.fit(name)
+        self.tell(events.StepStarted(step=title))
+        stored = not self.fresh and self.store.is_done(f"fit-{name}", key)
+        if stored:
+            fit = read_fit(folder)
+        else:
+            fit = work(self.reporter(title))
+            files = write_fit(folder, fit)
+            if is_final(fit):
+                self.store.mark_done(f"fit-{name}", key, files)
+        self.tell(events.StepDone(step=title, stored=stored, detail=f"{fit.train_time_s:.1f} s, {fit.status.value}"))
+        return fit, key
+
+    def reporter(self, step: str) -> Callable[[FitProgress], None]:
+        """Whom a training tells after every iteration.
+
+        Args:
+            step: Title of the step.
+
+        Returns:
+            The callback.
+        """
+
+        def report(entry: FitProgress) -> None:
+            detail = f"start {entry.start} of {entry.starts}, {entry.stage}, iteration {entry.iteration}"
+            self.tell(events.StepProgress(step=step, fraction=entry.fraction, detail=f"{detail}, mse {entry.mse:.3g}"))
+
+        return report

@@ -1,0 +1,240 @@
+"""The course of an assembly's training: alone, chosen together, retrained, grown, end to end; every fit kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sysid.errors import ConfigError
+from sysid.estimation import CascadeFit
+from sysid.models import Cascade, NARXModel
+from sysid.traces import Role, Trace, TraceSet
+from sysid.workbench import events
+from sysid.workbench.assembly.config import MemberConfig
+from sysid.workbench.assembly.context import CODE, Context
+from sysid.workbench.assembly.growth import Growth, Round, grow
+from sysid.workbench.assembly.members import Members, assembled, own_traces, whole_score
+from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
+from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
+
+ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
+GROWN, TOGETHER = "grown", "trained end to end"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Course:
+    """The training of one run.
+
+    Args:
+        context: The run.
+        notes: Sentences on how it came about.
+        stages: The whole after each stage.
+        growth: What growing the training data brought, where it was asked for.
+    """
+
+    context: Context
+    notes: list[str] = field(default_factory=list)
+    stages: dict[str, Cascade] = field(default_factory=dict)
+    growth: list[Growth] = field(default_factory=list)
+
+    def run(self) -> tuple[Trace, ...]:
+        """Go through all stages.
+
+        Returns:
+            The selection traces, which choose between them.
+
+        Raises:
+            ConfigError: If the data lack a role.
+        """
+        config = self.context.config
+        training = self.context.load(config.training)
+        estimation, selection = training.with_role(Role.ESTIMATION), training.with_role(Role.SELECTION)
+        if config.selection is not None:
+            selection = (*selection, *self.context.load(config.selection).with_role(Role.SELECTION))
+        if not estimation or not selection:
+            raise _lacks_a_role(training, "the training data lack a role")
+        models, key = self._members(estimation, selection)
+        models, key = self._retrained(models, key, estimation, selection)
+        models, key = self._grown(models, key, estimation, selection)
+        self._together(models, key, estimation, selection)
+        return tuple(selection)
+
+    def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
+        """Every member's candidates; the best of each alone, and those that are best together."""
+        candidates, alone, keys = {}, {}, []
+        data = [trace.digest for trace in (*estimation, *selection)]
+        for member in self.context.config.members:
+            fits = []
+            for number in range(member.candidates):
+                seed = self.context.config.seed + 1000 * number
+                fit, key = self.context.fit(
+                    f"{member.slug}-{number}",
+                    f"Fitting {member.mapping}, candidate {number + 1} of {member.candidates}",
+                    {"member": member.model_dump(mode="json", exclude={"candidates"}), "seed": seed, "data": data},
+                    partial(fit_member, member, estimation, selection, seed=seed),
+                )
+                fits.append(model_of(fit))
+                keys.append(key)
+            candidates[member.mapping.output] = fits
+            alone[member.mapping.output] = int(np.argmin([self._alone(member, fit, selection) for fit in fits]))
+        self.stages[ALONE] = assembled(
+            self.context.config, {name: models[alone[name]] for name, models in candidates.items()}
+        )
+        if max(map(len, candidates.values())) > 1:
+            step = "Choosing the members by the error of the whole"
+            self.context.tell(events.StepStarted(step=step))
+            choice = choose_together(
+                self.context.config,
+                candidates,
+                alone,
+                selection,
+                report=lambda text: self.context.tell(events.StepProgress(step=step, fraction=None, detail=text)),
+            )
+            self.context.tell(
+                events.StepDone(step=step, stored=False, detail=f"{choice.tried} wholes, best {choice.score:.3g}")
+            )
+            changed = [name for name in alone if choice.members[name] != alone[name]]
+            self.notes.append(
+                f"Of {choice.tried} wholes tried, the best has another {', '.join(changed)} than the best alone."
+                if changed
+                else f"Of {choice.tried} wholes tried, none beats the one of the members that are best alone."
+            )
+            alone = choice.members
+            self.stages[CHOSEN] = assembled(
+                self.context.config, {name: models[alone[name]] for name, models in candidates.items()}
+            )
+        return {name: models[alone[name]] for name, models in candidates.items()}, digest(strict([keys, alone]))
+
+    def _alone(self, member: MemberConfig, model: Any, selection: Sequence[Trace]) -> float:
+        errors = [
+            float(np.mean((model.simulate(t.columns(model.mapping.inputs)) - t[model.mapping.output]) ** 2))
+            for t in own_traces(member, selection)
+        ]
+        return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+
+    def _retrained(
+        self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]
+    ) -> tuple[Members, str]:
+        asked = self.context.config.retrain
+        if asked is None:
+            return models, key
+        outputs = self.context.config.choose_on or self.context.config.outputs
+        best = whole_score(assembled(self.context.config, models), selection, outputs)
+        members = {member.mapping.output: member for member in self.context.config.members}
+        for number in range(asked.rounds):
+            for name in asked.members:
+                member = members[name]
+                fit, key = self.context.fit(
+                    f"{member.slug}-retrained-{number}",
+                    f"Retraining {member.mapping} on what the others put out, round {number + 1}",
+                    {"before": key, "member": name, "iterations": asked.max_iterations},
+                    partial(
+                        retrain,
+                        self.context.config,
+                        member,
+                        models,
+                        estimation=estimation,
+                        selection=selection,
+                        max_iterations=asked.max_iterations,
+                    ),
+                )
+                changed = {**models, name: model_of(fit)}
+                score = whole_score(assembled(self.context.config, changed), selection, outputs)
+                verdict = "kept" if score < best else "not kept"
+                self.notes.append(
+                    f"{name} retrained on what the others put out (round {number + 1}): the whole's error on the "
+                    f"selection traces goes from {best:.3g} to {score:.3g}; {verdict}."
+                )
+                if score < best:
+                    models, best = changed, score
+        self.stages[RETRAINED] = assembled(self.context.config, models)
+        return models, key
+
+    def _grown(
+        self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]
+    ) -> tuple[Members, str]:
+        asked = self.context.config.grow
+        if asked is None:
+            return models, key
+        pool = self.context.load(asked.data)
+        sources, held_out = pool.with_role(Role.ESTIMATION), pool.with_role(Role.SELECTION)
+        if not sources or not held_out:
+            raise _lacks_a_role(pool, "the pool lacks a role")
+
+        def fit(
+            member: MemberConfig, now: Members, traces: Sequence[Trace], number: int, before: str
+        ) -> tuple[NARXModel, str]:
+            found, own = self.context.fit(
+                f"{member.slug}-grown-{number}",
+                f"Training {member.mapping} on {len(traces)} traces, round {number}",
+                {
+                    "before": before, "member": member.mapping.output, "iterations": asked.max_iterations,
+                    "data": [trace.digest for trace in traces],
+                },
+                partial(
+                    retrain, self.context.config, member, now, estimation=traces, selection=selection,
+                    max_iterations=asked.max_iterations,
+                ),
+            )  # fmt: skip
+            return model_of(found), own
+
+        def report(done: Round) -> None:
+            step = f"Looking for the sequences that the whole is worst at, after round {done.number}"
+            detail = f"{100.0 * done.look.within:.3g} % within, 99 % under {done.look.rare:.3g}, {done.samples} samples"
+            self.context.tell(events.StepStarted(step=step))
+            self.context.tell(events.StepDone(step=step, stored=False, detail=detail))
+
+        grown = grow(
+            self.context.config, models, key, fit, estimation=estimation, selection=selection, pool=sources,
+            held_out=held_out, report=report,
+        )  # fmt: skip
+        self.growth.append(grown)
+        self.notes.append(grown.sentence)
+        self.stages[GROWN] = assembled(self.context.config, grown.models)
+        return grown.models, grown.key
+
+    def _together(self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
+        if self.context.config.together is None:
+            return
+        step = "Training end to end"
+        name = "together"
+        terms = {
+            "code": code_digest(*CODE),
+            "before": key,
+            "together": self.context.config.together.model_dump(mode="json"),
+            "start": assembled(self.context.config, models).to_dict(),
+        }
+        whole_key, file = digest(strict(terms)), self.context.store.path / "together.json"
+        self.context.tell(events.StepStarted(step=step))
+        stored = not self.context.fresh and self.context.store.is_done(name, whole_key)
+        if stored:
+            fit = CascadeFit.from_dict(read_json(file))
+        else:
+            fit = train_together(
+                self.context.config,
+                assembled(self.context.config, models),
+                estimation,
+                selection,
+                self.context.reporter(step),
+            )
+            write_json(file, fit.to_dict())
+            self.context.store.mark_done(name, whole_key, [file])
+        self.context.tell(
+            events.StepDone(step=step, stored=stored, detail=f"{fit.train_time_s:.1f} s, {fit.status.value}")
+        )
+        self.notes.extend(fit.notes)
+        self.stages[TOGETHER] = fit.model
+
+
+def _lacks_a_role(found: TraceSet, what: str) -> ConfigError:
+    return ConfigError(
+        what,
+        where=f"data set {found.name}",
+        expected="cases with role: estimation, and cases with role: selection",
+        got=", ".join(f"{name}: {role.value}" for name, role in found.roles.items()),
+        remedy="give some cases that role in the data set's dataset.yaml",
+    )

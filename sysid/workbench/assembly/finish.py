@@ -1,0 +1,180 @@
+"""What a trained assembly comes to: scored, proven, exported, reported and tracked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sysid.models import Cascade
+from sysid.reporting.judgement import parse_judgement
+from sysid.reporting.judgement_report import (
+    JudgementResults,
+    SceneRecord,
+    SubjectRecord,
+    write_judgement_results,
+)
+from sysid.traces import Trace, TraceSet
+from sysid.validation import evaluate_cascade
+from sysid.workbench import events
+from sysid.workbench.annotation import find_annotator
+from sysid.workbench.assembly.context import Context
+from sysid.workbench.assembly.course import Course
+from sysid.workbench.assembly.document import Outcome, document
+from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
+from sysid.workbench.assembly.members import whole_score, written
+from sysid.workbench.assembly.stress import Stress, stress
+from sysid.workbench.environment import environment
+from sysid.workbench.store import digest, strict, write_json
+
+ASSEMBLY, LINE = "assembly.json", "line.json"
+"""In the run folder: the chosen whole, and its line."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Finish:
+    """The end of one run.
+
+    Args:
+        context: The run.
+        course: Its training, done.
+    """
+
+    context: Context
+    course: Course
+
+    def results(self, cases: TraceSet, selection: Sequence[Trace]) -> JudgementResults:
+        """Score every stage, choose one, and prove and export it.
+
+        Args:
+            cases: The cases that are scored.
+            selection: Traces that choose.
+
+        Returns:
+            What is reported, as it is stored.
+        """
+        config = self.context.config
+        outputs = config.choose_on or config.outputs
+        scores, timing, chosen_by = {}, {}, {}
+        for stage, cascade in self.course.stages.items():
+            evaluation = evaluate_cascade(cascade, cases, outputs=config.outputs)
+            scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
+            timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
+            chosen_by[stage] = whole_score(cascade, selection, outputs)
+        chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
+        whole = self.course.stages[chosen]
+        write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
+        stressed, worst = self._stressed(whole)
+        line = self._line(whole)
+        self._export(whole, cases, evaluate_cascade(whole, cases))
+        said = document(
+            config,
+            Outcome(
+                whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.course.notes,
+                timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst, line=line,
+                growth=tuple(self.course.growth),
+            ),
+        )  # fmt: skip
+        results = JudgementResults(
+            kind=config.kind,
+            pipeline=config.name,
+            description=config.description,
+            command=self.context.command,
+            created=time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+            environment=dict(environment()),
+            seed=config.seed,
+            data=SceneRecord(
+                name=cases.name,
+                digest=cases.digest,
+                others={name: found for name, found in self.context.digests.items() if name != cases.name},
+            ),
+            subjects=[
+                SubjectRecord(name=stage, parts=written(cascade)) for stage, cascade in self.course.stages.items()
+            ],
+            judgement=parse_judgement(strict(said), where="assembly"),
+        )
+        write_judgement_results(self.context.store.path, results)
+        return results
+
+    def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...]]:
+        """What came of the random sequences, and those that the whole did worst on."""
+        asked = self.context.config.stress
+        if asked is None:
+            return None, ()
+        annotator = None if asked.states is None else find_annotator(asked.states, where="stress, states")
+        step, sequences = "Running the whole on random sequences", self.context.load(asked.data)
+        self.context.tell(events.StepStarted(step=step))
+        found = stress(whole, tuple(sequences), asked.output, asked.within, annotator=annotator)
+        detail = f"{found.lost} of {found.sequences} diverged, {100 * found.within:.3g} % within"
+        self.context.tell(events.StepDone(step=step, stored=False, detail=detail))
+        return found, tuple(sequences[name] for name, _ in found.worst)
+
+    def _line(self, whole: Cascade) -> LineScores | None:
+        asked = self.context.config.line
+        if asked is None:
+            return None
+        line, cases, step = line_of(asked, whole), self.context.load(asked.data), "Running every place of the line"
+        write_json(self.context.store.path / LINE, StoredLine.of(asked, line, next(iter(cases))).to_dict())
+        self.context.tell(events.StepStarted(step=step))
+        scores = score_line(asked, line, cases)
+        slowest = max(scores.timing.values())
+        self.context.tell(
+            events.StepDone(step=step, stored=False, detail=f"all places of the longest case in {slowest:.3g} s")
+        )
+        return scores
+
+    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any) -> None:
+        from sysid.export import export_bundle
+
+        asked, step = self.context.config.export, "Exporting the assembly"
+        if asked is None:
+            return
+        self.context.tell(events.StepStarted(step=step))
+        provenance = {"pipeline": self.context.config.name, "command": self.context.command}
+        bundle = export_bundle(
+            whole, cases, self.context.store.path / "bundle", formats=asked.formats, tolerance=asked.tolerance,
+            metrics=evaluation, provenance=provenance,
+        )  # fmt: skip
+        worst = max((entry.largest_difference for entry in bundle.files), default=0.0)
+        self.context.tell(
+            events.StepDone(step=step, stored=False, detail=f"{len(bundle.files)} files, at most {worst:.1e} off")
+        )
+
+    def report(self) -> Path:
+        """Write the report.
+
+        Returns:
+            Its page.
+        """
+        from sysid.reporting.report import write_report
+
+        step = "Writing the report"
+        self.context.tell(events.StepStarted(step=step))
+        page = write_report(self.context.store.path)
+        self.context.tell(events.StepDone(step=step, stored=False, detail=str(page)))
+        return page
+
+    def track(self, results: JudgementResults, page: Path) -> None:
+        """Have each stage tracked as a run of its own, its figures beside the others'.
+
+        Args:
+            results: What is reported.
+            page: The report.
+        """
+        for stage, metrics in results.judgement.metrics.items():
+            self.context.tell(
+                events.JudgementReady(
+                    kind=self.context.config.kind,
+                    pipeline=self.context.config.name,
+                    subject=stage,
+                    digest=digest(strict({"pipeline": self.context.config.name, "stage": stage, "metrics": metrics})),
+                    metrics=metrics,
+                    fit_keys=(),
+                    tracked_as=(),
+                    page=page,
+                    document=self.context.store.results,
+                    command=self.context.command,
+                )
+            )
