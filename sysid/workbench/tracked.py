@@ -18,6 +18,24 @@ if TYPE_CHECKING:
     from sysid.validation import CaseResult
 
 
+COLOUR_TAG = "mlflow.runColor"
+"""Tag of a run with its colour in charts; without it MLflow may give two fits the same."""
+
+
+def colour(number: int) -> str:
+    """The colour of a fit, as reports have it.
+
+    Args:
+        number: Of the fit in its run.
+
+    Returns:
+        A colour as in ``#0072B2``.
+    """
+    from sysid.reporting.style import PALETTE
+
+    return PALETTE[number % len(PALETTE)]
+
+
 def run_name(ready: FitReady) -> str:
     """The fit as an engineer recognises it.
 

@@ -184,6 +184,7 @@ class Tracker:
             return
         words = tracked.tags(ready, self.run, self.data) | {
             KEY_TAG: ready.key,
+            tracked.COLOUR_TAG: tracked.colour(len(self.run_ids)),
             "mlflow.source.name": self.run.command,
             "mlflow.source.type": "LOCAL",
         }

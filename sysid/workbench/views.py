@@ -40,8 +40,11 @@ COLUMNS: Final = {
 NAME_WIDTH: Final = 330
 """Pixels for a name such as ``BP+AR -> BC · NARX 4/4/20 · closed``, which MLflow would cut in half."""
 
-METRIC_WIDTH: Final = 165
-"""Pixels for the name of a metric."""
+METRIC_WIDTH: Final = 150
+"""Pixels for the name of a metric: with :data:`ORDER_WIDTH`, the number of parameters still fits on a wide screen."""
+
+ORDER_WIDTH: Final = 170
+"""Pixels for the metric that sorts, which has a mark beside its name."""
 
 LAYOUT: Final = {"at a glance": (3, 360), "learning": (1, 360), "target and output": (2, 420)}
 """Charts side by side and their height in pixels, by section."""
@@ -110,7 +113,7 @@ def _state(cases: Sequence[str]) -> dict[str, Any]:
         "selectedColumns": columns,
         "columnOrder": ["attributes.`Run Name`", *columns],
         "columnWidths": {"attributes.`Run Name`": NAME_WIDTH}
-        | {column("metrics", name): METRIC_WIDTH for name in COLUMNS["metrics"]},
+        | {column("metrics", name): ORDER_WIDTH if name == ORDER else METRIC_WIDTH for name in COLUMNS["metrics"]},
         "runsHiddenMode": "FIRST_20_RUNS",
         "isAccordionReordered": True,
         "compareRunSections": [

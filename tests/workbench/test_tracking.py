@@ -65,6 +65,7 @@ def test_fits_stand_flat_in_the_experiment_of_their_mapping(tracked_once) -> Non
     assert {run.info.status for run in found.values()} == {"FINISHED"}
     assert not any("mlflow.parentRunId" in run.data.tags for run in found.values())
     assert len({run.data.tags["pipeline_run"] for run in found.values()}) == 1
+    assert len({run.data.tags["mlflow.runColor"] for run in found.values()}) == len(found), "told apart in charts"
 
 
 def test_parameters_and_figures_are_those_of_the_results(tracked_once) -> None:

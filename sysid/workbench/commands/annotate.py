@@ -14,7 +14,7 @@ from sysid.ingest import load_dataset, write_trace
 from sysid.traces import TraceSet
 from sysid.units import Reference
 from sysid.workbench.annotation import Annotator, annotated_set, find_annotator
-from sysid.workbench.commands.run import console
+from sysid.workbench.audience import console
 from sysid.workbench.naming import slug
 from sysid.workbench.store import write_bytes
 

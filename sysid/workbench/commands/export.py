@@ -7,7 +7,7 @@ from pathlib import Path
 from sysid.errors import ConfigError
 from sysid.export.bundle import zip_bundle
 from sysid.workbench import steps
-from sysid.workbench.commands.run import console
+from sysid.workbench.audience import console
 from sysid.workbench.config import ExportConfig, FitConfig, Pipeline, find_pipeline, read_pipeline
 from sysid.workbench.data import Data, load_data
 from sysid.workbench.record import read_fit, read_scores

@@ -17,7 +17,7 @@ from sysid.reporting.style import styled
 from sysid.reporting.svg import svg
 from sysid.traces import TraceSet
 from sysid.units import Reference
-from sysid.workbench.commands.run import console
+from sysid.workbench.audience import console
 from sysid.workbench.naming import nearby
 from sysid.workbench.schemas import schema_line
 from sysid.workbench.store import write_bytes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sysid.workbench.commands.run import console
+from sysid.workbench.audience import console
 
 
 def report_command(run_folder: Path, *, against: Path | None, pdf: bool) -> None:

@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
-from rich.console import Console
-
 from sysid.errors import ConfigError
+from sysid.workbench.audience import Audience, console, typed_command
 from sysid.workbench.config import find_pipeline, read_pipeline
-from sysid.workbench.events import Warned, Watcher
 from sysid.workbench.kinds import DEFAULT, RunRequest, kind_of, kinds
 from sysid.workbench.pipeline import run_pipeline
-from sysid.workbench.screen import LogFile, Screen, duration, table_of_fits, table_of_steps
-from sysid.workbench.tracking import Tracker
-
-PIPED_WIDTH = 160
-"""Columns where there is no terminal to ask: enough for a table of five cases on one line."""
-
-
-def console() -> Console:
-    """Where results are shown.
-
-    Returns:
-        A console on standard output.
-    """
-    plain = Console(highlight=False)
-    return plain if plain.is_terminal else Console(highlight=False, width=PIPED_WIDTH)
+from sysid.workbench.screen import duration, table_of_fits, table_of_steps
 
 
 def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool) -> int:
@@ -91,41 +74,24 @@ def run_fits(request: RunRequest) -> int:
     Raises:
         UserError: If the pipeline, its data or its options cannot be used.
     """
-    read, out, tracking = read_pipeline(request.path), request.out, request.tracking
-    folder = out or Path("runs") / read.config.name
-    words = ["sysid", "run", request.typed, *(["--out", str(out)] if out else [])]
-    target = console()
-    screen, log = Screen(target), LogFile()
-    watchers: list[Watcher] = [screen, log]
-
-    def warn(text: str) -> None:
-        for watch in (screen, log):
-            watch(Warned(text=text))
-
-    tracker = Tracker.of_workspace(Path.cwd(), warn) if tracking else None
-    watchers += [tracker] if tracker else []
+    read, out = read_pipeline(request.path), request.out
+    folder, audience = out or Path("runs") / read.config.name, Audience.of(tracking=request.tracking)
+    command = typed_command("run", request.typed, out)
     try:
-        results = run_pipeline(read, folder, command=shlex.join(words), fresh=request.fresh, watchers=watchers)
+        results = run_pipeline(read, folder, command=command, fresh=request.fresh, watchers=audience.watchers)
     finally:
-        screen.close()
-    target.print()
-    target.print(table_of_fits(results))
+        audience.screen.close()
+    audience.target.print()
+    audience.target.print(table_of_fits(results))
     if results.best is not None:
-        target.print(f"Best: {results.best.name}. {results.best.chosen_by}")
-    lines = {
-        "Report": folder / "report" / "index.html",
-        "Bundle": folder / "bundle",
-        "Results": folder / "results.json",
-    }
-    for name, path in lines.items():
-        if path.exists():
-            target.print(f"{name + ':':<9}{path}", soft_wrap=True)
-    if tracker is None:
-        return 0
-    if tracker.failures:
-        target.print(
-            "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
-        )
-        return 1
-    target.print(f"{'Compare:':<9}sysid ui")
-    return 0
+        audience.target.print(f"Best: {results.best.name}. {results.best.chosen_by}")
+    code = audience.end(
+        {
+            "Report": folder / "report" / "index.html",
+            "Bundle": folder / "bundle",
+            "Results": folder / "results.json",
+        }
+    )
+    if request.tracking and code == 0:
+        audience.target.print(f"{'Compare:':<9}sysid ui")
+    return code

@@ -15,7 +15,7 @@ from sysid.ingest import write_trace
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.runner import read_line
-from sysid.workbench.commands.run import console
+from sysid.workbench.audience import console
 from sysid.workbench.commands.simulate import check_picture
 
 DRAWN = 5

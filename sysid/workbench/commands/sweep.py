@@ -10,14 +10,12 @@ from rich.table import Table
 
 from sysid.errors import ConfigError
 from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.commands.run import console
+from sysid.workbench.audience import Audience, typed_command
 from sysid.workbench.config import find_pipeline
-from sysid.workbench.events import Warned, Watcher
 from sysid.workbench.kinds import KINDS, RunRequest, kind_of
-from sysid.workbench.screen import LogFile, Screen, table_of_fits
+from sysid.workbench.screen import table_of_fits
 from sysid.workbench.sweep_run import Sweep, read_sweep_file, run_sweep
 from sysid.workbench.sweep_store import TrialStore
-from sysid.workbench.tracking import Tracker
 
 SHOWN = 5
 """Trials in the table on the screen."""
@@ -63,8 +61,7 @@ def sweep_command(
             expected="a run folder with finished trials",
             remedy="leave --resume out to begin one, or name its folder with --out",
         )
-    words = ["sysid", "sweep", pipeline, *(["--out", str(out)] if out else [])]
-    return _run(sweep, folder, shlex.join(words), fresh=fresh, tracking=tracking)
+    return _run(sweep, folder, typed_command("sweep", pipeline, out), fresh=fresh, tracking=tracking)
 
 
 def run_sweep_request(request: RunRequest) -> int:
@@ -78,44 +75,28 @@ def run_sweep_request(request: RunRequest) -> int:
     """
     sweep = read_sweep_file(request.path)
     folder = request.out or Path("runs") / sweep.config.name
-    words = ["sysid", "sweep", request.typed, *(["--out", str(request.out)] if request.out else [])]
-    return _run(sweep, folder, shlex.join(words), fresh=request.fresh, tracking=request.tracking)
+    command = typed_command("sweep", request.typed, request.out)
+    return _run(sweep, folder, command, fresh=request.fresh, tracking=request.tracking)
 
 
 def _run(sweep: Sweep, folder: Path, command: str, *, fresh: bool, tracking: bool) -> int:
-    target = console()
-    screen, log = Screen(target), LogFile()
-    watchers: list[Watcher] = [screen, log]
-
-    def warn(text: str) -> None:
-        for watch in (screen, log):
-            watch(Warned(text=text))
-
-    tracker = Tracker.of_workspace(Path.cwd(), warn) if tracking else None
-    watchers += [tracker] if tracker else []
+    audience = Audience.of(tracking=tracking)
     try:
-        swept = run_sweep(sweep, folder, command=command, fresh=fresh, watchers=watchers)
+        swept = run_sweep(sweep, folder, command=command, fresh=fresh, watchers=audience.watchers)
     finally:
-        screen.close()
-    target.print()
-    target.print(_table_of_trials(swept.record))
-    target.print(table_of_fits(swept.results))
-    target.print(f"Best: {swept.results.fits[0].label}. {swept.record.chosen_by}", soft_wrap=True)
-    lines = {
-        "Report": folder / "report" / "index.html",
-        "Bundle": folder / "bundle",
-        "Trials": folder / "sweep.json",
-        "Results": folder / "results.json",
-    }
-    for name, path in lines.items():
-        if path.exists():
-            target.print(f"{name + ':':<9}{path}", soft_wrap=True)
-    if tracker is not None and tracker.failures:
-        target.print(
-            "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
-        )
-        return 1
-    return 0
+        audience.screen.close()
+    audience.target.print()
+    audience.target.print(_table_of_trials(swept.record))
+    audience.target.print(table_of_fits(swept.results))
+    audience.target.print(f"Best: {swept.results.fits[0].label}. {swept.record.chosen_by}", soft_wrap=True)
+    return audience.end(
+        {
+            "Report": folder / "report" / "index.html",
+            "Bundle": folder / "bundle",
+            "Trials": folder / "sweep.json",
+            "Results": folder / "results.json",
+        }
+    )
 
 
 def _table_of_trials(record: SweepRecord) -> Table:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from sysid.errors import SysidError
-from sysid.workbench.commands.run import console
+from sysid.workbench.audience import console
 from sysid.workbench.tracking import QUIET, latest_experiment, store_uri
 from sysid.workbench.views import VIEW
 

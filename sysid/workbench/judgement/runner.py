@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,49 +41,32 @@ def run_judgement(request: RunRequest) -> int:
     Raises:
         UserError: If the pipeline, a model or an option cannot be used.
     """
-    from sysid.workbench.commands.run import console
-    from sysid.workbench.screen import LogFile, Screen
-    from sysid.workbench.tracking import Tracker, fetch_bundle, store_uri
+    from sysid.workbench.audience import Audience, typed_command
+    from sysid.workbench.tracking import fetch_bundle, store_uri
 
     config = check(JudgementConfig, read_yaml(request.path), where=request.path)
     folder = (request.out or Path("runs") / config.name).resolve()
-    words = ["sysid", "run", request.typed, *(["--out", str(request.out)] if request.out else [])]
-    target = console()
-    screen, log = Screen(target), LogFile()
-    log.write_to(folder, shlex.join(words))
-    watchers: list[Watcher] = [screen, log]
-
-    def warn(text: str) -> None:
-        for watch in (screen, log):
-            watch(Warned(text=text))
-
-    tracker = Tracker.of_workspace(Path.cwd(), warn) if request.tracking else None
-    watchers += [tracker] if tracker else []
+    command, audience = typed_command("run", request.typed, request.out), Audience.of(tracking=request.tracking)
+    audience.log.write_to(folder, command)
     run = _Run(
         config=config,
         text=request.path.read_bytes(),
         judge=find_judge(config.kind, where=request.path),
         where=request.path,
         store=RunFolder(path=folder),
-        command=shlex.join(words),
+        command=command,
         fresh=request.fresh,
-        watchers=watchers,
+        watchers=audience.watchers,
         fetch=lambda address: fetch_bundle(store_uri(Path.cwd()), address, folder / "models"),
     )
     try:
         with run.store.locked():
             results, page = run.all()
     finally:
-        screen.close()
-    target.print()
-    target.print(results.judgement.headline, soft_wrap=True)
-    target.print(f"Report:  {nearby(page)}\nResults: {nearby(run.store.results)}", soft_wrap=True)
-    if tracker is not None and tracker.failures:
-        target.print(
-            "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
-        )
-        return 1
-    return 0
+        audience.screen.close()
+    audience.target.print()
+    audience.target.print(results.judgement.headline, soft_wrap=True)
+    return audience.end({"Report": nearby(page), "Results": nearby(run.store.results)})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

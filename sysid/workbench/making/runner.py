@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
 import yaml
@@ -10,7 +9,7 @@ import yaml
 from sysid.ingest import load_dataset
 from sysid.traces import TraceSet
 from sysid.workbench.environment import environment
-from sysid.workbench.events import Event, StepDone, StepProgress, StepStarted, Watcher
+from sysid.workbench.events import StepDone, StepProgress, StepStarted, Watcher
 from sysid.workbench.kept_steps import do_steps
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.making.config import MakingConfig
@@ -33,32 +32,24 @@ def run_making(request: RunRequest) -> int:
     Raises:
         UserError: If the pipeline or an option cannot be used.
     """
-    from sysid.workbench.commands.run import console
-    from sysid.workbench.screen import LogFile, Screen
+    from sysid.workbench.audience import Audience, typed_command
 
     config = check(MakingConfig, read_yaml(request.path), where=request.path)
     store = RunFolder(path=(request.out or Path("runs") / config.name).resolve())
-    words = ["sysid", "run", request.typed, *(["--out", str(request.out)] if request.out else [])]
-    target = console()
-    screen, log = Screen(target), LogFile()
-    log.write_to(store.path, shlex.join(words))
-
-    def tell(event: Event) -> None:
-        for watch in (screen, log):
-            watch(event)
-
+    command, audience = typed_command("run", request.typed, request.out), Audience.of(tracking=False)
+    audience.log.write_to(store.path, command)
     try:
         with store.locked():
             write_bytes(store.path / "pipeline.yaml", request.path.read_bytes())
             write_json(store.path / "environment.json", environment())
-            file = _make(config, request, store=store, tell=tell, command=shlex.join(words))
-            traces = _load(file, tell)
+            file = _make(config, request, store=store, tell=audience.tell, command=command)
+            traces = _load(file, audience.tell)
     finally:
-        screen.close()
+        audience.screen.close()
     roles = ", ".join(f"{trace.name} ({traces.roles[trace.name].value})" for trace in traces)
-    target.print(f"\n{len(traces)} traces: {roles}", soft_wrap=True)
-    target.print(f"Data set: {file}\nLook at it with: sysid ingest {file}", soft_wrap=True)
-    target.print(f"Fit or choose on it with data: {file}, or selection: {file}, in a pipeline", soft_wrap=True)
+    audience.target.print(f"\n{len(traces)} traces: {roles}", soft_wrap=True)
+    audience.target.print(f"Data set: {file}\nLook at it with: sysid ingest {file}", soft_wrap=True)
+    audience.target.print(f"Fit or choose on it with data: {file}, or selection: {file}, in a pipeline", soft_wrap=True)
     return 0
 
 
