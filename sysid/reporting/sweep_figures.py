@@ -196,7 +196,8 @@ def parallel_figure(record: SweepRecord) -> Figure | None:
         for number, (_, _, texts, places) in enumerate(columns):
             axes.axvline(number, color=TARGET, linewidth=0.8)
             for text, place in zip(texts, places, strict=True):
-                axes.text(number + 0.03, place, text, fontsize=7, va="center")
+                box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8}
+                axes.text(number + 0.03, place, text, fontsize=7, va="center", bbox=box)
         axes.set_xticks(range(len(columns)), [column[0] for column in columns], fontsize=7.5)
         axes.set_yticks([])
         axes.set_xlim(-0.1, len(columns) - 0.6)
