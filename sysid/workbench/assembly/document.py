@@ -16,7 +16,15 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.stress import Stress
-from sysid.workbench.assembly.views import growth_chart, growth_table, line_chart, line_point, line_table, stress_tables
+from sysid.workbench.assembly.views import (
+    growth_chart,
+    growth_table,
+    line_chart,
+    line_metrics,
+    line_point,
+    line_table,
+    stress_tables,
+)
 
 COLUMNS = 300
 """Width of the charts in points: enough for the eye, and a page of some hundred kilobytes."""
@@ -95,6 +103,7 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
         "scores": [_score(config, name, found) for name in config.outputs],
         "metrics": {
             stage: {f"{output}/{case}/mse": value for output, by in scores.items() for case, value in by.items()}
+            | (line_metrics(found.line) if found.line is not None and stage == found.chosen else {})
             for stage, scores in found.stages.items()
         },
     }

@@ -164,6 +164,25 @@ def line_chart(scores: LineScores, output: str) -> dict[str, Any]:
     }
 
 
+def line_metrics(scores: LineScores) -> dict[str, float]:
+    """Numbers to track with the chosen stage.
+
+    Args:
+        scores: The scores.
+
+    Returns:
+        Mean and largest error over the places that nothing was fitted at, by output and case.
+    """
+    found = {}
+    for output, by_case in scores.mse.items():
+        for case, errors in by_case.items():
+            own = errors[~scores.seen[output]]
+            if len(own):
+                found[f"{output}/{case}/unseen places/mse"] = float(own.mean())
+                found[f"{output}/{case}/unseen places/worst mse"] = float(own.max())
+    return found
+
+
 def line_point(scores: LineScores) -> tuple[str, str]:
     """For the verdict.
 

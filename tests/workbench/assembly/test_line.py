@@ -13,7 +13,7 @@ from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.assembly.config import LineConfig
 from sysid.workbench.assembly.line import line_of, places_of, score_line
 from sysid.workbench.assembly.members import assembled
-from sysid.workbench.assembly.views import line_chart, line_point, line_table
+from sysid.workbench.assembly.views import line_chart, line_metrics, line_point, line_table
 from tests.workbench.assembly.test_members import TWO_PLACES, config, models, trace
 
 ASKED = LineConfig(channel="BP", knots={"BP": 1, "BP9": 9}, outputs=("AR",), data="places")
@@ -62,6 +62,9 @@ def test_each_place_is_scored_by_itself():
         [case, pytest.approx(0.25), pytest.approx(0.25), 4.0] for case in ("A", "B")
     ]
     assert [one["name"] for one in line_chart(scores, "AR")["lines"]] == ["A", "B", "fitted here"]
+    assert line_metrics(scores) == pytest.approx(
+        {f"AR/{case}/unseen places/{what}": 0.25 for case in ("A", "B") for what in ("mse", "worst mse")}
+    )
     keyword, sentence = line_point(scores)
     assert keyword == "Everywhere"
     assert "at worst 0.250 (" in sentence
