@@ -84,7 +84,7 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
     tables.append(_time_table(found.timing, found.cases))
     return {
         "title": "The assembly",
-        "headline": _headline(config, found.stages[found.chosen], found.chosen),
+        "headline": _headline(config, found),
         "points": _points(config, found),
         "sentences": [
             f"The whole has {len(whole.models)} models and {whole.n_parameters} parameters; it reads "
@@ -109,18 +109,24 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
     }
 
 
-def _headline(config: AssemblyConfig, scores: Scores, chosen: str) -> str:
-    parts = []
+def _squared(output: str, found: Outcome) -> str:
+    """The unit of an output's squared error."""
+    return f"{found.cases[0].channel(output).unit}²"
+
+
+def _headline(config: AssemblyConfig, found: Outcome) -> str:
+    parts, scores = [], found.stages[found.chosen]
     for output in config.outputs:
         worst = max(scores[output], key=lambda case: scores[output][case])
-        parts.append(f"{output} at worst {scores[output][worst]:.3g} ({worst})")
-    return f"From the command alone, {chosen}: mean squared error of {'; '.join(parts)}."
+        parts.append(f"{output} at worst {quantity(scores[output][worst], _squared(output, found))} ({worst})")
+    return f"From the command alone, {found.chosen}: mean squared error of {'; '.join(parts)}."
 
 
 def _points(config: AssemblyConfig, found: Outcome) -> list[tuple[str, str]]:
     """How good, how good beside what is published, how fast, and where it is weak."""
     scores = found.stages[found.chosen]
-    points = [("Accuracy", "; ".join(_spread(name, scores[name]) for name in config.outputs) + ".")]
+    spreads = (_spread(name, scores[name], _squared(name, found)) for name in config.outputs)
+    points = [("Accuracy", f"Mean squared error of the free run: {'; '.join(spreads)}.")]
     beside = [_beside(name, scores[name], config) for name in config.outputs if name in config.published]
     points += [("Published", f"{'; '.join(beside)}.")] if beside else []
     lengths = {trace.name: len(trace) * trace.sample_time for trace in found.cases}
@@ -158,9 +164,9 @@ def _score(config: AssemblyConfig, output: str, found: Outcome) -> dict[str, Any
     }
 
 
-def _spread(output: str, by_case: Mapping[str, float]) -> str:
+def _spread(output: str, by_case: Mapping[str, float], unit: str) -> str:
     low, high = min(by_case, key=lambda case: by_case[case]), max(by_case, key=lambda case: by_case[case])
-    return f"{output} between {number(by_case[low])} ({low}) and {number(by_case[high])} ({high})"
+    return f"{output} between {number(by_case[low])} ({low}) and {quantity(by_case[high], unit)} ({high})"
 
 
 def _beside(output: str, by_case: Mapping[str, float], config: AssemblyConfig) -> str:
@@ -168,10 +174,8 @@ def _beside(output: str, by_case: Mapping[str, float], config: AssemblyConfig) -
     ratios = [by_case[case] / value for case, value in published.mse.items() if case in by_case]
     reached = sum(ratio <= published.target for ratio in ratios)
     below = sum(ratio <= 1.0 for ratio in ratios)
-    return (
-        f"{output} at or below {published.source} on {below} of {len(ratios)} cases, at or below "
-        f"{published.target:g} of it, which was aimed at, on {reached}"
-    )
+    aim = "" if published.target == 1.0 else f" ({published.target:g} of it, which was aimed at, on {reached})"
+    return f"{output} at or below {published.source} on {below} of {len(ratios)} cases{aim}"
 
 
 def _stage_table(config: AssemblyConfig, output: str, found: Outcome) -> dict[str, Any]:
@@ -190,10 +194,10 @@ def _stage_table(config: AssemblyConfig, output: str, found: Outcome) -> dict[st
         aimed = [_share(published.mse.get(case), published.target) for case in cases]
         rows.append([f"aimed at: {published.target:g} of it", *aimed, None])
     return {
-        "caption": f"{output}: mean squared error of the free run of the whole",
+        "caption": f"{output}: mean squared error of the free run of the whole [{_squared(output, found)}]",
         "head": [["Stage", ""], *([case, ""] for case in cases), ["Selection", "geometric mean"]],
         "rows": rows,
-        "note": "From the inputs of the whole alone, in the output's unit squared. No case had a say in any choice.",
+        "note": "From the inputs of the whole alone. No case had a say in any choice.",
     }
 
 
