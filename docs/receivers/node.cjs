@@ -26,7 +26,9 @@ async function main(bundle) {
     for (const space of about.state.state_spaces ?? []) {
       const scaled = space.channels.map((name, i) => (rest[name] - space.offset[i]) / space.scale[i]);
       space.at_rest.forEach((row, i) => {
-        state[space.first + i] = row.reduce((sum, number, j) => sum + number * scaled[j], 0);
+        const level = row.reduce((sum, number, j) => sum + number * scaled[j], space.constant[i]);
+        const bound = space.bound ?? Infinity;
+        state[space.first + i] = Math.min(Math.max(level, -bound), bound);
       });
     }
     const u = rows.flatMap((row) => row.slice(1, 1 + nInputs));

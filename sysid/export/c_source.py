@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 import sysid
-from sysid.export.cell import LinearCell
 from sysid.export.flags import MEANING
-from sysid.export.layout import LinearState
+from sysid.export.layout import SpaceState
 from sysid.export.rates import RateForm
+from sysid.export.space import SpaceCell
 from sysid.export.surrogate import Level, Side, Stage, Surrogate
 from sysid.export.templating import c_real, render
 
@@ -82,7 +82,7 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
         "outputs": outputs,
         "limited": stage.limited,
     }
-    return common | (_space(stage) if isinstance(cell, LinearCell) else _lagged(stage))
+    return common | (_space(stage) if isinstance(cell, SpaceCell) else _lagged(stage))
 
 
 def _side(surrogate: Surrogate, side: Side) -> dict[str, Any]:
@@ -130,16 +130,22 @@ def _lagged(stage: Stage) -> dict[str, Any]:
 
 
 def _space(stage: Stage) -> dict[str, Any]:
-    form = stage.space
+    cell = stage.space
     return {
         "kind": "space",
-        "n": form.n_state,
-        "neurons": 0,
-        "adds": form.n_state > 0,
-        "change": np.concatenate([form.A - np.eye(form.n_state), form.B], axis=1),
-        "readout": np.concatenate([form.C, form.D]),
-        "constant": [form.constant],
-        "scaled": _scaled(stage, [True] * form.n_inputs),
+        "n": cell.n_state,
+        "neurons": 0 if cell.cubic else len(cell.state_neurons) + len(cell.output_neurons),
+        "adds": cell.n_state > 0,
+        "change": cell.change,
+        "drift": cell.drift,
+        "readout": cell.readout,
+        "constant": [cell.constant],
+        "state_neurons": cell.state_neurons,
+        "output_neurons": cell.output_neurons,
+        "cubic": cell.cubic,
+        "rectified": cell.rectified,
+        "bound": cell.bound if np.isfinite(cell.bound) else None,
+        "scaled": _scaled(stage, [True] * cell.n_inputs),
     }
 
 
@@ -170,11 +176,13 @@ def _rest_spaces(surrogate: Surrogate) -> list[dict[str, Any]]:
     """Every state space with what its scaled inputs hold at rest."""
     found = []
     for stage in surrogate.stages:
-        if isinstance(stage.state, LinearState) and stage.state.size:
-            gain = {
-                "first": stage.first,
-                "gain": stage.state.gain,
-                "inputs": _scaled(stage, [True] * stage.cell.n_inputs),
-            }
-            found.append(gain | {"size": stage.state.size, "n_inputs": stage.cell.n_inputs})
+        if isinstance(stage.state, SpaceState) and stage.state.size:
+            cell, places = stage.space, (*stage.sources, *stage.targets)
+            channels = [
+                {"source": source, "offset": offset, "scale": scale}
+                for source, offset, scale, _ in zip(places, cell.offset, cell.scale, cell.rest_channels, strict=False)
+            ]
+            bound = cell.bound if np.isfinite(cell.bound) else None
+            rest = {"first": stage.first, "gain": cell.gain, "rest": cell.rest, "channels": channels, "bound": bound}
+            found.append(rest | {"size": stage.state.size})
     return found

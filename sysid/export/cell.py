@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.models import AbstractModel, StateSpace
+from sysid.export.space import SpaceCell
+from sysid.models import AbstractModel, NeuralForm, StateSpace
 from sysid.models.cascade_program import Part
 from sysid.models.wiring import Ends, Member
 
@@ -65,7 +66,7 @@ class Cell:
         if part is None:
             raise ConfigError(
                 "this kind of model cannot be exported",
-                expected="a model over lagged inputs and outputs (ARX, NARX), or a transfer function",
+                expected="a model over lagged inputs and outputs (ARX, NARX), or a state space, linear or neural",
                 got=model.structure.label,
                 remedy="fit one of these to what this model puts out, and export that",
             )
@@ -114,50 +115,7 @@ class Cell:
         return all(1 in own for own in self.lags[self.n_inputs :])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LinearCell:
-    """A state space as exporters see it.
-
-    Args:
-        ends: Names, units and values at rest of what goes in and comes out.
-        form: The state space.
-    """
-
-    ends: Ends
-    form: StateSpace
-
-    @property
-    def n_inputs(self) -> int:
-        """Number of inputs."""
-        return len(self.ends.inputs)
-
-    @property
-    def n_outputs(self) -> int:
-        """One."""
-        return 1
-
-    @property
-    def offset(self) -> tuple[float, ...]:
-        """Of every input, then of the output, in its unit."""
-        return (*self.form.scaling.input_offset, self.form.scaling.output_offset)
-
-    @property
-    def scale(self) -> tuple[float, ...]:
-        """Of every input, then of the output, in its unit."""
-        return (*self.form.scaling.input_scale, self.form.scaling.output_scale)
-
-    @property
-    def low(self) -> float:
-        """Lower bound of the output in scaled numbers."""
-        return self.form.low
-
-    @property
-    def high(self) -> float:
-        """Upper bound of the output in scaled numbers."""
-        return self.form.high
-
-
-def cell_of(model: Member) -> Cell | LinearCell:
+def cell_of(model: Member) -> Cell | SpaceCell:
     """A model as a cell, whichever kind it lowers to.
 
     Args:
@@ -170,5 +128,7 @@ def cell_of(model: Member) -> Cell | LinearCell:
         ConfigError: If it lowers to neither kind.
     """
     if isinstance(model, AbstractModel) and isinstance(model.recursion, StateSpace):
-        return LinearCell(ends=Ends.of(model), form=model.recursion)
+        return SpaceCell.linear(model.recursion, Ends.of(model))
+    if isinstance(model, AbstractModel) and isinstance(model.recursion, NeuralForm):
+        return SpaceCell.neural(model.recursion, Ends.of(model))
     return Cell.of(model)

@@ -13,53 +13,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.cell import Cell, LinearCell, cell_of
+from sysid.export.cell import Cell, cell_of
+from sysid.export.space import SpaceCell
 from sysid.models import History
 from sysid.models.wiring import Member
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LinearState:
-    """The state of a linear state space: numbers without a channel of their own.
+class SpaceState:
+    """The state of a state space: numbers without a channel of their own.
 
     Args:
         cell: The state space.
     """
 
-    cell: LinearCell
+    cell: SpaceCell
 
     @property
     def size(self) -> int:
         """Length of the state."""
-        return self.cell.form.n_state
+        return self.cell.n_state
 
     @property
     def lines(self) -> tuple[DelayLine, ...]:
         """None: no number of the state is a past sample."""
         return ()
 
-    @property
-    def gain(self) -> NDArray[np.float64]:
-        """From scaled inputs to the state that they hold at rest, shape ``(size, n_inputs)``."""
-        columns = [self.cell.form.equilibrium(unit) for unit in np.eye(self.cell.n_inputs)]
-        return np.column_stack(columns)
-
     def from_history(self, history: History) -> NDArray[np.float64]:
-        """The state after some samples.
-
-        Args:
-            history: The samples, oldest first, in units; a single one is a system at rest.
-
-        Returns:
-            Shape ``(size,)``.
-        """
-        return self.cell.form.state(history)
+        """The state after some samples; see :meth:`SpaceCell.from_history`."""
+        return self.cell.from_history(history)
 
     def at_rest(self, levels: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The state of a system that has stood at some inputs for ever.
+        """The state of a system that has stood at some values for ever.
 
         Args:
-            levels: Inputs, then the output, in their units; the output is not read.
+            levels: Inputs, then the output, in their units.
 
         Returns:
             Shape ``(size,)``.
@@ -68,18 +56,23 @@ class LinearState:
 
     def to_dict(self) -> dict[str, Any]:
         """How to begin at rest, as JSON values."""
-        scaling = self.cell.form.scaling
+        cell = self.cell
+        channels = cell.rest_channels
+        bounds = {"bound": cell.bound} if np.isfinite(cell.bound) else {}
         return {
             "size": self.size,
-            "rule": "at rest: at_rest times the scaled channels, (value - offset) / scale, one column per channel",
-            "channels": list(self.cell.ends.inputs),
-            "offset": list(scaling.input_offset),
-            "scale": list(scaling.input_scale),
-            "at_rest": self.gain.tolist(),
+            "rule": "at rest: constant plus at_rest times the scaled channels, (value - offset) / scale, one column "
+            "per channel; within the bound, where there is one, on both sides of zero",
+            "channels": list(channels),
+            "offset": list(cell.offset[: len(channels)]),
+            "scale": list(cell.scale[: len(channels)]),
+            "at_rest": cell.gain.tolist(),
+            "constant": cell.rest.tolist(),
+            **bounds,
         }
 
 
-def layout_of(model: Member) -> StateLayout | LinearState:
+def layout_of(model: Member) -> StateLayout | SpaceState:
     """The layout of a model's state, whatever it lowers to.
 
     Args:
@@ -92,7 +85,7 @@ def layout_of(model: Member) -> StateLayout | LinearState:
         ConfigError: If it lowers to neither.
     """
     cell = cell_of(model)
-    return LinearState(cell=cell) if isinstance(cell, LinearCell) else StateLayout.of_cell(cell)
+    return SpaceState(cell=cell) if isinstance(cell, SpaceCell) else StateLayout.of_cell(cell)
 
 
 @dataclass(frozen=True, kw_only=True)

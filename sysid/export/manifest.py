@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
-from sysid.export.layout import LinearState
+from sysid.export.layout import SpaceState
 from sysid.export.parity import Parity, ParityCase
 from sysid.export.surrogate import Port, Range, Stage, Surrogate
 from sysid.models import Cascade, Start
@@ -26,7 +26,8 @@ SCHEMA_VERSION = 4
 """Raised when a reader of an earlier version cannot read the file, or would misread it. Every version from 1 on can be
 read: 2 added what lies beside the exported files (``attachments``), and parity over random sequences; 3 has several
 outputs and models in place of one (``outputs``, ``stages``), and float32 files whose state is longer by the remainders;
-4 has networks with gates, and models that read each other in a circle."""
+4 has networks with gates, models that read each other in a circle, and neural state spaces, whose state at rest has a
+constant and a bound."""
 SCHEMA = "model.schema.json"
 """The JSON schema of ``model.json``, which travels in every bundle."""
 MANIFEST = "model.json"
@@ -311,10 +312,11 @@ def _channel(port: Port, traces: TraceSet, estimation: tuple[Trace, ...]) -> dic
 def _initialisation(surrogate: Surrogate, example: Trace) -> dict[str, Any]:
     first = example.columns(tuple(port.name for port in surrogate.inputs))[0]
     lines = "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale"
-    spaces = [stage for stage in surrogate.stages if isinstance(stage.state, LinearState)]
+    spaces = [stage for stage in surrogate.stages if isinstance(stage.state, SpaceState)]
     levels = surrogate.levels(first).tolist()
     return {
-        "rule": lines + ("; a state space is at the equilibrium of its inputs" if spaces else ""),
+        "rule": lines
+        + ("; a state space is where its inputs, and in a neural one its output, hold it" if spaces else ""),
         "levels": {port.name: port.level for port in surrogate.channels},
         "values": {port.name: value for port, value in zip(surrogate.channels, levels, strict=True)},
         "values_from": f"the inputs' first sample in {example.name}, and the levels: numbers, or inputs",

@@ -11,7 +11,7 @@ import numpy as np
 from sysid.export.cell import Cell
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.onnx_step import added
+from sysid.export.onnx_step import added, space_step, within_bound
 from sysid.export.rates import RateForm
 from sysid.export.surrogate import Side, Stage
 
@@ -218,7 +218,7 @@ def _limit(nodes: Nodes, stage: Stage, j: int, side: Side, rows: Sequence[str]) 
     )
 
 
-def linear_body(outer: Nodes, stage: Stage, *, keeps: bool) -> Body:
+def space_body(outer: Nodes, stage: Stage, *, keeps: bool) -> Body:
     """The body for a state space: it carries its state, and each step is two products.
 
     Args:
@@ -229,18 +229,16 @@ def linear_body(outer: Nodes, stage: Stage, *, keeps: bool) -> Body:
     Returns:
         The body; declared limits hold the output alone, after the loop.
     """
-    nodes, form = Nodes(outer.dtype, prefix=f"{outer.prefix}body_"), stage.space
-    n, x = form.n_state, f"{nodes.prefix}state"
+    nodes, cell = Nodes(outer.dtype, prefix=f"{outer.prefix}body_"), stage.space
+    n, x = cell.n_state, f"{nodes.prefix}state"
     z = nodes.add("Concat", [x, f"{nodes.prefix}x"], "state_and_inputs", axis=0)
-    readout = nodes.numbers("C_and_D", np.concatenate([form.C, form.D])[np.newaxis])
-    output = nodes.add("Gemm", [readout, z, nodes.numbers("c", [[form.constant]])], "output")
-    matrix = np.concatenate([form.A - np.eye(n), form.B], axis=1)
-    change = nodes.add("MatMul", [nodes.numbers("A_and_B", matrix), z], "change")
+    output, change = space_step(nodes, cell, z, rows=True)
     following, lost = added(nodes, x, change, f"{nodes.prefix}remainder" if keeps else None)
+    following = within_bound(nodes, cell, following)
     carried = {"state": following} | ({} if lost is None else {"remainder": lost})
     graph = nodes.graph(
         "one_step",
-        [*(nodes.value(name, [n, "batch"]) for name in carried), nodes.value("x", [form.n_inputs, "batch"])],
+        [*(nodes.value(name, [n, "batch"]) for name in carried), nodes.value("x", [cell.n_inputs, "batch"])],
         [
             *(nodes.value(name.removeprefix(nodes.prefix), [n, "batch"]) for name in carried.values()),
             nodes.value(output.removeprefix(nodes.prefix), [1, "batch"]),

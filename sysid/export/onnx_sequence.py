@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import DTypeLike
 from onnx import helper, numpy_helper
 
-from sysid.export.cell import Cell, LinearCell
+from sysid.export.cell import Cell
 from sysid.export.flags import Flag
 from sysid.export.layout import DelayLine
 from sysid.export.onnx_blocks import in_blocks
-from sysid.export.onnx_body import Body, clip_range, lagged_body, limit_name, linear_body, scanned_limits
+from sysid.export.onnx_body import Body, clip_range, lagged_body, limit_name, scanned_limits, space_body
 from sysid.export.onnx_nodes import TO_END, Nodes
 from sysid.export.onnx_step import (
     INT32,
@@ -36,6 +36,7 @@ from sysid.export.onnx_step import (
     within_a_body,
 )
 from sysid.export.rates import RateForm, Term
+from sysid.export.space import SpaceCell
 from sysid.export.surrogate import Stage, Surrogate
 
 
@@ -103,7 +104,7 @@ class _Sequence:
     def made(self) -> Made:
         """Add the nodes; ``outputs`` has the names of the outputs in units afterwards."""
         nodes = self.nodes
-        numbers, state = self._linear() if isinstance(self.stage.cell, LinearCell) else self._lagged()
+        numbers, state = self._space() if isinstance(self.stage.cell, SpaceCell) else self._lagged()
         limited = self._in_units(numbers)
         lost = nodes.add("Transpose", [f"{nodes.prefix}remainder_end"], "lost", perm=[1, 0]) if self.keeps else None
         return Made(scaled=tuple(numbers), state=state, remainder=lost, limited=tuple(limited))
@@ -129,12 +130,12 @@ class _Sequence:
             pieces.append(self._newest(self._with_past(tail, line), line))
         return numbers, nodes.add("Concat", [piece for piece in pieces if piece], "next_state", axis=1)
 
-    def _linear(self) -> tuple[list[str], str]:
+    def _space(self) -> tuple[list[str], str]:
         """A state space: the loop carries its state."""
         nodes = self.nodes
         rows = [self._scaled(self.known[source], i, f"u{i}") for i, source in enumerate(self.stage.sources)]
         begin = {"state": self.state} | dict(zip(["remainder"], self.remainder, strict=False))
-        body = linear_body(nodes, self.stage, keeps=self.keeps)
+        body = space_body(nodes, self.stage, keeps=self.keeps)
         numbers = self._loop(begin, [_rows(nodes, rows, "x")], body)
         return numbers, nodes.add("Transpose", [f"{nodes.prefix}state_end"], "next_state", perm=[1, 0])
 

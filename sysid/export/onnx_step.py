@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from sysid.export.cell import Cell, LinearCell
+from sysid.export.cell import Cell
 from sysid.export.flags import MEANING, Flag
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.rates import RateForm
+from sysid.export.space import Neurons, SpaceCell
 from sysid.export.surrogate import Port, Side, Stage, Surrogate
-from sysid.models import StateSpace
 
 STATE_TEXT = "past samples, scaled; the layout stands in model.json under state"
 FLAGS_TEXT = "the sum of: " + "; ".join(f"{int(flag)}: {text}" for flag, text in MEANING.items())
@@ -77,7 +77,7 @@ def step_nodes(surrogate: Surrogate, dtype: DTypeLike) -> Nodes:
         n_known = stage.targets[0]
         if stage.known_sources != tuple(range(n_known)):
             inputs = part.add("Gather", [known, nodes.integers(list(stage.known_sources))], "u", axis=-1)
-        add_stage = _linear_stage if isinstance(stage.cell, LinearCell) else _stage
+        add_stage = _space_stage if isinstance(stage.cell, SpaceCell) else _stage
         one = add_stage(part, stage, inputs, *stage_state(part, surrogate, stage))
         made.append(_within_limits(part, stage, one, known))
         if k + 1 < len(surrogate.stages):
@@ -225,32 +225,61 @@ def added(nodes: Nodes, last: str, change: str, remainder: str | None) -> tuple[
     return total, nodes.add("Sub", [whole, nodes.add("Sub", [total, last], "moved")], "lost")
 
 
-def _linear_stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str | None) -> _Draft:
-    scaled = scaled_inputs(nodes, inputs, stage.cell)
-    known = nodes.add("Concat", [state, scaled], "state_and_inputs", axis=1)
-    output, change = linear_step(nodes, stage.space, known)
+def _space_stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str | None) -> _Draft:
+    cell = stage.space
+    scaled = scaled_inputs(nodes, inputs, cell)
+    z = nodes.add("Concat", [state, scaled], "state_and_inputs", axis=1)
+    output, change = space_step(nodes, cell, z, rows=False)
     following, lost = added(nodes, state, change, remainder)
+    following = within_bound(nodes, cell, following)
     return _Draft(scaled=clipped(nodes, output, stage), following=lambda _: following, remainder=lost)
 
 
-def linear_step(nodes: Nodes, form: StateSpace, known: str) -> tuple[str, str]:
+def space_step(nodes: Nodes, cell: SpaceCell, z: str, *, rows: bool) -> tuple[str, str]:
     """One step of a state space.
 
     Args:
         nodes: The graph.
-        form: The state space.
-        known: State and scaled inputs side by side, ``(batch, n_state + n_inputs)``.
+        cell: The state space.
+        z: State and scaled inputs.
+        rows: Whether ``z`` is ``(n_state + n_inputs, batch)``; ``(batch, n_state + n_inputs)`` otherwise.
 
     Returns:
-        The scaled output ``(batch, 1)``, and what is added to the state: a slow mode is nearly an integrator, so that
-        ``A - 1`` is kept and not ``A``.
+        The scaled output, not yet within its bounds, and what is added to the state, both laid as ``z`` is.
     """
-    readout = np.concatenate([form.C, form.D])[:, np.newaxis]
-    output = nodes.add(
-        "Gemm", [known, nodes.numbers("C_and_D", readout), nodes.numbers("c", [form.constant])], "output"
-    )
-    matrix = nodes.numbers("A_and_B", np.concatenate([form.A - np.eye(form.n_state), form.B], axis=1).T)
-    return output, nodes.add("MatMul", [known, matrix], "change")
+
+    def product(name: str, matrix: NDArray[np.float64], value: str, plus: str, output: str) -> str:
+        table = nodes.numbers(name, matrix if rows else matrix.T)
+        return nodes.add("Gemm", [table, value, plus] if rows else [value, table, plus], output)
+
+    def column(name: str, values: ArrayLike) -> str:
+        numbers = np.atleast_1d(np.asarray(values))
+        return nodes.numbers(name, numbers[:, np.newaxis] if rows else numbers)
+
+    def summed(name: str, matrix: NDArray[np.float64], constant: ArrayLike, neurons: Neurons) -> str:
+        total = product(f"{name}_matrix", matrix, z, column(f"{name}_constant", constant), f"{name}_linear")
+        if not len(neurons):
+            return total
+        hidden = product(f"{name}_W", neurons.weights, z, column(f"{name}_b", neurons.bias), f"{name}_hidden_sum")
+        if cell.cubic:
+            square = nodes.add("Mul", [hidden, hidden], f"{name}_square")
+            hidden = nodes.add("Mul", [square, hidden], f"{name}_hidden")
+        else:
+            hidden = nodes.add("Tanh", [hidden], f"{name}_hidden")
+        return product(f"{name}_V", neurons.readout, hidden, total, f"{name}_network")
+
+    output = summed("output", cell.readout[np.newaxis], cell.constant, cell.output_neurons)
+    if cell.rectified:
+        output = nodes.add("Abs", [output], "output_rectified")
+    return output, summed("change", cell.change, cell.drift, cell.state_neurons)
+
+
+def within_bound(nodes: Nodes, cell: SpaceCell, state: str) -> str:
+    """A state within its bound; no node where there is none."""
+    if not np.isfinite(cell.bound):
+        return state
+    bounds = [nodes.numbers(f"state_{name}", value) for name, value in (("low", -cell.bound), ("high", cell.bound))]
+    return nodes.add("Clip", [state, *bounds], "state_bounded")
 
 
 def _within_limits(nodes: Nodes, stage: Stage, draft: _Draft, known: str) -> Made:
@@ -332,14 +361,14 @@ def _channels(ports: tuple[Port, ...]) -> str:
     return ", ".join(f"{port.name} [{port.unit}]" for port in ports)
 
 
-def scaled_inputs(nodes: Nodes, inputs: str, cell: Cell | LinearCell) -> str:
+def scaled_inputs(nodes: Nodes, inputs: str, cell: Cell | SpaceCell) -> str:
     """Inputs in the model's numbers, scaled on the last axis."""
     offset = nodes.numbers("input_offset", cell.offset[: cell.n_inputs])
     scale = nodes.numbers("input_scale", cell.scale[: cell.n_inputs])
     return nodes.add("Div", [nodes.add("Sub", [inputs, offset], "u_centred"), scale], "u_scaled")
 
 
-def unscaled_outputs(nodes: Nodes, scaled: str, cell: Cell | LinearCell) -> str:
+def unscaled_outputs(nodes: Nodes, scaled: str, cell: Cell | SpaceCell) -> str:
     """The stage's outputs in their units, on the last axis."""
     scale = nodes.numbers("output_scale", cell.scale[cell.n_inputs :])
     offset = nodes.numbers("output_offset", cell.offset[cell.n_inputs :])

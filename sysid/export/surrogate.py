@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.cell import Cell, LinearCell, cell_of
-from sysid.export.layout import DelayLine, LinearState, StateLayout, layout_of
-from sysid.models import AbstractModel, Cascade, History, Limit, StateSpace
+from sysid.export.cell import Cell, cell_of
+from sysid.export.layout import DelayLine, SpaceState, StateLayout, layout_of
+from sysid.export.space import SpaceCell
+from sysid.models import AbstractModel, Cascade, History, Limit
 from sysid.models.wiring import Member, Wiring
 
 Range = tuple[float, float]
@@ -115,12 +116,12 @@ class Stage:
     first_remainder: int
 
     @cached_property
-    def cell(self) -> Cell | LinearCell:
+    def cell(self) -> Cell | SpaceCell:
         """What is written."""
         return cell_of(self.model)
 
     @cached_property
-    def state(self) -> StateLayout | LinearState:
+    def state(self) -> StateLayout | SpaceState:
         """The layout of its own state, counted from ``first``."""
         return layout_of(self.model)
 
@@ -131,10 +132,10 @@ class Stage:
         return cell, StateLayout.of_cell(cell)
 
     @property
-    def space(self) -> StateSpace:
-        """The state space of a linear model that is one."""
-        if isinstance(self.cell, LinearCell):
-            return self.cell.form
+    def space(self) -> SpaceCell:
+        """The cell of a model that is a state space."""
+        if isinstance(self.cell, SpaceCell):
+            return self.cell
         raise ConfigError("not a state space", got=self.cell.ends.outputs)
 
     @property
@@ -157,7 +158,7 @@ class Stage:
     @property
     def remainders(self) -> int:
         """Numbers more in its state in float32: what rounding took from its newest numbers, for the next step."""
-        if isinstance(self.cell, LinearCell):
+        if isinstance(self.cell, SpaceCell):
             return self.state.size
         return self.cell.n_outputs if self.cell.adds else 0
 
@@ -337,7 +338,7 @@ class Surrogate:
 
     def state_text(self) -> dict[str, Any]:
         """The state as JSON values, with how to read it."""
-        spaces = [(stage.first, stage.state) for stage in self.stages if isinstance(stage.state, LinearState)]
+        spaces = [(stage.first, stage.state) for stage in self.stages if isinstance(stage.state, SpaceState)]
         text = {
             "size": self.state_size,
             "order": "delay line after delay line; within a line the newest sample first",

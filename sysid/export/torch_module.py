@@ -8,8 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from sysid.export.cell import Cell, LinearCell
+from sysid.export.cell import Cell
 from sysid.export.flags import Flag
+from sysid.export.space import SpaceCell
 from sysid.export.surrogate import Stage, Surrogate
 
 
@@ -142,8 +143,8 @@ class StageStep(nn.Module):
         return outputs, following, held, reached
 
 
-class LinearStep(nn.Module):
-    """One step of a stage that is a state space.
+class SpaceStep(nn.Module):
+    """One step of a stage that is a state space, linear or neural.
 
     Args:
         stage: The stage.
@@ -155,25 +156,40 @@ class LinearStep(nn.Module):
     input_scale: Tensor
     output_offset: Tensor
     output_scale: Tensor
-    transition: Tensor
+    change: Tensor
+    drift: Tensor
     readout: Tensor
     constant: Tensor
+    state_weights: Tensor
+    state_bias: Tensor
+    state_readout: Tensor
+    output_weights: Tensor
+    output_bias: Tensor
+    output_readout: Tensor
 
     def __init__(self, stage: Stage, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
-        form = stage.space
+        cell = stage.space
         numbers = {
-            **_scaling(stage.cell),
-            "transition": np.concatenate([form.A, form.B], axis=1).T,
-            "readout": np.concatenate([form.C, form.D])[:, np.newaxis],
-            "constant": [form.constant],
+            **_scaling(cell),
+            "change": cell.change.T,
+            "drift": cell.drift,
+            "readout": cell.readout[:, np.newaxis],
+            "constant": [cell.constant],
+            "state_weights": cell.state_neurons.weights.T,
+            "state_bias": cell.state_neurons.bias,
+            "state_readout": cell.state_neurons.readout.T,
+            "output_weights": cell.output_neurons.weights.T,
+            "output_bias": cell.output_neurons.bias,
+            "output_readout": cell.output_neurons.readout.T,
         }
         for name, values in numbers.items():
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
         self.register_buffer("sources", torch.tensor(stage.known_sources))
-        self.first, self.size = int(stage.first), form.n_state
+        self.first, self.size = int(stage.first), cell.n_state
         self.bounded, self.limited = stage.bounded, stage.limited
-        self.low, self.high = float(form.low), float(form.high)
+        self.low, self.high, self.bound = float(cell.low), float(cell.high), float(cell.bound)
+        self.cubic, self.rectified = cell.cubic, cell.rectified
         self.limits = Limits(stage)
 
     def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -181,7 +197,11 @@ class LinearStep(nn.Module):
         state = whole_state.narrow(1, self.first, self.size)
         scaled = (known.index_select(1, self.sources) - self.input_offset) / self.input_scale
         x = torch.cat([state, scaled], dim=1)
-        y = torch.clamp(torch.addmm(self.constant, x, self.readout), self.low, self.high)
+        total = torch.addmm(self.constant, x, self.readout)
+        total = total + self.active(torch.addmm(self.output_bias, x, self.output_weights)) @ self.output_readout
+        if self.rectified:
+            total = torch.abs(total)
+        y = torch.clamp(total, self.low, self.high)
         outputs = y * self.output_scale + self.output_offset
         reached = torch.zeros_like(y, dtype=torch.bool)
         if self.limited:
@@ -189,10 +209,16 @@ class LinearStep(nn.Module):
         held = torch.zeros_like(reached)
         if self.bounded:
             held = (y <= self.low) | (y >= self.high)
-        return outputs, x @ self.transition, held, reached
+        change = torch.addmm(self.drift, x, self.change)
+        change = change + self.active(torch.addmm(self.state_bias, x, self.state_weights)) @ self.state_readout
+        return outputs, torch.clamp(state + change, -self.bound, self.bound), held, reached
+
+    def active(self, total: Tensor) -> Tensor:
+        """What the neurons make of their sums."""
+        return total * total * total if self.cubic else torch.tanh(total)
 
 
-def _scaling(cell: Cell | LinearCell) -> dict[str, tuple[float, ...]]:
+def _scaling(cell: Cell | SpaceCell) -> dict[str, tuple[float, ...]]:
     n = cell.n_inputs
     return {
         "input_offset": cell.offset[:n],
@@ -221,7 +247,7 @@ class SurrogateStep(nn.Module):
         super().__init__()
         self.stages = nn.ModuleList(
             [
-                LinearStep(stage, dtype) if isinstance(stage.cell, LinearCell) else StageStep(stage, dtype)
+                SpaceStep(stage, dtype) if isinstance(stage.cell, SpaceCell) else StageStep(stage, dtype)
                 for stage in surrogate.stages
             ]
         )

@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.export_sanitizers
 
-1,000 random sequences each over a single model, one with long lags, one with gates, and a whole cascade, in double and
-float, in range and far out of it, with infinities and numbers that are not. Ends with an error if anything is found.
+1,000 random sequences each over a single model, one with long lags, one with gates, a neural state space, models in a
+circle, and a whole cascade, in double and float, in range and far out of it, with infinities and numbers that are not. Ends with an error if anything is found.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
 from sysid.export import EXPORTERS, Surrogate
-from sysid.models import NARX
+from sysid.models import NARX, Cascade, Limit, NeuralStateSpace, NeuralStateSpaceModel
 from tests.benchmarks.export import RANGES, build, cascade
 
 SEQUENCES = 1000
@@ -72,6 +74,27 @@ static NAME_real *out_at_rest(NAME_real *out)
 int main("""
 
 
+def space() -> NeuralStateSpaceModel:
+    """A neural state space with random weights and slow states."""
+    network = NeuralStateSpace(states=3, neurons=8, output_neurons=4)
+    sizes, like = network.sizes(2), build("BP+AR -> BC", NARX(input_delays=1, output_delays=1, neurons=1), 2)
+    theta = 0.1 * np.random.default_rng(5).normal(size=sizes.count)
+    theta[sizes.linear] = np.concatenate([np.diag([0.99, 0.9, 0.8]), np.full((3, 3), 0.05)], axis=1).ravel()
+    fields = ("scaling", "mapping", "sample_time", "input_units", "output_unit", "rest_output")
+    return NeuralStateSpaceModel(network=network, theta=theta, **{name: getattr(like, name) for name in fields})
+
+
+def circle() -> Cascade:
+    """Two models that read each other's past."""
+    return Cascade(
+        models=(
+            build("STP+AR -> BP", NARX(input_delays=[[0, 1], [1, 3]], output_delays=2, neurons=10), 1),
+            build("BP -> AR", NARX(input_delays="0:1", output_delays=1, neurons=6, gated=True), 2),
+        ),
+        limits={"AR": Limit(low=0.0, high="BP")},
+    )
+
+
 def programs(surrogate: Surrogate, folder: Path, *flags: str) -> None:
     """Write, compile and run under each of the tools; raises if one of them finds something."""
     prefix = surrogate.identifier
@@ -101,6 +124,8 @@ def main() -> None:
         Surrogate.of(
             build("BP+AR -> BC", NARX(input_delays="0:1", output_delays=2, neurons=12, gated=True), 2), RANGES
         ),
+        Surrogate.of(space(), RANGES),
+        Surrogate.of(circle(), RANGES),
         cascade(),
     ]
     for surrogate in surrogates:

@@ -440,6 +440,11 @@ def any_cascade(request: pytest.FixtureRequest) -> Surrogate:
 
 
 @pytest.fixture(scope="session")
+def circle() -> Surrogate:
+    return Surrogate.of(build_circle(), {"STP": (0.0, 80.0)})
+
+
+@pytest.fixture(scope="session")
 def limited() -> Cascade:
     return build_limited()
 

@@ -70,10 +70,10 @@ def can_compile(command, folder):
 
 
 @pytest.fixture(scope="module")
-def sources(models, declared, cascade, tmp_path_factory):
-    """Folder and name of the C files of every model and of a cascade."""
-    found = {}
-    for name, surrogate in {**{name: declared(build()) for name, build in models.items()}, "cascade": cascade}.items():
+def sources(models, declared, cascade, circle, tmp_path_factory):
+    """Folder and name of the C files of every model, of a cascade, and of models in a circle."""
+    found, wired = {}, {"cascade": cascade, "circle": circle}
+    for name, surrogate in {**{name: declared(build()) for name, build in models.items()}, **wired}.items():
         folder = tmp_path_factory.mktemp("c")
         EXPORTERS["c"].write(surrogate, folder)
         found[name] = (surrogate, folder)

@@ -1,7 +1,8 @@
-"""Transfer functions exported: their files compute what the model's state space computes."""
+"""State spaces exported, transfer functions and neural ones: their files compute what the model computes."""
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,7 +14,19 @@ from sysid.estimation import FitResult, Loop, Status
 from sysid.export import EXPORTERS, Surrogate, expected_flags, export_bundle, read_bundle
 from sysid.export.layout import layout_of
 from sysid.export.parity import largest_difference
-from sysid.models import Cascade, Domain, History, Mapping, Scaling, Start, TransferFunction
+from sysid.models import (
+    NARX,
+    AbstractModel,
+    Cascade,
+    Domain,
+    History,
+    Mapping,
+    NeuralStateSpace,
+    NeuralStateSpaceModel,
+    Scaling,
+    Start,
+    TransferFunction,
+)
 from sysid.models.transfer_function import TransferFunctionModel
 
 FORMATS = ("onnx", "torchscript", "torch-export", "c", "fmi2", "fmi3")
@@ -47,7 +60,34 @@ def build(
     )
 
 
+def build_neural(*, slowest: float = 0.97, **options) -> NeuralStateSpaceModel:
+    """Slow states with random neurons; the state at rest depends on inputs and output."""
+    network = NeuralStateSpace(states=3, **options)
+    sizes = network.sizes(2)
+    rng = np.random.default_rng(4)
+    theta = 0.1 * rng.normal(size=sizes.count)
+    theta[sizes.linear] = np.concatenate([np.diag([slowest, 0.9, 0.8]), 0.05 * rng.normal(size=(3, 3))], axis=1).ravel()
+    theta[sizes.output_linear] += [0.6, -0.4, 0.3, 0.0, 0.0, 0.1]
+    return NeuralStateSpaceModel(
+        network=network,
+        theta=theta,
+        scaling=Scaling(input_offset=(45.0, 70.0), input_scale=(45.0, 20.0), output_offset=38.0, output_scale=40.0),
+        mapping=Mapping.parse("BP+AR -> BC"),
+        sample_time=0.1,
+        input_units=("psi", "psi"),
+        output_unit="psi",
+        rest_output=5.0,
+        clamp=3.0,
+    )
+
+
 MODELS = {
+    "neural": lambda: build_neural(neurons=6),
+    "neural, cubes, output neurons, absolute": lambda: build_neural(
+        neurons=4, output_neurons=3, activation="cubic", output="absolute"
+    ),
+    "neural, neurons in the output alone": lambda: build_neural(neurons=0, output_neurons=5),
+    "neural, against the bounds of its states": lambda: build_neural(neurons=3, slowest=1.1),
     "discrete": build,
     "continuous": lambda: build(Domain.CONTINUOUS),
     "without dead time": lambda: build(delays=(0, 0)),
@@ -64,7 +104,7 @@ PAIRS = [
 
 
 @pytest.fixture(params=MODELS)
-def model(request: pytest.FixtureRequest) -> TransferFunctionModel:
+def model(request: pytest.FixtureRequest) -> AbstractModel:
     return MODELS[request.param]()
 
 
@@ -96,12 +136,24 @@ def test_files_compute_what_the_model_computes(model, name, kind, inputs, tmp_pa
     np.testing.assert_array_equal(rest.state, whole.state)
 
 
-@pytest.mark.parametrize(("name", "kind"), PAIRS, ids=[" ".join(pair) for pair in PAIRS])
-def test_a_cascade_may_hold_one(narx, name, kind, inputs, tmp_path) -> None:
-    from sysid.models import NARX
+@pytest.mark.parametrize("compiler", [["gcc", "-std=c99"], ["g++", "-x", "c++", "-std=c++17"]], ids=["C99", "C++17"])
+def test_no_compiler_has_a_word_to_say(model, compiler, tmp_path) -> None:
+    if shutil.which(compiler[0]) is None:
+        pytest.skip(f"no {compiler[0]} here")
+    (file,) = EXPORTERS["c"].write(Surrogate.of(model, RANGES), tmp_path)
+    strict = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-O2"]
+    for real in ([], [f"-D{file.details['float32_macro']}"]):
+        command = [*compiler, *strict, *real, "-c", file.name, "-o", "out.o"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
 
+
+@pytest.mark.parametrize(("name", "kind"), PAIRS, ids=[" ".join(pair) for pair in PAIRS])
+def test_a_cascade_may_hold_some(narx, name, kind, inputs, tmp_path) -> None:
+    first = narx(NARX(input_delays=2, output_delays=2, neurons=3))
     second = replace(build(), mapping=Mapping.parse("BC+AR -> X"))
-    surrogate = Surrogate.of(Cascade(models=(narx(NARX(input_delays=2, output_delays=2, neurons=3)), second)), RANGES)
+    third = replace(build_neural(neurons=4, output_neurons=2), mapping=Mapping.parse("BC+AR -> Y"))
+    surrogate = Surrogate.of(Cascade(models=(first, second, third)), RANGES)
     run = opened(name, kind, surrogate, tmp_path)
     u = inputs(100, 2)
     result = run(u[:, np.newaxis], surrogate.at_rest(u[0])[np.newaxis])
@@ -111,9 +163,10 @@ def test_a_cascade_may_hold_one(narx, name, kind, inputs, tmp_path) -> None:
 def test_at_rest_can_be_computed_from_what_the_manifest_says(model) -> None:
     surrogate = Surrogate.of(model, RANGES)
     (space,) = surrogate.state_text()["state_spaces"]
-    u = np.array([88.0, 70.0])
-    scaled = model.scaling.scale_inputs(u[np.newaxis])[0]
-    np.testing.assert_allclose(np.array(space["at_rest"]) @ scaled, surrogate.at_rest(u), atol=1e-9)
+    levels = dict(zip(("BP", "AR", "BC"), surrogate.levels(np.array([88.0, 70.0])), strict=True))
+    scaled = (np.array([levels[name] for name in space["channels"]]) - space["offset"]) / space["scale"]
+    state = np.clip(space["constant"] + np.array(space["at_rest"]) @ scaled, -space.get("bound", 1e9), 1e9)
+    np.testing.assert_allclose(state, surrogate.at_rest(np.array([88.0, 70.0])), atol=1e-9)
     assert space["size"] == surrogate.state_size
 
 
@@ -133,8 +186,9 @@ def test_a_bundle_carries_one(model, traces, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["onnx-float32", "c-float32"])
-def test_float32_stays_near_over_a_long_run(name, inputs, tmp_path) -> None:
-    surrogate = Surrogate.of(build(), RANGES)
+@pytest.mark.parametrize("model", ["discrete", "neural"], indirect=True)
+def test_float32_stays_near_over_a_long_run(model, name, inputs, tmp_path) -> None:
+    surrogate = Surrogate.of(model, RANGES)
     u = inputs(3000, 2).astype(np.float32).astype(np.float64)
     expected = surrogate.simulate(u)
     exporter = EXPORTERS[name]

@@ -1,0 +1,172 @@
+"""A state space as exporters see it, linear or with neurons beside the matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models import History, NeuralForm, Scaling, StateSpace
+from sysid.models.wiring import Ends
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Neurons:
+    """A layer beside a matrix: ``V s(W z + b)``.
+
+    Args:
+        weights: ``W``, shape ``(n_neurons, n_states + n_inputs)``.
+        bias: ``b``, shape ``(n_neurons,)``.
+        readout: ``V``, shape ``(n_rows, n_neurons)``.
+    """
+
+    weights: NDArray[np.float64]
+    bias: NDArray[np.float64]
+    readout: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.bias)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SpaceCell:
+    r"""``x(t+1) = clip(x + T z + d + V s(W z + b))``, ``y = clip(r(C z + c + v s(Wy z + by)))`` with ``z = [x; u]``.
+
+    All in scaled numbers.
+
+    Args:
+        ends: Names, units and values at rest of what goes in and comes out.
+        form: What the model runs.
+        change: ``T``, what a step adds to the state, shape ``(n_states, n_states + n_inputs)``: a slow mode is nearly
+            an integrator, so that ``A - 1`` is kept and not ``A``.
+        drift: ``d``, shape ``(n_states,)``.
+        readout: ``C``, shape ``(n_states + n_inputs,)``.
+        constant: ``c``.
+        state_neurons: Those of the state.
+        output_neurons: Those of the output.
+        cubic: ``s`` is the cube; tanh otherwise.
+        rectified: ``r`` is the absolute value; the identity otherwise.
+        bound: Bound of each state; ``inf`` for none.
+        gain: From scaled channels at rest to the state, shape ``(n_states, n_channels)``; the channels are the inputs,
+            and the output where the state at rest depends on it.
+        rest: The state at rest where these are zero, shape ``(n_states,)``.
+    """
+
+    ends: Ends
+    form: StateSpace | NeuralForm
+    change: NDArray[np.float64]
+    drift: NDArray[np.float64]
+    readout: NDArray[np.float64]
+    constant: float
+    state_neurons: Neurons
+    output_neurons: Neurons
+    cubic: bool
+    rectified: bool
+    bound: float
+    gain: NDArray[np.float64]
+    rest: NDArray[np.float64]
+
+    @classmethod
+    def linear(cls, form: StateSpace, ends: Ends) -> SpaceCell:
+        """A linear state space: no neurons, no bound."""
+        n, row = form.n_state, form.n_state + form.n_inputs
+        return cls(
+            ends=ends,
+            form=form,
+            change=np.concatenate([form.A - np.eye(n), form.B], axis=1),
+            drift=np.zeros(n),
+            readout=np.concatenate([form.C, form.D]),
+            constant=form.constant,
+            state_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((n, 0))),
+            output_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((1, 0))),
+            cubic=False,
+            rectified=False,
+            bound=np.inf,
+            gain=np.column_stack([form.equilibrium(unit) for unit in np.eye(form.n_inputs)]),
+            rest=np.zeros(n),
+        )
+
+    @classmethod
+    def neural(cls, form: NeuralForm, ends: Ends) -> SpaceCell:
+        """A neural state space."""
+        sizes, theta = form.sizes, form.theta
+        n, k, q, row = sizes.states, sizes.neurons, sizes.output_neurons, sizes.row
+        M, W, Wy = (theta[part].reshape(-1, row) for part in (sizes.linear, sizes.hidden, sizes.output_hidden))
+        L, E = theta[sizes.output_linear], theta[sizes.start].reshape(n, -1)
+        change = M[:, :-1].copy()
+        change[:, :n] -= np.eye(n)
+        return cls(
+            ends=ends,
+            form=form,
+            change=change,
+            drift=M[:, -1],
+            readout=L[:-1],
+            constant=float(L[-1]),
+            state_neurons=Neurons(weights=W[:, :-1], bias=W[:, -1], readout=theta[sizes.readout].reshape(n, k)),
+            output_neurons=Neurons(
+                weights=Wy[:, :-1], bias=Wy[:, -1], readout=theta[sizes.output_readout].reshape(1, q)
+            ),
+            cubic=form.cubic,
+            rectified=form.rectified,
+            bound=form.bound,
+            gain=E[:, :-1],
+            rest=E[:, -1],
+        )
+
+    @property
+    def scaling(self) -> Scaling:
+        """Between units and scaled numbers."""
+        return self.form.scaling
+
+    @property
+    def n_state(self) -> int:
+        """Length of the state."""
+        return len(self.drift)
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.ends.inputs)
+
+    @property
+    def n_outputs(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def offset(self) -> tuple[float, ...]:
+        """Of every input, then of the output, in its unit."""
+        return (*self.scaling.input_offset, self.scaling.output_offset)
+
+    @property
+    def scale(self) -> tuple[float, ...]:
+        """Of every input, then of the output, in its unit."""
+        return (*self.scaling.input_scale, self.scaling.output_scale)
+
+    @property
+    def low(self) -> float:
+        """Lower bound of the output in scaled numbers."""
+        return self.form.low
+
+    @property
+    def high(self) -> float:
+        """Upper bound of the output in scaled numbers."""
+        return self.form.high
+
+    @property
+    def rest_channels(self) -> tuple[str, ...]:
+        """The channels that ``gain`` takes."""
+        return (*self.ends.inputs, *self.ends.outputs)[: self.gain.shape[1]]
+
+    def from_history(self, history: History) -> NDArray[np.float64]:
+        """The state after some samples.
+
+        Args:
+            history: The samples, oldest first, in units; a single one is a system at rest.
+
+        Returns:
+            Shape ``(n_states,)``.
+        """
+        return self.form.state(history)
