@@ -208,12 +208,19 @@ class Surrogate:
             The surrogate.
 
         Raises:
-            ConfigError: If a model is of a kind that cannot be written.
+            ConfigError: If a model is of a kind that cannot be written, or models in a circle have no input.
         """
         if isinstance(source, Cascade):
             models, wiring, limits = source.models, source.wiring, source.limits
         else:
             models, wiring, limits = (source,), Wiring.of([source]), {}
+        if not wiring.inputs:
+            raise ConfigError(
+                "nothing goes into the models",
+                expected="at least one channel that none of them computes",
+                got=", ".join(str(model.mapping) for model in models),
+                remedy="wire models of which one reads what comes from outside",
+            )
         ranges, starts = ranges or {}, starts or {}
         identifiers, levels = _identifiers(wiring.channels), _levels(source, wiring)
         inputs = tuple(

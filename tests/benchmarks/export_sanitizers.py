@@ -3,7 +3,8 @@
     python -m tests.benchmarks.export_sanitizers
 
 1,000 random sequences each over a single model, one with long lags, one with gates, a neural state space, models in a
-circle, and a whole cascade, in double and float, in range and far out of it, with infinities and numbers that are not. Ends with an error if anything is found.
+circle, and a whole cascade, in double and float, in range and far out of it, with infinities and numbers that are not.
+Ends with an error if anything is found.
 """
 
 from __future__ import annotations

@@ -60,9 +60,20 @@ def test_stages_run_in_an_order_in_which_they_can():
     assert [stage.model for stage in surrogate.stages] == [first, second]
 
 
-def test_a_circle_through_the_past_cannot_be_stages():
+def test_in_a_circle_what_is_computed_late_goes_into_the_state_at_the_end():
+    back = linear("u+z -> y", orders=ARX(na=1, nb=(1, 1), nk=(0, 1)))
+    surrogate = Surrogate.of(Cascade(models=(back, linear("y -> z"))))
+    first, second = surrogate.stages
+    assert [port.name for port in surrogate.channels] == ["u", "y", "z"]
+    assert (first.sources, first.known_sources, second.known_sources) == ((0, 2), (0, 0), (1,))
+    assert [(late.place, late.column) for late in surrogate.late] == [(0, 2)]
+    assert surrogate.lines[1].channel == "z"
+    assert surrogate.lines[1].first == 0
+
+
+def test_a_circle_that_nothing_goes_into_is_refused():
     back = linear("z -> y", orders=ARX(na=1, nb=(1,), nk=(1,)))
-    with pytest.raises(ConfigError, match="in a circle cannot be exported"):
+    with pytest.raises(ConfigError, match="nothing goes into the models"):
         Surrogate.of(Cascade(models=(linear("y -> z"), back)))
 
 
