@@ -254,8 +254,18 @@ def judge(problem: Problem, learned: Learned, curves: list[tuple[np.ndarray, np.
         at_least=True,
         bound=not arrived,
         peer=f"{theirs:.1f} s" if arrived else f"not within {cap:g} s",
-        note=f"its best, {best:.3g}, in {at_best:.1f} s; ours undercuts that in {undercut:.2f} s, "
-        f"{at_best / undercut:.1f} x{'; on unseen records: ' + ', '.join(unseen) if unseen else ''}",
+        note="; ".join(
+            filter(
+                None,
+                (
+                    f"its best, {best:.3g}, in {at_best:.1f} s",
+                    f"ours undercuts that in {undercut:.2f} s, {at_best / undercut:.1f} x"
+                    if np.isfinite(undercut)
+                    else "ours does not undercut that",
+                    f"on unseen records: {', '.join(unseen)}" if unseen else "",
+                ),
+            )
+        ),
     )
 
 
