@@ -122,6 +122,78 @@ def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
+def _output_row(row, S, z, sign, L, v, Wy, hy, slope, G):
+    """Derivative of an output that nothing clips: through the state, and through the output's own parameters.
+
+    Args:
+        row: Shape ``(n_dynamic + n_states + n_output,)``, written.
+        S: Derivative of the state, shape ``(n_states, n_dynamic + n_states)``.
+        z: State, inputs and 1, shape ``(n_row,)``.
+        sign: -1 where a rectified output was negative, else 1.
+        L: Linear output weights, shape ``(n_row,)``.
+        v: Readout of the output's neurons, shape ``(n_output_neurons,)``.
+        Wy: Their weights, shape ``(n_output_neurons, n_row)``.
+        hy: Their activations.
+        slope: Derivatives of the activations.
+        G: Room for the derivative by the state, shape ``(n_states,)``, written.
+    """
+    n, n_S = S.shape
+    r, q = len(z), len(v)
+    for i in range(n):
+        G[i] = sign * L[i]
+        for j in range(q):
+            G[i] += sign * v[j] * slope[j] * Wy[j, i]
+    row[:n_S] = 0.0
+    for i in range(n):
+        factor, past = G[i], S[i]
+        for p in range(n_S):
+            row[p] += factor * past[p]
+    for i in range(r):
+        row[n_S + i] = sign * z[i]
+    for j in range(q):
+        factor = sign * v[j] * slope[j]
+        place = n_S + r + j * r
+        for i in range(r):
+            row[place + i] = factor * z[i]
+        row[n_S + r + q * r + j] = sign * hy[j]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def _state_row(after, S, z, i, M, V, W, h, slope):
+    """Derivative of the next state ``i``, which nothing bounds; added to ``after``.
+
+    Args:
+        after: Shape ``(n_dynamic + n_states,)``, zeros at first.
+        S: As in :func:`_output_row`.
+        z: As in :func:`_output_row`.
+        i: The state.
+        M: Linear weights, shape ``(n_states, n_row)``.
+        V: Readout of the neurons, shape ``(n_states, n_neurons)``.
+        W: Their weights, shape ``(n_neurons, n_row)``.
+        h: Their activations.
+        slope: Derivatives of the activations.
+    """
+    n, n_S = S.shape
+    r, k = len(z), len(h)
+    at_W, at_V = n * r, (n + k) * r
+    for j in range(n):
+        factor = M[i, j]
+        for o in range(k):
+            factor += V[i, o] * slope[o] * W[o, j]
+        past = S[j]
+        for p in range(n_S):
+            after[p] += factor * past[p]
+    for j in range(r):
+        after[i * r + j] += z[j]
+    for o in range(k):
+        factor = V[i, o] * slope[o]
+        place = at_W + o * r
+        for j in range(r):
+            after[place + j] += factor * z[j]
+        after[at_V + i * k + o] += h[o]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
 def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J):
     """Outputs of some samples and their derivatives; a record is walked in blocks that hand ``x`` and ``S`` on.
 
@@ -153,10 +225,8 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
     plain_Wy = theta[at + r : at + r + q * r].reshape(q, r)
     Wy = np.ascontiguousarray(plain_Wy.T)
     v = theta[at + r + q * r : at + r + q * r + q]
-    n_S = S.shape[1]
-    at_W, at_V = n * r, (n + k) * r
     following = np.empty_like(S)
-    F, G = np.empty((n, n)), np.empty(n)
+    G = np.empty(n)
     z = np.ones(r)
     h, slope = np.empty(k), np.empty(k)
     hy, slope_y = np.empty(q), np.empty(q)
@@ -181,23 +251,7 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
         if bounded != total:
             row[:] = 0.0
         else:
-            for i in range(n):
-                G[i] = sign * L[i]
-                for j in range(q):
-                    G[i] += sign * v[j] * slope_y[j] * plain_Wy[j, i]
-            row[:n_S] = 0.0
-            for i in range(n):
-                factor, past = G[i], S[i]
-                for p in range(n_S):
-                    row[p] += factor * past[p]
-            for i in range(r):
-                row[n_S + i] = sign * z[i]
-            for j in range(q):
-                factor = sign * v[j] * slope_y[j]
-                place = n_S + r + j * r
-                for i in range(r):
-                    row[place + i] = factor * z[i]
-                row[n_S + r + q * r + j] = sign * hy[j]
+            _output_row(row, S, z, sign, L, v, plain_Wy, hy, slope_y, G)
         # the state
         _activate(W, z, cubic, h, slope)
         for i in range(n):
@@ -211,22 +265,6 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
             after[:] = 0.0
             if new_x[i] != new:
                 continue
-            for j in range(n):
-                derivative = M[i, j]
-                for o in range(k):
-                    derivative += V[i, o] * slope[o] * plain_W[o, j]
-                F[i, j] = derivative
-            for j in range(n):
-                factor, past = F[i, j], S[j]
-                for p in range(n_S):
-                    after[p] += factor * past[p]
-            for j in range(r):
-                after[i * r + j] += z[j]
-            for o in range(k):
-                factor = V[i, o] * slope[o]
-                place = at_W + o * r
-                for j in range(r):
-                    after[place + j] += factor * z[j]
-                after[at_V + i * k + o] += h[o]
+            _state_row(after, S, z, i, M, V, plain_W, h, slope)
         S[:] = following
         x[:] = new_x
