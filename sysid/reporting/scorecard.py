@@ -20,6 +20,12 @@ from sysid.reporting.markdown import escape, rows_lines
 from sysid.reporting.numbers import number
 from sysid.reporting.scores import SCORES_FILE, Score, read_scores
 
+_SETTING: Final = re.compile(r", (?:(?:ARX|TF|NARX|NSS) .*|n = \d+|full)$|(?<=: time of ).*?(?= to )")
+"""What tells findings on the same record apart: a structure, a number of samples, a tool."""
+
+_SOURCE: Final = re.compile(r"(?:;| \([^()]*(?:et al\.|jax-sysid|tried)).*$")
+"""Where a figure is from, which its report says."""
+
 PLACE: Final = re.compile(r"(<!-- scorecard: (?P<command>[^\n]*) -->\n).*?(<!-- end of the scorecard -->)", re.DOTALL)
 
 
@@ -103,13 +109,24 @@ def _cells(errors: dict[str, float], cases: Sequence[str], scale: float) -> list
 
 
 def _benchmarks(findings: Sequence[Finding]) -> list[str]:
-    """What has a target and stands beside others."""
-    kept = [one for one in findings if one.target is not None and (one.published or one.peer)]
+    """On each record our least error beside the published one, and of each comparison of times the closest."""
+    kept: dict[tuple[str, str, bool], Finding] = {}
+    for one in findings:
+        if not one.published and not (one.peer and one.target is not None):
+            continue
+        key = (_SETTING.sub("", one.what), one.unit, one.at_least)
+        # What a peer was measured on too comes first.
+        if key not in kept or (not one.peer, one.ours) < (not kept[key].peer, kept[key].ours):
+            kept[key] = one
     if not kept:
         return []
-    rows = [["benchmark", "ours", "published", "peer"], ["---"] * 4]
-    rows += [[escape(text) for text in (one.what, one.ours_text, one.published, one.peer)] for one in kept]
+    rows = [["benchmark (sources in its report)", "ours", "published", "peer"], ["---"] * 4]
+    rows += [[escape(one.what), one.ours_text, *map(_brief, (one.published, one.peer))] for one in kept.values()]
     return rows_lines(rows)
+
+
+def _brief(text: str) -> str:
+    return escape(_SOURCE.sub("", text))
 
 
 def main(arguments: Sequence[str]) -> None:

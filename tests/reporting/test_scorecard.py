@@ -59,15 +59,25 @@ def test_the_best_peer_is_the_one_with_the_least_geometric_mean_that_never_diver
     assert last[2:4] == ["100", "400"]
 
 
-def test_benchmarks_stand_beside_what_others_have(tmp_path: Path) -> None:
+def test_benchmarks_stand_beside_what_others_have_once_for_each_record(tmp_path: Path) -> None:
     findings = [
-        Finding(what="Tanks", ours=0.276, unit="V", target=0.3, published="0.306 (best)", peer="0.285"),
-        Finding(what="without a target", ours=1.0, published="2"),
+        Finding(what="Tanks, ARX [2; 2]", ours=0.59, unit="V", target=0.588, published="0.588 (linear; A et al. 2024)"),
+        Finding(what="Tanks, n = 50", ours=0.276, unit="V", target=0.3, published="0.306", peer="0.285 V (tried)"),
+        Finding(what="Tanks, n = 5", ours=0.27, unit="V", published="0.306; A et al. 2024"),
+        Finding(
+            what="Race: time of one to 1 m, divided by ours", ours=9.0, unit="x", target=3.0, at_least=True, peer="9 s"
+        ),
+        Finding(
+            what="Race: time of two to 1 m, divided by ours", ours=4.0, unit="x", target=3.0, at_least=True, peer="4 s"
+        ),
         Finding(what="without others", ours=1.0, target=2.0),
     ]
     benchmark = Benchmark(title="Public", command="public", findings=findings)
     folder = publish_benchmarks("public", tmp_path, [benchmark]).parent
-    assert rows(scorecard([folder]))[2:] == [["Tanks", "0.276 V", "0.306 (best)", "0.285"]]
+    assert rows(scorecard([folder]))[2:] == [
+        ["Tanks, n = 50", "0.276 V", "0.306", "0.285 V"],
+        ["Race: time of two to 1 m, divided by ours", "4.00 x", "", "4 s"],
+    ]
 
 
 def test_it_goes_between_its_two_lines(report: Path, tmp_path: Path) -> None:
