@@ -59,8 +59,8 @@ class Course:
             raise _lacks_a_role(training, "the training data lack a role")
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
-        models, key = self._grown(models, key, estimation, selection)
-        self._together(models, key, estimation, selection)
+        models, key, added = self._grown(models, key, estimation, selection)
+        self._together(models, key, (*estimation, *added), selection)
         return tuple(selection)
 
     def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
@@ -156,10 +156,11 @@ class Course:
 
     def _grown(
         self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]
-    ) -> tuple[Members, str]:
+    ) -> tuple[Members, str, tuple[Trace, ...]]:
+        """The members of the best round, and the sequences that had been added by then."""
         asked = self.context.config.grow
         if asked is None:
-            return models, key
+            return models, key, ()
         pool = self.context.load(asked.data)
         sources, held_out = pool.with_role(Role.ESTIMATION), pool.with_role(Role.SELECTION)
         if not sources or not held_out:
@@ -195,7 +196,7 @@ class Course:
         self.growth.append(grown)
         self.notes.append(grown.sentence)
         self.stages[GROWN] = assembled(self.context.config, grown.models)
-        return grown.models, grown.key
+        return grown.models, grown.key, tuple(trace for trace in sources if trace.name in grown.added)
 
     def _together(self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
         if self.context.config.together is None:

@@ -97,6 +97,11 @@ class Growth:
     outputs: tuple[str, ...]
 
     @property
+    def added(self) -> frozenset[str]:
+        """Names of the sequences that had been added by the round that is kept."""
+        return frozenset(name for done in self.rounds[: self.best + 1] for name in done.added)
+
+    @property
     def sentence(self) -> str:
         """For the report."""
         first, kept = self.rounds[0], self.rounds[self.best]
