@@ -67,11 +67,13 @@ def test_the_worst_sequences_of_the_pool_are_added_and_none_twice():
 def test_the_best_round_is_kept_and_growth_ends_when_nothing_improves():
     found, *_ = grown(better_in=())
     assert (len(found.rounds), found.best, found.key) == (3, 0, "start")
+    assert found.added == frozenset(), "what did not help is not trained on later either"
     found, *_ = grown(better_in=(2,), text=GROW.replace("patience: 2", "patience: 2, until: 1.0"))
     assert found.best == 2
     assert found.rounds[2].look.within == 1.0
     assert len(found.rounds) == 3, "the figure holds: no further round"
     assert found.key == "start>1BP>1AR>2BP>2AR"
+    assert found.added == {name for one in found.rounds[1:] for name in one.added}
     assert "round 2 is kept" in found.sentence
     assert "6 sequences added" in found.sentence
 
