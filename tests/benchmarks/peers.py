@@ -47,7 +47,7 @@ PINNED = ("jax-sysid==1.1.0", "fastcan==0.6.0", "pyrenn==0.1")
 WORKER = Path(__file__).with_name("_peers_worker.py")
 TOOLS = ("jax-sysid", "fastcan, degree 2", "fastcan, degree 3", "pyrenn", "jax-sysid, state space")
 SEEDS = (0, 1, 2)
-PATIENCE = 8.0
+PATIENCE = 30.0
 """Wall time that a peer is given, in units of its cap and two minutes: the machine may have other work."""
 
 
