@@ -67,7 +67,7 @@ selection: abdx-selection
 mapping: BP+AR -> BC
 rest: {BC: 0}
 structure: {kind: NARX, input_delays: 3, output_delays: {from: 1, to: 4}, neurons: {from: 6, to: 15}}
-training: {loop: closed, max_iterations: 10}
+training: {loop: closed, max_iterations: 40}
 export: null
 """
 
