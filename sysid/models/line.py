@@ -46,7 +46,7 @@ class Line:
     Example:
         >>> from sysid.models import ARX, ARXModel, Mapping
         >>> def model(text: str, gain: float) -> ARXModel:
-        ...     return ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.0, gain]), intercept=0.0,
+        ...     return ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([gain, 0.0]), intercept=0.0,
         ...         mapping=Mapping.parse(text), sample_time=0.1, input_units=("psi",), output_unit="psi",
         ...         rest_output=0.0)
         >>> line = Line(along=Cascade(models=(model("u -> p1", 1.0), model("u -> p9", 5.0))), knots={"p1": 1, "p9": 9},
