@@ -144,11 +144,14 @@ class _Candidate:
         return self.solution.state.iteration if self.solution else 0
 
     @property
+    def origin(self) -> str:
+        return "the members as they were" if self.seed is None else f"seed {self.seed}"
+
+    @property
     def sentence(self) -> str:
-        origin = "the members as they were" if self.seed is None else f"seed {self.seed}"
         seconds = self.solution.curve[-1].elapsed_s if self.solution else 0.0
         return (
-            f"from {origin} after {self.iteration} iterations ({seconds:.1f} s): mean squared residual "
+            f"from {self.origin} after {self.iteration} iterations ({seconds:.1f} s): mean squared residual "
             f"{self.loss:.4g}, on the selection traces {self.score:.4g}"
         )
 
@@ -274,7 +277,7 @@ class Joint:
             evidence=chosen.solution.evidence if chosen.solution else None,
             notes=(
                 f"Chosen {how} among {len(seen)} states: {chosen.sentence}.",
-                *(f"Seen: {one.sentence}." for one in seen if one is not chosen),
+                *_others([one for one in seen if one is not chosen]),
             ),
         )
 
@@ -288,6 +291,17 @@ class Joint:
             return Status.NOT_IMPROVED
         later = any(one.seed == chosen.seed and one.iteration > chosen.iteration for one in seen)
         return Status.STOPPED_EARLY if later else chosen.solution.status
+
+
+def _others(seen: Sequence[_Candidate]) -> list[str]:
+    """One sentence for each start: how the selection error went on the way."""
+    by_origin: dict[str, list[str]] = {}
+    for one in seen:
+        by_origin.setdefault(one.origin, []).append(f"{one.score:.4g} ({one.iteration})")
+    return [
+        f"The other states from {origin}, error on the selection traces (iterations): {', '.join(looks)}."
+        for origin, looks in by_origin.items()
+    ]
 
 
 def _last(value: float) -> float:

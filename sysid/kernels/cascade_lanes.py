@@ -105,6 +105,18 @@ def _fill_past(p, depth, rest, record, z):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _limits(p, o, now_values, low, high):
+    """Write the limits of an output into all lanes; what they would be called where they hold."""
+    low[:], high[:] = p.limits[o, 0], p.limits[o, 1]
+    low_code, high_code = LOW, HIGH
+    if p.limit_channel[o, 0] >= 0:
+        low[:], low_code = now_values[p.limit_channel[o, 0]], LOW_CHANNEL
+    if p.limit_channel[o, 1] >= 0:
+        high[:], high_code = now_values[p.limit_channel[o, 1]], HIGH_CHANNEL
+    return low_code, high_code
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sizes(p):
     width, neurons = 1, 1
     for m in range(len(p.neurons)):
@@ -167,12 +179,7 @@ def run(p, depth, rest, lanes, values, held):
                 o = first_y + j
                 column, channel = p.output_column[o], p.output_channel[o]
                 offset, scale = p.column_offset[column], p.column_scale[column]
-                low[:], high[:] = p.limits[o, 0], p.limits[o, 1]
-                low_code, high_code = LOW, HIGH
-                if p.limit_channel[o, 0] >= 0:
-                    low[:], low_code = now_values[p.limit_channel[o, 0]], LOW_CHANNEL
-                if p.limit_channel[o, 1] >= 0:
-                    high[:], high_code = now_values[p.limit_channel[o, 1]], HIGH_CHANNEL
+                low_code, high_code = _limits(p, o, now_values, low, high)
                 total[:] = p.theta[at + j]
                 if gates >= 0:
                     _products(total, g, n, h)

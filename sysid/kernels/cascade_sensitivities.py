@@ -85,6 +85,37 @@ def _factors(c, theta, first, gates, j, n, n_x, n_y, linear, h, g):
                 c[i] += h[k] * theta[gates + k * n_x + i]
 
 
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _through_the_past(row, c, p, m, t, here, extent, source, J):
+    """Add what earlier samples and upstream outputs pass on; regressors of one column stand side by side."""
+    first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
+    i = 0
+    while i < n_x:
+        column = p.regressor_column[first_x + i]
+        s, end = source[column], i + 1
+        while end < n_x and p.regressor_column[first_x + end] == column:
+            end += 1
+        stop = end
+        # Samples before the first do not depend on the parameters.
+        while end > i and t < p.regressor_lag[first_x + end - 1]:
+            end -= 1
+        if s >= 0 and extent[s] > 0:
+            own = p.output_column[s]
+            ratio = p.column_scale[own] / p.column_scale[column]
+            while end - i >= 4:
+                lag = p.regressor_lag[first_x + i : first_x + i + 4]
+                _add_four(
+                    row, ratio * c[i], ratio * c[i + 1], ratio * c[i + 2], ratio * c[i + 3],
+                    J[s, here - lag[0]], J[s, here - lag[1]], J[s, here - lag[2]], J[s, here - lag[3]],
+                    extent[s],
+                )  # fmt: skip
+                i += 4
+            while i < end:
+                _add(row, ratio * c[i], J[s, here - p.regressor_lag[first_x + i]], extent[s])
+                i += 1
+        i = stop
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, source, carry, J):
     """Rows ``first`` to ``first + n_rows`` of the Jacobians of all outputs, in their scaled numbers.
@@ -142,30 +173,4 @@ def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, sou
                     own_gates = own_first[m] + gates - p.theta_first[m] if gates >= 0 else -1
                     _own(row, own_first[m], own_gates, j, n, n_x, n_y, linear, x, h, g)
                 _factors(c, p.theta, p.theta_first[m], gates, j, n, n_x, n_y, linear, h, g)
-                i = 0
-                while i < n_x:
-                    column = p.regressor_column[first_x + i]
-                    s, end = source[column], i + 1
-                    while end < n_x and p.regressor_column[first_x + end] == column:
-                        end += 1
-                    # Samples before the first do not depend on the parameters.
-                    while end > i and t < p.regressor_lag[first_x + end - 1]:
-                        end -= 1
-                    stop = end
-                    if s >= 0 and extent[s] > 0:
-                        ratio = p.column_scale[p.output_column[s]] / p.column_scale[column]
-                        here = carry + r
-                        while end - i >= 4:
-                            lag = p.regressor_lag[first_x + i : first_x + i + 4]
-                            _add_four(
-                                row, ratio * c[i], ratio * c[i + 1], ratio * c[i + 2], ratio * c[i + 3],
-                                J[s, here - lag[0]], J[s, here - lag[1]], J[s, here - lag[2]], J[s, here - lag[3]],
-                                extent[s],
-                            )  # fmt: skip
-                            i += 4
-                        while i < end:
-                            _add(row, ratio * c[i], J[s, here - p.regressor_lag[first_x + i]], extent[s])
-                            i += 1
-                    i = stop
-                    while i < n_x and p.regressor_column[first_x + i] == column:
-                        i += 1
+                _through_the_past(row, c, p, m, t, carry + r, extent, source, J)

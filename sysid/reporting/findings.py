@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from sysid.atomic import replacing
-from sysid.errors import ConfigError
+from sysid.reporting.figures_file import read_figures
 from sysid.reporting.numbers import number
 from sysid.reporting.results import Number
 from sysid.reporting.scores import Score
@@ -129,17 +128,13 @@ def read_findings(folder: Path) -> Benchmarks:
     Raises:
         ConfigError: If there are none, or they are damaged.
     """
-    path = Path(folder) / FINDINGS_FILE
-    try:
-        return Benchmarks.model_validate(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, RecursionError, ValidationError) as error:
-        raise ConfigError(
-            "the figures of the benchmark cannot be read",
-            where=path,
-            expected="what python -m tests.benchmarks NAME --publish=REPORT writes",
-            got=f"{error}".splitlines()[0],
-            remedy="publish the benchmark again",
-        ) from error
+    return read_figures(
+        Path(folder) / FINDINGS_FILE,
+        TypeAdapter(Benchmarks),
+        what="the figures of the benchmark cannot be read",
+        expected="what python -m tests.benchmarks NAME --publish=REPORT writes",
+        remedy="publish the benchmark again",
+    )
 
 
 def write_findings(folder: Path, found: Benchmarks) -> Path:

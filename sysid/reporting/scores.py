@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from sysid.atomic import replacing
-from sysid.errors import ConfigError
+from sysid.reporting.figures_file import read_figures
 from sysid.reporting.numbers import seconds
 from sysid.reporting.results import Number, Results
 
@@ -101,14 +100,10 @@ def read_scores(folder: Path) -> list[Score]:
     Raises:
         ConfigError: If there are none, or they are damaged.
     """
-    path = Path(folder) / SCORES_FILE
-    try:
-        return _SCORES.validate_python(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, RecursionError, ValidationError) as error:
-        raise ConfigError(
-            "the scores of the report cannot be read",
-            where=path,
-            expected="what sysid publish writes beside the page of a run",
-            got=f"{error}".splitlines()[0],
-            remedy="publish the run again",
-        ) from error
+    return read_figures(
+        Path(folder) / SCORES_FILE,
+        _SCORES,
+        what="the scores of the report cannot be read",
+        expected="what sysid publish writes beside the page of a run",
+        remedy="publish the run again",
+    )
