@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -247,7 +247,8 @@ class AssemblyConfig(BaseModel):
         name: Name of the run folder; letters, digits, dots, dashes and underscores.
         description: What it is for.
         data: Data set whose cases are scored; they need the inputs of the whole and the outputs that are scored.
-        training: Data set with the traces that are fitted, and those that choose (role ``selection``).
+        training: Data set with the traces that are fitted, and those that choose (role ``selection``); or several, whose
+            traces are then dealt in turn, so that the first so many of them hold some of each.
         selection: Another data set with traces that choose.
         outputs: Outputs that are scored.
         choose_on: Outputs whose error on the selection traces chooses; those that are scored by default.
@@ -271,7 +272,7 @@ class AssemblyConfig(BaseModel):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
     description: str = ""
     data: str
-    training: str
+    training: str | Annotated[tuple[str, ...], Field(min_length=1)]
     selection: str | None = None
     outputs: tuple[str, ...] = Field(min_length=1)
     choose_on: tuple[str, ...] = ()

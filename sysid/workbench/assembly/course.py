@@ -17,7 +17,7 @@ from sysid.workbench import events
 from sysid.workbench.assembly.config import MemberConfig
 from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
-from sysid.workbench.assembly.members import Members, assembled, own_traces, whole_score
+from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
 from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
 from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
 
@@ -51,12 +51,14 @@ class Course:
             ConfigError: If the data lack a role.
         """
         config = self.context.config
-        training = self.context.load(config.training)
-        estimation, selection = training.with_role(Role.ESTIMATION), training.with_role(Role.SELECTION)
+        names = (config.training,) if isinstance(config.training, str) else config.training
+        training = [self.context.load(name) for name in names]
+        estimation = dealt([one.with_role(Role.ESTIMATION) for one in training])
+        selection = [trace for one in training for trace in one.with_role(Role.SELECTION)]
         if config.selection is not None:
-            selection = (*selection, *self.context.load(config.selection).with_role(Role.SELECTION))
+            selection += self.context.load(config.selection).with_role(Role.SELECTION)
         if not estimation or not selection:
-            raise _lacks_a_role(training, "the training data lack a role")
+            raise _lacks_a_role("the training data lack a role", *training)
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
         models, key, added = self._grown(models, key, estimation, selection)
@@ -164,7 +166,7 @@ class Course:
         pool = self.context.load(asked.data)
         sources, held_out = pool.with_role(Role.ESTIMATION), pool.with_role(Role.SELECTION)
         if not sources or not held_out:
-            raise _lacks_a_role(pool, "the pool lacks a role")
+            raise _lacks_a_role("the pool lacks a role", pool)
 
         def fit(
             member: MemberConfig, now: Members, traces: Sequence[Trace], number: int, before: str
@@ -231,11 +233,11 @@ class Course:
         self.stages[TOGETHER] = fit.model
 
 
-def _lacks_a_role(found: TraceSet, what: str) -> ConfigError:
+def _lacks_a_role(what: str, *found: TraceSet) -> ConfigError:
     return ConfigError(
         what,
-        where=f"data set {found.name}",
+        where=f"data set {', '.join(one.name for one in found)}",
         expected="cases with role: estimation, and cases with role: selection",
-        got=", ".join(f"{name}: {role.value}" for name, role in found.roles.items()),
+        got=", ".join(f"{name}: {role.value}" for one in found for name, role in one.roles.items()),
         remedy="give some cases that role in the data set's dataset.yaml",
     )

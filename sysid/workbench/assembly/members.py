@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import zip_longest
+from typing import TypeVar
 
 import numpy as np
 
 from sysid.models import Cascade, Ends, Limit, Mapping, NARXModel
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+
+_T = TypeVar("_T")
 
 Members = dict[str, NARXModel]
 """The fitted members by the output of their first place."""
@@ -70,6 +74,22 @@ def assembled(config: AssemblyConfig, models: Members, *, without: str | None = 
     rest = {name: level for name, level in config.rest.items() if name in outputs | read}
     limits = {name: Limit(low=one.low, high=one.high) for name, one in config.limits.items() if name in outputs}
     return Cascade(models=tuple(wired), rest=rest, limits=limits)
+
+
+def dealt(sets: Sequence[Sequence[_T]]) -> list[_T]:
+    """Traces of several data sets in one row: one of each in turn, while it has any.
+
+    Args:
+        sets: The traces of each data set.
+
+    Returns:
+        All of them.
+
+    Example:
+        >>> dealt([["a", "b", "c"], ["d"]])
+        ['a', 'd', 'b', 'c']
+    """
+    return [trace for turn in zip_longest(*sets) for trace in turn if trace is not None]
 
 
 def own_traces(member: MemberConfig, traces: Sequence[Trace]) -> list[Trace]:

@@ -111,6 +111,18 @@ def test_training_data_without_selection_are_refused(workspace: Path) -> None:
         run(workspace)
 
 
+def test_several_training_data_sets_are_dealt_in_turn(workspace: Path) -> None:
+    shutil.copytree(workspace / "datasets" / "tanks", workspace / "datasets" / "more")
+    file = workspace / "datasets" / "more" / "dataset.yaml"
+    file.write_text(file.read_text(encoding="utf-8").replace("name: tanks", "name: more"), encoding="utf-8")
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    both = pipeline.read_text(encoding="utf-8").replace("training: tanks", "training: [tanks, more]")
+    pipeline.write_text(both, encoding="utf-8")
+    assert run(workspace) == 0
+    results = json.loads((workspace / "runs" / "tanks" / "results.json").read_text(encoding="utf-8"))
+    assert results["judgement"]["tables"]
+
+
 def test_a_run_that_has_not_come_so_far_has_no_assembly(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="has no assembly"):
         read_assembly(tmp_path)
