@@ -203,9 +203,9 @@ class RecursionProvider(AbstractProvider):
         object.__setattr__(self, "experiments", tuple(self.experiments))
         object.__setattr__(self, "_records", tuple(self._record(e) for e in self.experiments))
         counted = [
-            len(r.target[:: self.stride])
+            len(r.target[self._first :: self.stride])
             if r.root_weights is None
-            else np.count_nonzero(r.root_weights[:: self.stride])
+            else np.count_nonzero(r.root_weights[self._first :: self.stride])
             for r in self._records
         ]
         object.__setattr__(self, "n_samples", int(sum(counted)))
@@ -216,6 +216,15 @@ class RecursionProvider(AbstractProvider):
         measured[self.template.lags.depth :] = target
         roots = None if experiment.weights is None else np.sqrt(experiment.weights)
         return _Record(u, measured, target, roots)
+
+    @property
+    def _first(self) -> int:
+        """The first sample that counts.
+
+        Over a horizon it is the last of a window or of a stride: were it the first, a horizon that divides the stride
+        would be judged one step ahead alone.
+        """
+        return min(self.horizon, self.stride) - 1 if self.closed and self.horizon is not None else 0
 
     def _steps(self, record: _Record) -> int:
         """The horizon as the kernel wants it."""
@@ -234,7 +243,7 @@ class RecursionProvider(AbstractProvider):
             else:
                 residual = self._pass(record, theta).out - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
-            residual = residual[:: self.stride]
+            residual = residual[self._first :: self.stride]
             total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
 
@@ -249,12 +258,12 @@ class RecursionProvider(AbstractProvider):
             residual = passed.out - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
             correlated += len(residual) * max(1.0, correlation_time(residual) / self.stride)
-            counted = residual[:: self.stride]
+            counted = residual[self._first :: self.stride]
             loss += 0.5 * float(counted @ counted)
             for first, block in self._blocks(record, theta, passed):
                 rows = slice(first, first + len(block))
                 weighted = block if record.root_weights is None else block * record.root_weights[rows, None]
-                some = slice(-first % self.stride, None, self.stride)
+                some = slice((self._first - first) % self.stride, None, self.stride)
                 # A copy only where rows are left out: products of strided arrays are not done by BLAS.
                 weighted = weighted if self.stride == 1 else np.ascontiguousarray(weighted[some])
                 gradient += weighted.T @ residual[rows][some]

@@ -247,8 +247,8 @@ class AssemblyConfig(BaseModel):
         name: Name of the run folder; letters, digits, dots, dashes and underscores.
         description: What it is for.
         data: Data set whose cases are scored; they need the inputs of the whole and the outputs that are scored.
-        training: Data set with the traces that are fitted, and those that choose (role ``selection``); or several, whose
-            traces are then dealt in turn, so that the first so many of them hold some of each.
+        training: Data set with the traces that are fitted, and those that choose (role ``selection``); or several
+            data sets, whose traces are dealt in turn, so that the first so many hold some of each.
         selection: Another data set with traces that choose.
         outputs: Outputs that are scored.
         choose_on: Outputs whose error on the selection traces chooses; those that are scored by default.
