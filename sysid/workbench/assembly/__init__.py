@@ -3,6 +3,7 @@
 ============  ===================================================================================
 ``config``    the pipeline's YAML
 ``members``   the members: where each stands, what it is fitted on, how it is put in its place
+``known``     members that are declared and not fitted
 ``stages``    alone, chosen together, retrained downstream, trained end to end
 ``growth``    more training data, where the whole is worst
 ``line``      the places between those that are modelled

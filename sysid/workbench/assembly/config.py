@@ -76,6 +76,48 @@ class MemberConfig(BaseModel):
         return Training(**{"seed": seed, **given})
 
 
+class KnownConfig(BaseModel):
+    """A member that is declared and not fitted: a weighted sum of its inputs, held between two bounds.
+
+    Args:
+        mapping: Inputs and output, such as ``BP+PS -> EM``.
+        gains: The weight of each input, in the output's unit per the input's.
+        constant: What is added, in the output's unit.
+        low: Least value.
+        high: Greatest value.
+        rest: Value at rest.
+        unit: Of the output; a pure number by default.
+    """
+
+    model_config = STRICT
+
+    mapping: MappingField
+    gains: dict[str, float]
+    constant: float = 0.0
+    low: float
+    high: float
+    rest: float
+    unit: str = "1"
+
+    @model_validator(mode="after")
+    def _check(self) -> KnownConfig:
+        if set(self.gains) != set(self.mapping.inputs):
+            raise FieldError(
+                f"the gains of {self.mapping} are not those of its inputs",
+                expected=f"one for each of {', '.join(self.mapping.inputs)}",
+                got=", ".join(self.gains) or "none",
+                remedy="correct the gains or the mapping",
+            )
+        if not self.low <= self.rest <= self.high or self.low == self.high:
+            raise FieldError(
+                f"the bounds of {self.mapping.output} do not hold its rest",
+                expected="low at most rest, rest at most high, low below high",
+                got=f"low {self.low:g}, rest {self.rest:g}, high {self.high:g}",
+                remedy="correct the bounds",
+            )
+        return self
+
+
 class RetrainConfig(BaseModel):
     """Members that are trained again on what the others really put out.
 
@@ -254,6 +296,7 @@ class AssemblyConfig(BaseModel):
         choose_on: Outputs whose error on the selection traces chooses; those that are scored by default.
         definitions: Anything, to be repeated by YAML's anchors; not read.
         members: The members.
+        known: Members that are declared, not fitted; members may read them, and they the members.
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
         limits: Limits of outputs.
         retrain: Members to train again on what the others put out.
@@ -278,6 +321,7 @@ class AssemblyConfig(BaseModel):
     choose_on: tuple[str, ...] = ()
     definitions: dict[str, Any] = Field(default_factory=dict)
     members: tuple[MemberConfig, ...] = Field(min_length=1)
+    known: tuple[KnownConfig, ...] = ()
     rest: dict[str, float | str] = Field(default_factory=dict)
     limits: dict[str, LimitConfig] = Field(default_factory=dict)
     retrain: RetrainConfig | None = None
@@ -293,6 +337,7 @@ class AssemblyConfig(BaseModel):
     def _check_outputs(self) -> AssemblyConfig:
         bases = [member.mapping.output for member in self.members]
         written = [f"{member.mapping.output}{place}" for member in self.members for place in member.places]
+        written += [known.mapping.output for known in self.known]
         if len(set(written)) < len(written):
             raise FieldError(
                 "two members write one channel",

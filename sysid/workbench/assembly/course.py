@@ -17,6 +17,7 @@ from sysid.workbench import events
 from sysid.workbench.assembly.config import MemberConfig
 from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
+from sysid.workbench.assembly.known import known_model, with_known
 from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
 from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
 from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
@@ -59,6 +60,7 @@ class Course:
             selection += self.context.load(config.selection).with_role(Role.SELECTION)
         if not estimation or not selection:
             raise _lacks_a_role("the training data lack a role", *training)
+        estimation, selection = with_known(config.known, estimation), with_known(config.known, selection)
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
         models, key, added = self._grown(models, key, estimation, selection)
@@ -83,6 +85,9 @@ class Course:
                 keys.append(key)
             candidates[member.mapping.output] = fits
             alone[member.mapping.output] = int(np.argmin([self._alone(member, fit, selection) for fit in fits]))
+        for known in self.context.config.known:
+            candidates[known.mapping.output] = [known_model(known, estimation[0])]
+            alone[known.mapping.output] = 0
         self.stages[ALONE] = assembled(
             self.context.config, {name: models[alone[name]] for name, models in candidates.items()}
         )
@@ -164,7 +169,8 @@ class Course:
         if asked is None:
             return models, key, ()
         pool = self.context.load(asked.data)
-        sources, held_out = pool.with_role(Role.ESTIMATION), pool.with_role(Role.SELECTION)
+        known = self.context.config.known
+        sources, held_out = (with_known(known, pool.with_role(role)) for role in (Role.ESTIMATION, Role.SELECTION))
         if not sources or not held_out:
             raise _lacks_a_role("the pool lacks a role", pool)
 

@@ -17,7 +17,7 @@ from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
 _T = TypeVar("_T")
 
 Members = dict[str, NARXModel]
-"""The fitted members by the output of their first place."""
+"""The members by the output of their first place, the known ones among them."""
 
 
 def placed_name(member: MemberConfig, channel: str, place: str) -> str:
@@ -69,6 +69,7 @@ def assembled(config: AssemblyConfig, models: Members, *, without: str | None = 
         if member.mapping.output != without
         for place in member.places
     ]
+    wired += [models[known.mapping.output] for known in config.known]
     outputs = {model.mapping.output for model in wired}
     read = {name for model in wired for name in model.mapping.inputs}
     rest = {name: level for name, level in config.rest.items() if name in outputs | read}

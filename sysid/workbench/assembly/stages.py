@@ -183,10 +183,12 @@ def train_together(
     asked = config.together
     if asked is None:
         raise TypeError("the pipeline trains nothing together")
-    trained = None
-    if asked.members is not None:
-        places = {member.mapping.output: member.places for member in config.members}
-        trained = [f"{name}{place}" for name in asked.members for place in places[name]]
+    trained = [
+        f"{member.mapping.output}{place}"
+        for member in config.members
+        if asked.members is None or member.mapping.output in asked.members
+        for place in member.places
+    ]
     return fit_cascade(
         cascade,
         estimation[: asked.traces],

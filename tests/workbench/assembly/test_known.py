@@ -1,0 +1,93 @@
+"""Known members: what is declared, as one more measured channel and as a part of the whole."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from sysid.errors import ConfigError
+from sysid.models import Mapping
+from sysid.traces import Channel, Trace
+from sysid.workbench.assembly.config import KnownConfig
+from sysid.workbench.assembly.known import known_model, with_known
+from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.kinds import RunRequest
+from sysid.yaml_files import check, parse_yaml
+
+FIELDS = "{mapping: a+b -> d, gains: {a: 2, b: -1}, constant: 0.5, low: -1, high: 3, rest: 0}"
+
+
+def known(text: str = FIELDS) -> KnownConfig:
+    return check(KnownConfig, parse_yaml(text, where="text"), where="text")
+
+
+def trace(values: np.ndarray) -> Trace:
+    channels = (Channel(name="a", unit="psi"), Channel(name="b", unit="V"))
+    return Trace(name="t", sample_time=0.1, channels=channels, values=values)
+
+
+@given(
+    st.lists(st.tuples(*[st.floats(-10.0, 10.0)] * 2), min_size=1, max_size=20),
+    st.floats(-5.0, 0.0),
+    st.floats(0.1, 5.0),
+    st.floats(-3.0, 3.0),
+)
+def test_it_is_the_sum_that_is_declared_held_between_its_bounds(rows, low, high, constant):
+    values = np.array(rows)
+    declared = KnownConfig(
+        mapping=Mapping.parse("a+b -> d"), gains={"b": -1.0, "a": 2.0}, constant=constant, low=low, high=high, rest=0.0
+    )
+    expected = np.clip(2.0 * values[:, 0] - values[:, 1] + constant, low, high)
+    assert_allclose(known_model(declared, trace(values)).simulate(values), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_a_later_one_may_read_an_earlier_one():
+    second = known("{mapping: d -> e, gains: {d: 1}, low: 0, high: 1, rest: 0}")
+    values = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 1.0]])
+    (seen,) = with_known([known(), second], [trace(values)])
+    assert seen.channel_names == ("a", "b", "d", "e")
+    assert_allclose(seen["d"], [0.5, 2.5, -1.0])
+    assert_allclose(seen["e"], [0.5, 1.0, 0.0])
+    assert [channel.unit for channel in seen.channels] == ["psi", "V", "1", "1"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"gains: {a: 2, b: -1}": "gains: {a: 2}"}, "gains of a\\+b -> d"),
+        ({"low: -1": "low: 1"}, "bounds of d"),
+        ({"low: -1, high: 3": "low: 0, high: 0"}, "bounds of d"),
+    ],
+    ids=["an input without a gain", "rest below low", "no room between the bounds"],
+)
+def test_what_cannot_be_meant_is_refused(change, said):
+    text = FIELDS
+    for old, new in change.items():
+        text = text.replace(old, new)
+    with pytest.raises(ConfigError, match=said):
+        known(text)
+
+
+def test_members_read_it_and_the_whole_runs_it(workspace: Path):
+    """Two tanks, the lower of which is told the difference that drives it."""
+    file = workspace / "pipelines" / "tanks.yaml"
+    text = file.read_text(encoding="utf-8").replace(
+        "  - mapping: upper -> lower\n    structure: {kind: NARX, input_delays: [0]",
+        "  - mapping: head -> lower\n    structure: {kind: NARX, input_delays: [1]",
+    )
+    declared = (
+        "known: [{mapping: upper+lower -> head, gains: {upper: 1, lower: -0.3}, low: 0, high: 9, rest: 0, unit: m}]\n"
+    )
+    file.write_text(text.replace("retrain:", f"{declared}retrain:"), encoding="utf-8")
+    assert run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
+    whole = read_assembly(workspace / "runs" / "tanks")
+    ran = whole.simulate(np.full((60, 1), 1.5))
+    assert_allclose(ran["head"], np.maximum(ran["upper"] - 0.3 * ran["lower"], 0.0), atol=1e-12)
+    results = json.loads((workspace / "runs" / "tanks" / "results.json").read_text(encoding="utf-8"))
+    assert "trained end to end" in json.dumps(results["judgement"]["tables"][0])
