@@ -139,6 +139,8 @@ class TogetherConfig(BaseModel):
 
     Args:
         members: Outputs of the members that are trained; all by default.
+        measured: Outputs that are as measured while the others are trained, such as a switch: where the free run
+            decides when it flips, the loss has an edge there, and no step of the training sees across it.
         targets: The error of each output that counts as one, in its unit.
         training: How.
         traces: Estimation traces used, the first so many; all by default.
@@ -147,6 +149,7 @@ class TogetherConfig(BaseModel):
     model_config = STRICT
 
     members: tuple[str, ...] | None = None
+    measured: tuple[str, ...] = ()
     targets: dict[str, float] = Field(min_length=1)
     training: JointConfig = Field(default_factory=JointConfig)
     traces: int | None = Field(default=None, ge=1)
@@ -352,6 +355,7 @@ class AssemblyConfig(BaseModel):
             "published": tuple(self.published),
             "stress": (self.stress.output,) if self.stress else (),
             "together, targets": tuple(self.together.targets) if self.together else (),
+            "together, measured": self.together.measured if self.together else (),
             "grow, outputs": self.grow.outputs if self.grow else (),
             "line": (self.line.channel, *self.line.knots, *self.line.outputs) if self.line else (),
         }

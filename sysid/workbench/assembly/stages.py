@@ -7,7 +7,7 @@ upstream, and training end to end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sysid.estimation import CascadeFit, FitProgress, FitResult, fit_cascade, fit_narx
@@ -188,9 +188,10 @@ def train_together(
         for member in config.members
         if asked.members is None or member.mapping.output in asked.members
         for place in member.places
+        if f"{member.mapping.output}{place}" not in asked.measured
     ]
-    return fit_cascade(
-        cascade,
+    fit = fit_cascade(
+        _without(cascade, asked.measured),
         estimation[: asked.traces],
         targets=asked.targets,
         trained=trained,
@@ -198,3 +199,13 @@ def train_together(
         selection=selection,
         on_progress=report,
     )
+    left_out = [cascade.member(name) for name in asked.measured]
+    return replace(fit, model=replace(cascade, models=(*fit.model.models, *left_out)))
+
+
+def _without(cascade: Cascade, names: Collection[str]) -> Cascade:
+    """The cascade without some of its members: whoever reads their outputs reads what was measured."""
+    left_out = [cascade.member(name) for name in names]
+    models = tuple(model for model in cascade.models if model not in left_out)
+    limits = {name: limit for name, limit in cascade.limits.items() if name not in names}
+    return replace(cascade, models=models, limits=limits)

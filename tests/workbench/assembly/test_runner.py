@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.estimation import CascadeFit
 from sysid.reporting import publish_run
 from sysid.reporting.judgement_report import read_judgement_results
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.kinds import RunRequest, kind_of
+from sysid.workbench.record import read_fit
 from sysid.workbench.tracking import connect, store_uri
 from tests.workbench.assembly.conftest import levels
 
@@ -102,6 +104,23 @@ def test_every_stage_is_tracked_once(workspace: Path, empty_store: Path) -> None
         "assembly · chosen together", "assembly · each alone", "assembly · retrained", "assembly · trained end to end"
     ]  # fmt: skip
     assert all(any(name.endswith("V/mse") for name in one.data.metrics) for one in runs)
+
+
+def test_what_is_as_measured_while_the_others_are_trained_stays_as_it_was(workspace: Path) -> None:
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8").replace(
+        "targets: {upper: 0.1, lower: 0.1}", "measured: [lower]\n  targets: {upper: 0.1}"
+    )
+    pipeline.write_text(text.replace("retrain: {members: [lower], max_iterations: 5}\n", ""), encoding="utf-8")
+    assert run(workspace) == 0
+    folder = workspace / "runs" / "tanks"
+    fit = CascadeFit.from_dict(json.loads((folder / "together.json").read_text(encoding="utf-8")))
+    alone = read_fit(folder / "fits" / "upper-lower-0")
+    assert fit.model.inputs == ("pump",)
+    assert fit.errors == {"upper": 0.1}
+    assert fit.model.member("lower").to_dict() == alone.model.to_dict()
+    starts = [read_fit(folder / "fits" / f"pump-lower-upper-{n}").model.to_dict() for n in range(2)]
+    assert fit.model.member("upper").to_dict() not in starts
 
 
 def test_training_data_without_selection_are_refused(workspace: Path) -> None:
