@@ -25,30 +25,22 @@ def known_model(known: KnownConfig, like: Trace) -> NARXModel:
         like: A trace with its inputs, for their units and the sample time.
 
     Returns:
-        The model; its bounds are those of the scaled output.
+        The model, without its bounds.
 
     Raises:
         ChannelError: If the trace lacks an input.
     """
     inputs = known.mapping.inputs
-    middle, half = 0.5 * (known.high + known.low), 0.5 * (known.high - known.low)
-    scaling = Scaling(
-        input_offset=(0.0,) * len(inputs),
-        input_scale=(1.0,) * len(inputs),
-        output_offset=middle,
-        output_scale=half,
-    )
-    gains = [known.gains[name] / half for name in inputs]
     return NARXModel(
         network=NARX(input_delays=[0], output_delays=1, neurons=0),
-        theta=np.array([(known.constant - middle) / half, *gains, 0.0]),
-        scaling=scaling,
+        theta=np.array([known.constant, *(known.gains[name] for name in inputs), 0.0]),
+        scaling=Scaling.identity(len(inputs)),
         mapping=known.mapping,
         sample_time=like.sample_time,
         input_units=tuple(like.channel(name).unit for name in inputs),
         output_unit=known.unit,
         rest_output=known.rest,
-        clamp=1.0,
+        clamp=np.inf,  # its bounds are limits of the whole: a model at its own bound counts as lost
     )
 
 
@@ -66,6 +58,7 @@ def with_known(known: Sequence[KnownConfig], traces: Sequence[Trace]) -> list[Tr
     def one(trace: Trace) -> Trace:
         for member in known:
             column = known_model(member, trace).simulate(trace.columns(member.mapping.inputs))
+            column = np.clip(column, member.low, member.high)
             trace = replace(
                 trace,
                 channels=(*trace.channels, Channel(name=member.mapping.output, unit=member.unit)),

@@ -74,6 +74,7 @@ def assembled(config: AssemblyConfig, models: Members, *, without: str | None = 
     read = {name for model in wired for name in model.mapping.inputs}
     rest = {name: level for name, level in config.rest.items() if name in outputs | read}
     limits = {name: Limit(low=one.low, high=one.high) for name, one in config.limits.items() if name in outputs}
+    limits |= {known.mapping.output: Limit(low=known.low, high=known.high) for known in config.known}
     return Cascade(models=tuple(wired), rest=rest, limits=limits)
 
 
