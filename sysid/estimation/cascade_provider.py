@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError
-from sysid.estimation.provider import AbstractProvider, Linearisation, correlation_time
+from sysid.estimation.correlation import correlation_time
+from sysid.estimation.provider import AbstractProvider, Linearisation
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_sensitivities import sensitivities
 from sysid.models import Cascade, Ends, Member, VectorNARXModel

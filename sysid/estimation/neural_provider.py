@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.provider import BLOCK, AbstractProvider, Experiment, Linearisation, correlation_time
+from sysid.estimation.correlation import correlation_time
+from sysid.estimation.provider import BLOCK, AbstractProvider, Experiment, Linearisation
 from sysid.kernels import neural_state_space as kernel
 from sysid.models import NeuralForm
 

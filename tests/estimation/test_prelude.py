@@ -154,7 +154,7 @@ def in_windows(record: Experiment, horizon: int) -> np.ndarray:
     ids=str,
 )
 def test_with_a_stride_the_loss_is_that_of_every_so_manieth_sample(stride, horizon, first):
-    """Over a horizon that the stride divides, not of the samples that are one step ahead."""
+    """Over a horizon that divides the stride, not of the samples that are one step ahead."""
     weights = np.random.default_rng(4).uniform(0.5, 2.0, 2500)
     weights[::3] = 0.0
     records = (experiment(2500, weights=weights), experiment(1300, 1))

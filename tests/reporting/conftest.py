@@ -112,6 +112,48 @@ def _null(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
+def _document(fits: list[dict[str, Any]], samples: int) -> dict[str, Any]:
+    """The results of a run with these fits."""
+    return {
+        "schema_version": 1,
+        "pipeline": "tank-level",
+        "description": "Level of a tank from pump -> valve, <fitted> four ways.",
+        "command": "sysid run tank-level --seed 3",
+        "created": "2026-03-01T12:00:00+00:00",
+        "environment": {
+            "python": "3.11.9",
+            "packages": {"numpy": "2.2.1", "scipy": "1.15.0"},
+            "cpu": "Test Processor 3 GHz",
+            "cores": 2,
+            "platform": "Linux",
+            "commit": None,
+        },
+        "seed": 3,
+        "data": {
+            "name": "tank",
+            "digest": "ab" * 32,
+            "sample_time": 0.1,
+            "cases": {
+                case: {
+                    "role": role,
+                    "samples": samples,
+                    "duration_s": 0.1 * (samples - 1),
+                    "provenance": ["Recorded on the rig", "Averaged to 0.1 s."],
+                }
+                for case, role in CASES.items()
+            },
+        },
+        "selection": {"name": "tank-selection", "cases": {"SEL01": {"samples": 500}, "SEL02": {"samples": 500}}},
+        "start": {"kind": "rest", "n_measured": 0},
+        "fits": fits,
+        "best": {
+            "name": "NARX free run",
+            "chosen_by": "Least mean free-run mse on the selection traces SEL01 and SEL02.",
+        },
+        "published": None,
+    }
+
+
 @pytest.fixture(scope="session")
 def make_run() -> Callable[..., Path]:
     """Writes a run folder; ``edit`` changes the results before they are written."""
@@ -132,45 +174,7 @@ def make_run() -> Callable[..., Path]:
             arrays = {f"{case}/{part}": array for case, parts in signals.items() for part, array in parts.items()}
             np.savez_compressed(place / "signals.npz", **arrays)
             fits.append(_fit(name, signals, None if np.isinf(noise) else 1.1 * noise**2))
-        document = {
-            "schema_version": 1,
-            "pipeline": "tank-level",
-            "description": "Level of a tank from pump -> valve, <fitted> four ways.",
-            "command": "sysid run tank-level --seed 3",
-            "created": "2026-03-01T12:00:00+00:00",
-            "environment": {
-                "python": "3.11.9",
-                "packages": {"numpy": "2.2.1", "scipy": "1.15.0"},
-                "cpu": "Test Processor 3 GHz",
-                "cores": 2,
-                "platform": "Linux",
-                "commit": None,
-            },
-            "seed": 3,
-            "data": {
-                "name": "tank",
-                "digest": "ab" * 32,
-                "sample_time": 0.1,
-                "cases": {
-                    case: {
-                        "role": role,
-                        "samples": samples,
-                        "duration_s": 0.1 * (samples - 1),
-                        "provenance": ["Recorded on the rig", "Averaged to 0.1 s."],
-                    }
-                    for case, role in CASES.items()
-                },
-            },
-            "selection": {"name": "tank-selection", "cases": {"SEL01": {"samples": 500}, "SEL02": {"samples": 500}}},
-            "start": {"kind": "rest", "n_measured": 0},
-            "fits": fits,
-            "best": {
-                "name": "NARX free run",
-                "chosen_by": "Least mean free-run mse on the selection traces SEL01 and SEL02.",
-            },
-            "published": None,
-        }
-        document = _null(document)
+        document = _null(_document(fits, samples))
         if edit is not None:
             edit(document)
         (folder / "results.json").write_text(json.dumps(document, allow_nan=False), encoding="utf-8")

@@ -154,6 +154,18 @@ class TogetherConfig(BaseModel):
     training: JointConfig = Field(default_factory=JointConfig)
     traces: int | None = Field(default=None, ge=1)
 
+    @model_validator(mode="after")
+    def _check(self) -> TogetherConfig:
+        both = set(self.measured) & {*(self.members or ()), *self.targets}
+        if both:
+            raise FieldError(
+                f"{', '.join(sorted(both))} is to be as measured, and trained or judged",
+                expected="outputs under measured that are neither under members nor under targets",
+                got=f"measured {', '.join(self.measured)}",
+                remedy="take it out of measured, or out of the others",
+            )
+        return self
+
     def training_options(self, seed: int) -> JointTraining:
         """The options of the training, with a seed where none is named.
 

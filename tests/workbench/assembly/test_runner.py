@@ -123,6 +123,14 @@ def test_what_is_as_measured_while_the_others_are_trained_stays_as_it_was(worksp
     assert fit.model.member("upper").to_dict() not in starts
 
 
+def test_what_is_as_measured_is_neither_trained_nor_a_target(workspace: Path) -> None:
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8").replace("  targets: {upper", "  measured: [lower]\n  targets: {upper")
+    pipeline.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match="lower is to be as measured"):
+        run(workspace)
+
+
 def test_training_data_without_selection_are_refused(workspace: Path) -> None:
     file = workspace / "datasets" / "tanks" / "dataset.yaml"
     file.write_text(file.read_text(encoding="utf-8").replace("role: selection", "role: validation"), encoding="utf-8")
@@ -139,7 +147,12 @@ def test_several_training_data_sets_are_dealt_in_turn(workspace: Path) -> None:
     pipeline.write_text(both, encoding="utf-8")
     assert run(workspace) == 0
     results = json.loads((workspace / "runs" / "tanks" / "results.json").read_text(encoding="utf-8"))
-    assert results["judgement"]["tables"]
+    assert set(results["data"]["others"]) == {"more"}
+    both_ways = [read_fit(workspace / "runs" / "tanks" / "fits" / "upper-lower-0").model.to_dict()["theta"]]
+    pipeline.write_text(both.replace("[tanks, more]", "tanks"), encoding="utf-8")
+    assert run(workspace) == 0
+    both_ways.append(read_fit(workspace / "runs" / "tanks" / "fits" / "upper-lower-0").model.to_dict()["theta"])
+    assert both_ways[0] != both_ways[1]  # twice the traces: another weight of the prior
 
 
 def test_a_run_that_has_not_come_so_far_has_no_assembly(tmp_path: Path) -> None:
