@@ -13,7 +13,7 @@ class Attempt:
 
     Args:
         start: Which start, from 1 on.
-        seed: Its seed; ``None`` for an initial fit.
+        seed: Its seed; ``None`` for an initial fit, and for a committee.
         iterations: Done by then.
         elapsed_s: Seconds that it had taken.
         estimation_mse: On the estimation records, in the output's unit squared.
@@ -22,6 +22,7 @@ class Attempt:
         effective_parameters: Parameters that the data determine; NaN where the evidence was not computed.
         stable: Whether its free run passed the check over random sequences; ``None`` where nobody asked.
         chosen: Whether it is the result.
+        members: Of a committee, the starts that it unites, once for each vote.
     """
 
     start: int
@@ -34,6 +35,7 @@ class Attempt:
     effective_parameters: float
     stable: bool | None = None
     chosen: bool = False
+    members: tuple[int, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
@@ -51,4 +53,4 @@ class Attempt:
         """
         numbers = ("estimation_mse", "selection_mse", "log_evidence", "effective_parameters")
         read = {name: float("nan" if fields[name] is None else fields[name]) for name in numbers}
-        return cls(**{**fields, **read})
+        return cls(**{**fields, **read, "members": tuple(fields.get("members", ()))})

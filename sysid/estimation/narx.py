@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError
-from sysid.estimation import starts
+from sysid.estimation import committee, starts
 from sysid.estimation.arx import first_output
-from sysid.estimation.attempts import Attempt
 from sysid.estimation.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.batched import device_named
 from sysid.estimation.checkpoint import Checkpoint
+from sysid.estimation.choosing import choose
 from sysid.estimation.growing import grown
 from sysid.estimation.initialise import Layout
 from sysid.estimation.posterior import calibrate, laplace
 from sysid.estimation.prelude import StepSamples
 from sysid.estimation.provider import Experiment, RecursionProvider, experiments_of
+from sysid.estimation.raced import raced_result, raced_status
 from sysid.estimation.regression import lagged
-from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.result import FitResult, Loop
 from sysid.estimation.scouting import Patrol, Scout
 from sysid.estimation.training import FitProgress, Training
 from sysid.models import NARX, ARXModel, History, Mapping, NARXModel, Scaling, Start
@@ -72,82 +73,113 @@ def fit_narx(
     """
     began = time.perf_counter()
     training, start = training or Training(), start or Start()
+    committee.check(training, selection)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = experiments_of(traces, mapping, start, rest)
     experiments = (*experiments, *_offset(experiments, mapping, training))
-    template = _template(traces[0], mapping, network, experiments, rest)
-    layout = Layout.of(network, len(mapping.inputs))
-    basis = _basis(training, template, experiments, layout)
-    to_plain = basis.to_plain(layout)
-    inner = RecursionProvider(
-        template=template.recursion,
-        experiments=experiments,
-        closed=training.loop is Loop.CLOSED,
-        stride=training.stride,
-    )
+    task = _Task.of(_template(traces[0], mapping, network, experiments, rest), experiments, training)
     race = starts.Race(
         training=training,
-        layout=layout,
-        provider=RebasedProvider(inner=inner, to_plain=to_plain),
-        to_plain=to_plain,
-        template=template,
+        layout=task.layout,
+        provider=task.provider,
+        to_plain=task.to_plain,
+        template=task.template,
         selection=selection,
         start=start,
-        initial=_initial_parameters(initial, template, layout, to_plain, training.seed),
+        initial=_initial_parameters(initial, task.template, task.layout, task.to_plain, training.seed),
         on_progress=on_progress,
         resume=resume,
-        prelude=_prelude(training, template, experiments, layout, basis),
-        scouted=_scouted(training, inner, to_plain, layout),
-        curriculum=[RebasedProvider(inner=replace(inner, horizon=k), to_plain=to_plain) for k in training.curriculum],
+        prelude=_prelude(training, task, experiments),
+        scouted=_scouted(training, task),
+        curriculum=[task.within(horizon) for horizon in training.curriculum],
     )
     candidates = starts.run(race)
-    choice = starts.choose(candidates, training.choose_by, vet)
+    on_checkpoint(Checkpoint.of(choose(candidates, training.choose_by).chosen.solution.state))
+    tasks = dict.fromkeys(candidates, task) | _with_committee(race, candidates, experiments)
+    choice = choose(list(tasks), training.choose_by, vet)
     chosen = choice.chosen
-    on_checkpoint(Checkpoint.of(chosen.solution.state))
     records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     records += [(t.columns(mapping.inputs), None) for t in selection]
-    status = raced_status(chosen, candidates, records, interrupted=race.stop.is_set())
+    status = raced_status(chosen, list(tasks), records, interrupted=race.stop.is_set())
     posterior = laplace(
         chosen.solution.state,
         chosen.model,
-        to_plain,
+        tasks[chosen].to_plain,
         experiments,
         copies=1 + len(training.offsets),
         stride=training.stride,
     )
     if posterior is not None:
         posterior = calibrate(posterior, chosen.model, experiments_of(selection, mapping, start, rest))
-    fit = raced_result(choice, candidates, training, status, time.perf_counter() - began)
+    fit = raced_result(choice, list(tasks), training, status, time.perf_counter() - began)
     return replace(fit, posterior=posterior)
 
 
-def _scouted(
-    training: Training, inner: RecursionProvider, to_plain: NDArray[np.float64], layout: Layout
-) -> list[Scout]:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Task(committee.Task):
+    """What is minimised for one size of the network.
+
+    Args:
+        template: The model but for its parameters.
+        basis: The regressors' basis in training.
+        inner: Residuals over plain parameters.
+    """
+
+    template: NARXModel
+    basis: RegressorBasis
+    inner: RecursionProvider
+
+    @classmethod
+    def of(cls, template: NARXModel, experiments: Sequence[Experiment], training: Training) -> _Task:
+        layout = Layout.of(template.network, len(template.mapping.inputs))
+        basis = _basis(training, template, experiments, layout)
+        inner = RecursionProvider(
+            template=template.recursion,
+            experiments=tuple(experiments),
+            closed=training.loop is Loop.CLOSED,
+            stride=training.stride,
+        )
+        to_plain = basis.to_plain(layout)
+        provider = RebasedProvider(inner=inner, to_plain=to_plain)
+        return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider, inner=inner)
+
+    def within(self, horizon: int) -> RebasedProvider:
+        """Residuals of free runs over so many samples."""
+        return RebasedProvider(inner=replace(self.inner, horizon=horizon), to_plain=self.to_plain)
+
+
+def _with_committee(
+    race: starts.Race, candidates: Sequence[starts.Candidate], experiments: Sequence[Experiment]
+) -> dict[starts.Candidate, _Task]:
+    """The committee as one more candidate, with its task; none where no second vote helps."""
+    found = committee.elected(race, candidates) if race.training.committee > 1 else None
+    if found is None:
+        return {}
+    task = _Task.of(found[0].model, experiments, race.training)
+    return {committee.seated(race, *found, task): task}
+
+
+def _scouted(training: Training, task: _Task) -> list[Scout]:
     """The best of the scouts as starts; none where none are asked for, or no device is there to send them out on."""
     if not training.scouts or (training.device == "auto" and device_named("auto") == "cpu"):
         return []
     patrol = Patrol(
-        provider=inner,
-        to_plain=to_plain,
-        layout=layout,
-        centre=np.asarray(np.linalg.solve(to_plain, layout.centre())),
+        provider=task.inner,
+        to_plain=task.to_plain,
+        layout=task.layout,
+        centre=np.asarray(np.linalg.solve(task.to_plain, task.layout.centre())),
         regularisation=training.regularisation,
         device=training.device,
     )
     return patrol.scouts(range(training.seed, training.seed + training.scouts))[: training.starts]
 
 
-def _prelude(
-    training: Training,
-    template: NARXModel,
-    experiments: Sequence[Experiment],
-    layout: Layout,
-    basis: RegressorBasis,
-) -> StepSamples | None:
-    if not training.prelude or not layout.linear or not layout.neurons:
+def _prelude(training: Training, task: _Task, experiments: Sequence[Experiment]) -> StepSamples | None:
+    if not training.prelude or not task.layout.linear or not task.layout.neurons:
         return None
-    return StepSamples.of(template, experiments, layout, basis, samples=training.prelude, seed=training.seed)
+    return StepSamples.of(
+        task.template, experiments, task.layout, task.basis, samples=training.prelude, seed=training.seed
+    )
 
 
 def _offset(experiments: Sequence[Experiment], mapping: Mapping, training: Training) -> list[Experiment]:
@@ -219,109 +251,3 @@ def _initial_parameters(
 
 def _same(model: NARXModel, template: NARXModel) -> bool:
     return model.network == template.network and model.scaling == template.scaling
-
-
-def raced_status(
-    chosen: starts.Candidate,
-    candidates: Sequence[starts.Candidate],
-    records: Sequence[tuple[NDArray[np.float64], History | None]],
-    *,
-    interrupted: bool,
-) -> Status:
-    """How a race ended.
-
-    Args:
-        chosen: The candidate chosen.
-        candidates: All of them.
-        records: Inputs and history of each record over which the free run must stay within its bounds.
-        interrupted: Whether the race was.
-
-    Returns:
-        The status.
-    """
-    if interrupted:
-        return Status.INTERRUPTED
-    if any(_leaves_its_bounds(chosen.model, inputs, history) for inputs, history in records):
-        return Status.UNSTABLE
-    iteration = chosen.solution.state.iteration
-    later = any(c.number == chosen.number and c.solution.state.iteration > iteration for c in candidates)
-    return Status.STOPPED_EARLY if later else chosen.solution.status
-
-
-def _leaves_its_bounds(model: starts.Network, inputs: NDArray[np.float64], history: History | None) -> bool:
-    scaled = model.scaling.scale_output(model.simulate(inputs, history))
-    return not bool(np.all(np.abs(scaled) < model.clamp * (1.0 - 1e-9)))
-
-
-def raced_result(
-    choice: starts.Choice,
-    candidates: Sequence[starts.Candidate],
-    training: Training,
-    status: Status,
-    seconds: float,
-) -> FitResult:
-    """What a race found.
-
-    Args:
-        choice: The candidate chosen.
-        candidates: All of them, for the attempts.
-        training: How they were trained.
-        status: How it ended.
-        seconds: Wall time.
-
-    Returns:
-        The result.
-    """
-    chosen = choice.chosen
-    curve = chosen.solution.curve
-    scale = chosen.model.scaling.output_scale**2
-    return FitResult(
-        model=chosen.model,
-        status=status,
-        loop=training.loop,
-        history={
-            "iteration": np.array([entry.iteration for entry in curve], dtype=np.float64),
-            "mse": np.array([entry.mse * scale for entry in curve]),
-            "effective_parameters": np.array([entry.effective_parameters for entry in curve]),
-            "elapsed_s": np.array([entry.elapsed_s for entry in curve]),
-        },
-        train_time_s=seconds,
-        seed=chosen.seed,
-        evidence=chosen.solution.evidence,
-        attempts=_attempts(choice, candidates),
-        notes=_notes(choice, candidates, training),
-    )
-
-
-def _attempts(choice: starts.Choice, candidates: Sequence[starts.Candidate]) -> tuple[Attempt, ...]:
-    scale = choice.chosen.model.scaling.output_scale**2
-    found = [
-        Attempt(
-            start=candidate.number + 1,
-            seed=candidate.seed,
-            iterations=candidate.solution.state.iteration,
-            elapsed_s=candidate.solution.curve[-1].elapsed_s,
-            estimation_mse=candidate.solution.curve[-1].mse * scale,
-            selection_mse=candidate.score,
-            log_evidence=candidate.log_evidence,
-            effective_parameters=candidate.solution.curve[-1].effective_parameters,
-            stable=stable,
-            chosen=candidate is choice.chosen,
-        )
-        for candidate, stable in zip(candidates, choice.stable, strict=True)
-    ]
-    return tuple(sorted(found, key=lambda attempt: (attempt.start, attempt.iterations)))
-
-
-def _notes(choice: starts.Choice, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
-    notes = []
-    if training.starts > 1:
-        by_selection = training.choose_by == "selection" and np.isfinite(choice.chosen.score)
-        by_evidence = choice.chosen.solution.evidence is not None
-        how = "the largest evidence" if by_evidence else "the least error on the estimation traces"
-        how = "the least error on the selection traces (geometric mean)" if by_selection else how
-        notes.append(f"Chosen by {how} among {training.starts} starts looked at {len(candidates)} times.")
-    refused = sum(stable is False for stable in choice.stable)
-    if refused and any(choice.stable):
-        notes.append(f"{refused} that ranked higher were passed over: their free run is not stable.")
-    return tuple(notes)

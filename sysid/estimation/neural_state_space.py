@@ -11,16 +11,17 @@ import numpy as np
 from sysid.errors import ConfigError
 from sysid.estimation import starts
 from sysid.estimation.arx import first_output
-from sysid.estimation.narx import raced_result, raced_status
+from sysid.estimation.choosing import choose
 from sysid.estimation.neural_provider import NeuralProvider
 from sysid.estimation.neural_start import NeuralLayout, linear_start
 from sysid.estimation.provider import Experiment, experiments_of
+from sysid.estimation.raced import raced_result, raced_status
 from sysid.estimation.result import FitResult, Loop
 from sysid.estimation.training import FitProgress, Training
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
 from sysid.traces import Trace
 
-LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "curriculum", "scouts")
+LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "curriculum", "scouts", "committee")
 """Options of a training that concern lagged regressors."""
 
 
@@ -94,7 +95,7 @@ def fit_neural_state_space(
         on_progress=on_progress,
     )
     candidates = starts.run(race)
-    choice = starts.choose(candidates, training.choose_by, vet)
+    choice = choose(candidates, training.choose_by, vet)
     records = [(e.inputs, e.history) for e in experiments]
     records += [(e.inputs, e.history) for e in experiments_of(selection, mapping, start, rest)]
     status = raced_status(choice.chosen, candidates, records, interrupted=race.stop.is_set())

@@ -99,6 +99,7 @@ class Candidate:
         solution: Where its fit stands.
         model: The model there.
         score: Geometric mean over the selection traces of the mean squared error; NaN without such traces.
+        members: Starts that a committee unites, once for each vote; empty for a single start.
     """
 
     number: int
@@ -106,6 +107,7 @@ class Candidate:
     solution: Solution
     model: Network
     score: float
+    members: tuple[int, ...] = ()
 
     @property
     def log_evidence(self) -> float:
@@ -172,64 +174,6 @@ def _rung(
     return reached
 
 
-def rank(candidate: Candidate, choose_by: str) -> tuple[bool, float]:
-    """Sorting key, best first; fits that did not improve come last.
-
-    Args:
-        candidate: The candidate.
-        choose_by: ``selection`` or ``evidence``; without selection traces the evidence, without evidence the loss.
-
-    Returns:
-        The key.
-    """
-    if choose_by == "selection" and np.isfinite(candidate.score):
-        value = candidate.score
-    elif candidate.solution.evidence is not None:
-        value = -candidate.log_evidence
-    else:
-        value = candidate.loss
-    return not candidate.solution.status.usable, value
-
-
-VETTED = 10
-"""Best candidates that are looked at for one whose free run is stable."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Choice:
-    """Which candidate was chosen.
-
-    Args:
-        chosen: The candidate.
-        stable: Of each candidate, whether its free run was found stable; ``None`` where it was not looked at.
-    """
-
-    chosen: Candidate
-    stable: tuple[bool | None, ...]
-
-
-def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Network], bool] | None = None) -> Choice:
-    """Choose the best candidate, or the best stable one among the best.
-
-    Args:
-        candidates: At least one.
-        choose_by: As for :func:`rank`.
-        vet: Whether a model's free run is stable; ``None`` takes the best as it is.
-
-    Returns:
-        The choice; the best of all where none that was looked at is stable.
-    """
-    order = sorted(range(len(candidates)), key=lambda i: rank(candidates[i], choose_by))
-    found: dict[int, bool] = {}
-    if vet is not None:
-        for i in order[:VETTED]:
-            found[i] = vet(candidates[i].model)
-            if found[i]:
-                break
-    chosen = next((i for i, stable in found.items() if stable), order[0])
-    return Choice(chosen=candidates[chosen], stable=tuple(found.get(i) for i in range(len(candidates))))
-
-
 def _rungs(training: Training) -> tuple[float, ...]:
     return RUNGS if training.starts > 1 else RUNGS[-1:]
 
@@ -275,14 +219,16 @@ def _advance(race: Race, number: int, before: Candidate | None, share: float, se
         for provider in race.curriculum:
             first = replace(engine, termination=Termination(max_iterations=training.curriculum_iterations))
             first = replace(first, on_iteration=lambda _: None)
-            theta = first.minimise(provider, theta, _first_prior(race, provider, theta, centre)).theta
-        solution = engine.minimise(race.provider, theta, _first_prior(race, race.provider, theta, centre))
+            theta = first.minimise(provider, theta, first_prior(training, race.layout, provider, theta, centre)).theta
+        solution = engine.minimise(
+            race.provider, theta, first_prior(training, race.layout, race.provider, theta, centre)
+        )
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
         seed, solution = before.seed, engine.resume(race.provider, before.solution.state)
     else:
         return before
     model = race.model(solution.theta)
-    return Candidate(number=number, seed=seed, solution=solution, model=model, score=_score(race, model))
+    return Candidate(number=number, seed=seed, solution=solution, model=model, score=score(race, model))
 
 
 def _prelude(
@@ -314,18 +260,34 @@ def _prelude(
         should_stop=race.stop.is_set,
     )
     theta = prelude.draw(np.random.default_rng(seed), centre)
-    return engine.minimise(prelude, theta, _first_prior(race, prelude, theta, centre)).theta
+    return engine.minimise(prelude, theta, first_prior(training, race.layout, prelude, theta, centre)).theta
 
 
-def _first_prior(
-    race: Race, provider: AbstractProvider, theta: NDArray[np.float64], centre: NDArray[np.float64]
+def first_prior(
+    training: Training,
+    layout: AbstractLayout,
+    provider: AbstractProvider,
+    theta: NDArray[np.float64],
+    centre: NDArray[np.float64],
 ) -> Prior:
+    """The prior that a fit begins with.
+
+    Args:
+        training: How to train.
+        layout: Where the parameters stand.
+        provider: Residuals.
+        theta: Where the fit begins, in the provider's parameters.
+        centre: What they are drawn to.
+
+    Returns:
+        The prior.
+    """
     # The noise is taken to be as large as the start's error: a prior weighed against residuals of size 1 would hold
     # an open-loop fit, whose residuals are a thousand times smaller, at its start.
     beta = 0.5 * provider.n_samples / max(provider.loss(theta), np.finfo(np.float64).tiny)
     # A precision given from outside is relative to that of the residuals, and stays.
-    given = race.training.regularisation
-    return race.layout.prior(centre, alpha=INITIAL_ALPHA if given is None else given * beta, beta=beta)
+    given = training.regularisation
+    return layout.prior(centre, alpha=INITIAL_ALPHA if given is None else given * beta, beta=beta)
 
 
 def _begin(race: Race, number: int) -> tuple[int | None, NDArray[np.float64], NDArray[np.float64]]:
@@ -374,8 +336,16 @@ def _engine(race: Race, number: int, iterations: int, seconds: float) -> Levenbe
     return LevenbergMarquardt(termination=limits, on_iteration=report, should_stop=race.stop.is_set)
 
 
-def _score(race: Race, model: Network) -> float:
-    """Geometric mean over the selection traces: one trace on which every start fails must not choose alone."""
+def score(race: Race, model: Network) -> float:
+    """Geometric mean over the selection traces: one trace on which every start fails must not choose alone.
+
+    Args:
+        race: The race, for its selection traces.
+        model: A model.
+
+    Returns:
+        Of the mean squared errors, in the output's unit squared; NaN without selection traces.
+    """
     errors = []
     for trace in race.selection:
         inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]

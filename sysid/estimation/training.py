@@ -51,6 +51,8 @@ class Training:
         curriculum_iterations: Iterations of each horizon; they come before those of ``max_iterations``.
         scouts: Random starts that a graphics processor fits at once for a few iterations (``scouting.py``); the best of
             them are the starts. 0 for none.
+        committee: Votes that unite the candidates of the race into one network whose one-step map is the mean of theirs
+            (``committee.py``), elected on the selection traces; 1 for none. Each member adds its neurons.
         device: Where scouts run: ``auto`` sends them out only where there is a graphics processor, ``cuda`` insists on
             one, ``cpu`` does without, slowly.
     """
@@ -73,6 +75,7 @@ class Training:
     curriculum: tuple[int, ...] = ()
     curriculum_iterations: int = 20
     scouts: int = 0
+    committee: int = 1
     device: str = "auto"
 
     def __post_init__(self) -> None:
@@ -104,6 +107,7 @@ class Training:
             "curriculum_iterations",
             "prelude_iterations",
             "stride",
+            "committee",
         ):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))

@@ -145,6 +145,7 @@ class AttemptRecord(_Record):
     effective_parameters: Number
     stable: bool | None = Field(default=None, description="What the check of its free run said, where it was asked.")
     chosen: bool = False
+    members: list[int] = Field(default=[], description="Of a committee, the starts that it unites, once for each vote.")
 
 
 class StabilityRecord(_Record):

@@ -163,9 +163,12 @@ def attempts_table(fit: FitRecord) -> Table:
 
 def _attempt_row(attempt: AttemptRecord) -> tuple[Cell, ...]:
     origin = "from the initial fit" if attempt.seed is None else f"seed {attempt.seed}"
+    name = "committee" if attempt.members else f"{attempt.start}"
+    if attempt.members:
+        origin = f"of starts {', '.join(map(str, attempt.members))}"
     words = {None: "not checked", True: "stable", False: "not stable"}[attempt.stable]
     return (
-        Cell(text=f"{attempt.start}", header=True, below="chosen" if attempt.chosen else origin, mark=_mark(attempt)),
+        Cell(text=name, header=True, below=f"{origin}, chosen" if attempt.chosen else origin, mark=_mark(attempt)),
         Cell(text=str(attempt.iterations), value=attempt.iterations, below=f"{attempt.elapsed_s:.1f} s", mark="number"),
         figure_cell(attempt.estimation_mse, missing="diverged"),
         figure_cell(attempt.selection_mse, missing="none"),

@@ -65,8 +65,15 @@ def test_the_last_look_at_each_start_is_listed_best_first(results):
     assert [row[0].text for row in table.rows] == ["3", "2", "1", "4"]
     assert [row[1].value for row in table.rows] == [10, 10, 40, 10]
     assert [row[6].text for row in table.rows] == ["stable", "not stable", "not checked", "not checked"]
-    assert table.rows[0][0].below == "chosen"
+    assert table.rows[0][0].below == "seed 2, chosen"
     assert table.rows[3][3].text == "none"
+
+
+def test_a_committee_is_listed_with_the_starts_that_it_unites(results):
+    united = results.fits[2].attempts[0].model_copy(update={"start": 5, "seed": None, "members": [3, 1, 3]})
+    fit = results.fits[2].model_copy(update={"attempts": [*results.fits[2].attempts, united]})
+    (row,) = (row for row in attempts_table(fit).rows if row[0].text == "committee")
+    assert row[0].below == "of starts 3, 1, 3"
 
 
 def test_every_look_is_a_point_and_the_chosen_one_stands_out(results):
