@@ -17,7 +17,9 @@ is exported, checked and timed like any other.
 
 Who sits in it is found by forward selection with replacement (Caruana et al. 2004, "Ensemble selection from libraries
 of models", section 2.1) from the best candidates of the race: the vote that lowers the error of the united free run on
-the selection traces most is cast next, until none lowers it by :data:`WORTH`.
+the selection traces most is cast next, until none lowers it by :data:`WORTH`. A network that sticks or runs away on
+some inputs takes the mean with it, though, so that after every vote the united network has to pass the check of its
+free run, where there is one.
 
 Limits: the price of a free run grows with the members; all must agree on what a regressor means, so that hidden states,
 which have no common coordinates, cannot be united; the selection traces choose more often than between single starts,
@@ -106,13 +108,16 @@ class Task:
 
 
 def elected(
-    race: starts.Race, candidates: Sequence[starts.Candidate]
+    race: starts.Race,
+    candidates: Sequence[starts.Candidate],
+    vet: Callable[[starts.Network], bool] | None = None,
 ) -> tuple[Committee, list[starts.Candidate]] | None:
     """The committee of the candidates of a race.
 
     Args:
         race: The race; its training says how many votes there are.
         candidates: Every start at every look.
+        vet: Whether a model's free run is stable; a committee must be after every vote.
 
     Returns:
         The committee and those whom its votes count; ``None`` where no second vote helps.
@@ -143,10 +148,12 @@ def elected(
         [c.score for c in usable],
         lambda model: starts.score(race, model),
         votes=training.committee,
+        origins=[c.number for c in usable],
+        accept=vet or (lambda _: True),
         workers=training.workers,
         on_vote=report,
     )
-    return (found, usable) if sum(found.votes.values()) > 1 else None
+    return (found, usable) if found and sum(found.votes.values()) > 1 else None
 
 
 def seated(
@@ -201,9 +208,11 @@ def elect(
     score: Callable[[NARXModel], float],
     *,
     votes: int,
+    origins: Sequence[int] | None = None,
+    accept: Callable[[NARXModel], bool] = lambda _: True,
     workers: int = 1,
     on_vote: Callable[[int], None] = lambda _: None,
-) -> Committee:
+) -> Committee | None:
     """Cast the votes one after the other, each for the member that helps most.
 
     Args:
@@ -211,25 +220,39 @@ def elect(
         scores: Error of each on the selection traces; one that is not finite is not eligible.
         score: The error of a model on them.
         votes: At most so many.
+        origins: The start that each candidate comes from; by default each is its own.
+        accept: Whether a united network may stand; whoever would make it one that may not is passed over from then on,
+            and with him all that come from the same start.
         workers: Models that are run at the same time.
         on_vote: Called with the number of each vote that is about to be cast.
 
     Returns:
-        The committee; of one member where no second vote helps.
+        The committee, of one member where no second vote helps; ``None`` where not even one may stand.
     """
+    origins = origins or range(len(models))
     order = sorted((i for i, value in enumerate(scores) if np.isfinite(value)), key=lambda i: scores[i])
-    eligible = order[:ELIGIBLE] or [0]
-    elected, best = Counter({eligible[0]: 1}), scores[eligible[0]]
+    eligible, elected, best = order[:ELIGIBLE], Counter[int](), np.inf
     with ThreadPoolExecutor(workers) as pool:
         while elected.total() < votes:
             on_vote(elected.total() + 1)
             trials = [elected + Counter([i]) for i in eligible]
-            found = list(pool.map(lambda trial: score(_of(models, trial)), trials))
-            first = min(range(len(trials)), key=lambda k: (not np.isfinite(found[k]), found[k]))
-            if not found[first] < (1.0 - WORTH) * best:
+            alone = [scores[i] for i in eligible]
+            found = list(pool.map(lambda trial: score(_of(models, trial)), trials)) if elected else alone
+            barred: set[int] = set()
+            cast = None
+            for k in sorted(
+                (k for k, value in enumerate(found) if value < (1.0 - WORTH) * best), key=found.__getitem__
+            ):
+                if origins[eligible[k]] not in barred:
+                    if accept(_of(models, trials[k])):
+                        cast = k
+                        break
+                    barred.add(origins[eligible[k]])
+            if cast is None:
                 break
-            elected, best = trials[first], found[first]
-    return Committee(votes=dict(elected), model=_of(models, elected), score=best)
+            elected, best = trials[cast], found[cast]
+            eligible = [i for i in eligible if origins[i] not in barred]
+    return Committee(votes=dict(elected), model=_of(models, elected), score=best) if elected else None
 
 
 def _of(models: Sequence[NARXModel], votes: Counter[int]) -> NARXModel:

@@ -95,7 +95,7 @@ def fit_narx(
     )
     candidates = starts.run(race)
     on_checkpoint(Checkpoint.of(choose(candidates, training.choose_by).chosen.solution.state))
-    tasks = dict.fromkeys(candidates, task) | _with_committee(race, candidates, experiments)
+    tasks = dict.fromkeys(candidates, task) | _with_committee(race, candidates, experiments, vet)
     choice = choose(list(tasks), training.choose_by, vet)
     chosen = choice.chosen
     records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
@@ -149,10 +149,13 @@ class _Task(committee.Task):
 
 
 def _with_committee(
-    race: starts.Race, candidates: Sequence[starts.Candidate], experiments: Sequence[Experiment]
+    race: starts.Race,
+    candidates: Sequence[starts.Candidate],
+    experiments: Sequence[Experiment],
+    vet: Callable[[starts.Network], bool] | None,
 ) -> dict[starts.Candidate, _Task]:
     """The committee as one more candidate, with its task; none where no second vote helps."""
-    found = committee.elected(race, candidates) if race.training.committee > 1 else None
+    found = committee.elected(race, candidates, vet) if race.training.committee > 1 else None
     if found is None:
         return {}
     task = _Task.of(found[0].model, experiments, race.training)

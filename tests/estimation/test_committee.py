@@ -98,7 +98,22 @@ def test_no_more_votes_are_cast_than_there_are():
     seen = []
     committee = elect(models, [score(m) for m in models], score, votes=3, on_vote=seen.append)
     assert sum(committee.votes.values()) <= 3
-    assert seen == list(range(2, 2 + len(seen)))
+    assert seen == list(range(1, 1 + len(seen)))
+
+
+def test_whoever_makes_it_unstable_is_passed_over_with_all_of_his_start():
+    models = [linear(0.0), linear(4.0), linear(4.2), linear(3.0)]
+    score = distance(2.0)
+    seen = []
+
+    def accept(model):
+        seen.append(float(model.recursion.constant))
+        return seen[-1] not in {2.0, 2.1}  # with either of the second start
+
+    committee = elect(models, [1.0, 2.0, 2.0, 3.0], score, votes=2, origins=[0, 1, 1, 2], accept=accept)
+    assert committee.votes == {0: 1, 3: 1}
+    assert 2.1 not in seen  # one refusal is enough
+    assert elect(models, [1.0, 2.0, 2.0, 3.0], score, votes=2, accept=lambda _: False) is None
 
 
 def test_whoever_diverged_or_is_far_behind_is_not_eligible():
