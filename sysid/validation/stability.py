@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,9 @@ bounded: networks are held there (``sysid.models.narx.CLAMP``), and a run that i
 
 TOLERANCE = 0.1
 """How far from its plateau a run may settle, as a share of the output's range in the records."""
+
+AT_ONCE = 50
+"""Sequences that are in memory at the same time."""
 
 Run = Callable[[InputSequence], NDArray[np.float64]]
 """The free run over a sequence: outputs of shape ``(n_samples,)`` or ``(n_samples, n_outputs)``."""
@@ -145,15 +150,14 @@ def check_stability(
         >>> check_stability(model, Excursions.of([trace], ["u"], ["y"]), count=20).stable
         True
     """
-    run = _run_of(model) if isinstance(model, AbstractModel) else model
     low, high = sequences.output_range
     width = np.where(high > low, high - low, 1.0)
     unbounded = judged = unsettled = drawn = 0
     largest = np.nan
     worst: tuple[tuple[bool, float], InputSequence, NDArray[np.float64]] | None = None
-    for sequence in sequences.draw(count, seed):
+    for sequence, output in _runs(model, sequences.draw(count, seed)):
         drawn += 1
-        outputs = run(sequence).reshape(len(sequence.inputs), -1)
+        outputs = output.reshape(len(sequence.inputs), -1)
         beyond = np.maximum(low - outputs, outputs - high) / width
         lost = not bool(np.all(beyond < REACH * (1.0 - 1e-9)))  # NaN counts as lost
         error = 0.0
@@ -184,5 +188,14 @@ def check_stability(
     )
 
 
-def _run_of(model: AbstractModel) -> Run:
-    return lambda sequence: model.simulate(sequence.inputs, sequence.history)
+def _runs(
+    model: AbstractModel | Run, sequences: Iterable[InputSequence]
+) -> Iterator[tuple[InputSequence, NDArray[np.float64]]]:
+    """Each sequence with the run over it, in order; a model's kernels leave the interpreter to a second thread."""
+    if not isinstance(model, AbstractModel):
+        yield from ((sequence, model(sequence)) for sequence in sequences)
+        return
+    waiting = iter(sequences)
+    with ThreadPoolExecutor(2) as pool:
+        while some := list(islice(waiting, AT_ONCE)):
+            yield from zip(some, pool.map(lambda one: model.simulate(one.inputs, one.history), some), strict=True)
