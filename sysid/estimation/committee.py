@@ -236,24 +236,35 @@ def elect(
     with ThreadPoolExecutor(workers) as pool:
         while elected.total() < votes:
             on_vote(elected.total() + 1)
-            trials = [elected + Counter([i]) for i in eligible]
-            alone = [scores[i] for i in eligible]
-            found = list(pool.map(lambda trial: score(_of(models, trial)), trials)) if elected else alone
-            barred: set[int] = set()
-            cast = None
-            for k in sorted(
-                (k for k, value in enumerate(found) if value < (1.0 - WORTH) * best), key=found.__getitem__
-            ):
-                if origins[eligible[k]] not in barred:
-                    if accept(_of(models, trials[k])):
-                        cast = k
-                        break
-                    barred.add(origins[eligible[k]])
+            trials = {i: elected + Counter([i]) for i in eligible}
+            found = {i: scores[i] for i in eligible}
+            if elected:
+                united_scores = pool.map(lambda trial: score(_of(models, trial)), trials.values())
+                found = dict(zip(eligible, united_scores, strict=True))
+            better = sorted((i for i in eligible if found[i] < (1.0 - WORTH) * best), key=found.__getitem__)
+            cast, barred = _first_accepted(better, origins, [_of(models, trials[i]) for i in better], accept)
             if cast is None:
                 break
             elected, best = trials[cast], found[cast]
             eligible = [i for i in eligible if origins[i] not in barred]
     return Committee(votes=dict(elected), model=_of(models, elected), score=best) if elected else None
+
+
+def _first_accepted(
+    ranked: Sequence[int],
+    origins: Sequence[int],
+    networks: Sequence[NARXModel],
+    accept: Callable[[NARXModel], bool],
+) -> tuple[int | None, set[int]]:
+    """Who is voted for, and the starts that are passed over from now on."""
+    barred: set[int] = set()
+    for i, network in zip(ranked, networks, strict=True):
+        if origins[i] in barred:
+            continue
+        if accept(network):
+            return i, barred
+        barred.add(origins[i])
+    return None, barred
 
 
 def _of(models: Sequence[NARXModel], votes: Counter[int]) -> NARXModel:

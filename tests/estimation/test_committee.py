@@ -174,6 +174,19 @@ def test_the_same_committee_is_elected_again_whatever_the_number_of_workers(fit)
     np.testing.assert_array_equal(again.model.theta, fit.model.theta)
 
 
+def test_a_committee_that_is_not_stable_gives_way_to_the_best_single_start():
+    asked = []
+
+    def alone(model) -> bool:
+        asked.append(model.network.neurons)
+        return model.network.neurons == PLAIN.neurons
+
+    fit = fit_narx([tank(9)], TANK, PLAIN, ELECTION, selection=[tank(2), tank(5)], vet=alone)
+    assert max(asked) > PLAIN.neurons
+    assert fit.model.network == PLAIN
+    assert not any(attempt.members for attempt in fit.attempts)
+
+
 def test_a_fixed_regularisation_leaves_a_committee_without_evidence():
     training = Training(max_iterations=10, starts=3, committee=3, regularisation=1e-6)
     fit = fit_narx([tank(1)], TANK, SMALL, training, selection=[tank(2)])
