@@ -117,10 +117,14 @@ def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Tra
         how = "the least error on the selection traces (geometric mean)" if by_selection else how
         notes.append(f"Chosen by {how} among {training.starts} starts looked at {len(candidates)} times.")
     if choice.chosen.members:
-        best = min(c.score for c in candidates if not c.members and np.isfinite(c.score))
+        single = [
+            c.score
+            for c, stable in zip(candidates, choice.stable, strict=True)
+            if not c.members and stable is not False and np.isfinite(c.score)
+        ]
         notes.append(
             f"A committee: the mean of {len(choice.chosen.members)} one-step maps as one network. Its error on the "
-            f"selection traces is {choice.chosen.score:.3g}, that of the best single start {best:.3g}."
+            f"selection traces is {choice.chosen.score:.3g}, that of the best single start {min(single):.3g}."
         )
     refused = sum(stable is False for stable in choice.stable)
     if refused and any(choice.stable):
