@@ -154,8 +154,14 @@ def _with_committee(
     experiments: Sequence[Experiment],
     vet: Callable[[starts.Network], bool] | None,
 ) -> dict[starts.Candidate, _Task]:
-    """The committee as one more candidate, with its task; none where no second vote helps."""
-    found = committee.elected(race, candidates, vet) if race.training.committee > 1 else None
+    """The committee as one more candidate, with its task; none where no second vote helps, or nobody waits for it."""
+    if race.training.committee == 1 or race.stop.is_set():
+        return {}
+    try:
+        found = committee.elected(race, candidates, vet)
+    except KeyboardInterrupt:  # the starts are there, and the best of them stands
+        race.stop.set()
+        return {}
     if found is None:
         return {}
     task = _Task.of(found[0].model, experiments, race.training)

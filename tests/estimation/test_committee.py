@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sysid.errors import ConfigError
-from sysid.estimation import Loop, Training, fit_narx, fit_neural_state_space
+from sysid.estimation import Loop, Status, Training, fit_narx, fit_neural_state_space
 from sysid.estimation.committee import ELIGIBLE, WORTH, elect, united
 from sysid.models import NARX, Mapping, NARXModel, NeuralStateSpace, Scaling
 from sysid.models.recursion import parameter_count
@@ -185,6 +185,17 @@ def test_a_committee_that_is_not_stable_gives_way_to_the_best_single_start():
     assert max(asked) > PLAIN.neurons
     assert fit.model.network == PLAIN
     assert not any(attempt.members for attempt in fit.attempts)
+
+
+def test_an_interruption_of_the_election_leaves_the_best_single_start():
+    def vote(progress) -> None:
+        if progress.stage == "vote 2 of 4":
+            raise KeyboardInterrupt
+
+    fit = fit_narx([tank(9)], TANK, PLAIN, ELECTION, selection=[tank(2), tank(5)], on_progress=vote)
+    assert fit.status is Status.INTERRUPTED
+    assert fit.model.network == PLAIN
+    assert fit.model.simulate(tank(2).columns(["pump"])) == pytest.approx(tank(2)["level"], abs=0.1)
 
 
 def test_a_fixed_regularisation_leaves_a_committee_without_evidence():
