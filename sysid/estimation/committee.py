@@ -30,7 +30,7 @@ that the posterior there is wider than that of a single fit.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -232,36 +232,38 @@ def elect(
     """
     origins = origins or range(len(models))
     order = sorted((i for i, value in enumerate(scores) if np.isfinite(value)), key=lambda i: scores[i])
-    eligible, elected, best = order[:ELIGIBLE], Counter[int](), np.inf
+    eligible, found, committee = order[:ELIGIBLE], dict(enumerate(scores)), None
     with ThreadPoolExecutor(workers) as pool:
-        while elected.total() < votes:
-            on_vote(elected.total() + 1)
-            trials = {i: elected + Counter([i]) for i in eligible}
-            found = {i: scores[i] for i in eligible}
-            if elected:
-                united_scores = pool.map(lambda trial: score(_of(models, trial)), trials.values())
-                found = dict(zip(eligible, united_scores, strict=True))
-            better = sorted((i for i in eligible if found[i] < (1.0 - WORTH) * best), key=found.__getitem__)
-            cast, barred = _first_accepted(better, origins, [_of(models, trials[i]) for i in better], accept)
+        for vote in range(1, votes + 1):
+            on_vote(vote)
+            elected = Counter(committee.votes) if committee else Counter[int]()
+            networks = {i: _of(models, elected + Counter([i])) for i in eligible}
+            if committee:
+                found = dict(zip(eligible, pool.map(score, networks.values()), strict=True))
+            bar = (1.0 - WORTH) * committee.score if committee else np.inf
+            better = sorted((i for i in eligible if found[i] < bar), key=found.__getitem__)
+            cast, barred = _first_accepted(better, origins, networks, accept)
             if cast is None:
                 break
-            elected, best = trials[cast], found[cast]
+            # the very network that was accepted: a check that knows it need not run again
+            tally = dict(elected + Counter([cast]))
+            committee = Committee(votes=tally, model=networks[cast], score=found[cast])
             eligible = [i for i in eligible if origins[i] not in barred]
-    return Committee(votes=dict(elected), model=_of(models, elected), score=best) if elected else None
+    return committee
 
 
 def _first_accepted(
     ranked: Sequence[int],
     origins: Sequence[int],
-    networks: Sequence[NARXModel],
+    networks: Mapping[int, NARXModel],
     accept: Callable[[NARXModel], bool],
 ) -> tuple[int | None, set[int]]:
     """Who is voted for, and the starts that are passed over from now on."""
     barred: set[int] = set()
-    for i, network in zip(ranked, networks, strict=True):
+    for i in ranked:
         if origins[i] in barred:
             continue
-        if accept(network):
+        if accept(networks[i]):
             return i, barred
         barred.add(origins[i])
     return None, barred

@@ -162,10 +162,9 @@ def attempts_table(fit: FitRecord) -> Table:
 
 
 def _attempt_row(attempt: AttemptRecord) -> tuple[Cell, ...]:
-    origin = "from the initial fit" if attempt.seed is None else f"seed {attempt.seed}"
-    name = "committee" if attempt.members else f"{attempt.start}"
+    name, origin = f"{attempt.start}", "from the initial fit" if attempt.seed is None else f"seed {attempt.seed}"
     if attempt.members:
-        origin = f"of starts {', '.join(map(str, attempt.members))}"
+        name, origin = "committee", f"of starts {', '.join(map(str, attempt.members))}"
     words = {None: "not checked", True: "stable", False: "not stable"}[attempt.stable]
     return (
         Cell(text=name, header=True, below=f"{origin}, chosen" if attempt.chosen else origin, mark=_mark(attempt)),

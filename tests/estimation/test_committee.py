@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from sysid.estimation import Loop, Status, Training, fit_narx, fit_neural_state_
 from sysid.estimation.committee import ELIGIBLE, WORTH, elect, united
 from sysid.models import NARX, Mapping, NARXModel, NeuralStateSpace, Scaling
 from sysid.models.recursion import parameter_count
-from sysid.traces import Channel, Trace
 from sysid.validation import predict_interval
+from tests.estimation.tank import TANK
+from tests.estimation.tank import tank as record
 
 MAPPING = Mapping(inputs=("u", "w"), output="y")
 NETWORKS = {
@@ -22,7 +24,7 @@ NETWORKS = {
     "gated": NARX(input_delays=[[0, 1], [2]], output_delays=[1, 4], neurons=2, gated=True),
     "without feedthrough": NARX(input_delays=1, output_delays=1, neurons=4, feedthrough=False),
 }
-TANK = Mapping(inputs=("pump",), output="level")
+tank = partial(record, n=400)
 SMALL = NARX(input_delays=1, output_delays=1, neurons=3, gated=True)
 PLAIN = NARX(input_delays=1, output_delays=1, neurons=4)
 ELECTION = Training(max_iterations=60, starts=6, committee=4)
@@ -116,6 +118,14 @@ def test_whoever_makes_it_unstable_is_passed_over_with_all_of_his_start():
     assert elect(models, [1.0, 2.0, 2.0, 3.0], score, votes=2, accept=lambda _: False) is None
 
 
+def test_the_network_that_was_accepted_is_the_one_that_comes_back():
+    models, accepted = [linear(0.0), linear(4.0)], []
+    score = distance(2.0)
+    committee = elect(models, [1.0, 2.0], score, votes=2, accept=lambda model: accepted.append(model) is None)
+    assert committee.votes == {0: 1, 1: 1}
+    assert committee.model is accepted[-1]
+
+
 def test_whoever_diverged_or_is_far_behind_is_not_eligible():
     models = [linear(100.0), *(linear(-float(k)) for k in range(1, ELIGIBLE + 2))]
     scores = [np.nan, *(float(k) for k in range(1, ELIGIBLE + 2))]
@@ -129,17 +139,6 @@ def test_whoever_diverged_or_is_far_behind_is_not_eligible():
     assert len(asked) == ELIGIBLE
     assert min(asked) > -(ELIGIBLE + 1)
     assert max(asked) < 0.0
-
-
-def tank(seed: int, n: int = 400) -> Trace:
-    """A tank whose outflow follows the square root of its level."""
-    rng = np.random.default_rng(seed)
-    pump = np.repeat(rng.uniform(0.2, 2.0, n // 30 + 1), 30)[:n]
-    level = np.zeros(n)
-    for t in range(1, n):
-        level[t] = level[t - 1] + 0.05 * (pump[t - 1] - 1.2 * np.sqrt(max(level[t - 1], 0.0)))
-    channels = (Channel(name="pump", unit="V"), Channel(name="level", unit="m"))
-    return Trace(name=f"tank {seed}", sample_time=0.5, channels=channels, values=np.column_stack([pump, level]))
 
 
 @pytest.fixture(scope="module")

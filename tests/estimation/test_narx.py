@@ -9,22 +9,11 @@ import pytest
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import Loop, Status, Training, fit_narx
-from sysid.models import NARX, Mapping, Start, StartKind
-from sysid.traces import Channel, Trace
+from sysid.models import NARX, Start, StartKind
+from sysid.traces import Trace
+from tests.estimation.tank import TANK, tank
 
-TANK = Mapping(inputs=("pump",), output="level")
 SMALL = NARX(input_delays=1, output_delays=1, neurons=4)
-
-
-def tank(seed: int, n: int = 600) -> Trace:
-    """A tank whose outflow follows the square root of its level: no linear model fits it."""
-    rng = np.random.default_rng(seed)
-    pump = np.repeat(rng.uniform(0.2, 2.0, n // 30 + 1), 30)[:n]
-    level = np.zeros(n)
-    for t in range(1, n):
-        level[t] = level[t - 1] + 0.05 * (pump[t - 1] - 1.2 * np.sqrt(max(level[t - 1], 0.0)))
-    channels = (Channel(name="pump", unit="V"), Channel(name="level", unit="m"))
-    return Trace(name=f"tank {seed}", sample_time=0.5, channels=channels, values=np.column_stack([pump, level]))
 
 
 def free_run_mse(fit, trace: Trace) -> float:
