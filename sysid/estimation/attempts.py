@@ -23,6 +23,7 @@ class Attempt:
         stable: Whether its free run passed the check over random sequences; ``None`` where nobody asked.
         chosen: Whether it is the result.
         members: Of a committee, the starts that it unites, once for each vote.
+        without: Inputs that it does without.
     """
 
     start: int
@@ -36,6 +37,7 @@ class Attempt:
     stable: bool | None = None
     chosen: bool = False
     members: tuple[int, ...] = ()
+    without: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
@@ -53,4 +55,5 @@ class Attempt:
         """
         numbers = ("estimation_mse", "selection_mse", "log_evidence", "effective_parameters")
         read = {name: float("nan" if fields[name] is None else fields[name]) for name in numbers}
-        return cls(**{**fields, **read, "members": tuple(fields.get("members", ()))})
+        lists = {name: tuple(fields.get(name, ())) for name in ("members", "without")}
+        return cls(**{**fields, **read, **lists})

@@ -74,24 +74,24 @@ def grown(source: Recursion, template: Recursion, fresh: NDArray[np.float64]) ->
             remedy="start from a smaller network over the same lags or some of them, or leave initial out",
         )
     small = _in_scaling(source, template.scaling)
-    places = _places(template.lags, source.lags)
+    kept = places(template.lags, source.lags)
     r, k = template.lags.n_regressors, template.neurons
     theta = np.array(fresh, dtype=np.float64)
     W, b, v = theta[: k * r].reshape(k, r), theta[k * r : k * (r + 1)], theta[k * (r + 1) : k * (r + 2)]
     W[: source.neurons] = 0.0
-    W[: source.neurons, places] = small.W
+    W[: source.neurons, kept] = small.W
     b[: source.neurons] = small.b
     v[: source.neurons] = small.v
     theta[k * (r + 2)] = small.constant
     if linear:
         w = theta[k * (r + 2) + 1 : k * (r + 2) + 1 + r]
         w[:] = 0.0
-        w[places] = small.w
+        w[kept] = small.w
     if template.gates is not None:
         V = theta[k * (r + 2) + 1 + r :].reshape(k, r)
         V[: source.neurons] = 0.0
         if small.V is not None:
-            V[: source.neurons, places] = small.V
+            V[: source.neurons, kept] = small.V
     return theta
 
 
@@ -129,8 +129,20 @@ def _in_scaling(source: Recursion, to: Scaling) -> _Parts:
     )
 
 
-def _places(larger: Lags, smaller: Lags) -> list[int]:
-    """Where each regressor of the smaller set stands in the larger."""
+def places(larger: Lags, smaller: Lags) -> list[int]:
+    """Where each regressor of the smaller set stands in the larger.
+
+    Args:
+        larger: The larger set.
+        smaller: The smaller one.
+
+    Returns:
+        Positions, in the order of the smaller set.
+
+    Example:
+        >>> places(Lags(inputs=((0, 1), (0,)), output=(1,)), Lags(inputs=((), (0,)), output=(1,)))
+        [2, 3]
+    """
 
     def named(lags: Lags) -> list[tuple[int, int]]:
         inputs = [(channel, lag) for channel, some in enumerate(lags.inputs) for lag in some]

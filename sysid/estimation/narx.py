@@ -26,6 +26,7 @@ from sysid.estimation.regression import lagged
 from sysid.estimation.result import FitResult, Loop
 from sysid.estimation.scouting import Patrol, Scout
 from sysid.estimation.training import FitProgress, Training
+from sysid.estimation.views import PartLayout, embedding, part_of, views
 from sysid.models import NARX, ARXModel, History, Mapping, NARXModel, Scaling, Start
 from sysid.traces import Trace
 
@@ -93,9 +94,9 @@ def fit_narx(
         scouted=_scouted(training, task),
         curriculum=[task.within(horizon) for horizon in training.curriculum],
     )
-    candidates = starts.run(race)
-    on_checkpoint(Checkpoint.of(choose(candidates, training.choose_by).chosen.solution.state))
-    tasks = dict.fromkeys(candidates, task) | _with_committee(race, candidates, experiments, vet)
+    tasks = _raced(race, task, experiments)
+    on_checkpoint(Checkpoint.of(choose(list(tasks), training.choose_by).chosen.solution.state))
+    tasks |= _with_committee(race, list(tasks), experiments, vet)
     choice = choose(list(tasks), training.choose_by, vet)
     chosen = choice.chosen
     records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
@@ -117,7 +118,7 @@ def fit_narx(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Task(committee.Task):
-    """What is minimised for one size of the network.
+    """What is minimised for one size of the network and one set of its inputs.
 
     Args:
         template: The model but for its parameters.
@@ -130,8 +131,11 @@ class _Task(committee.Task):
     inner: RecursionProvider
 
     @classmethod
-    def of(cls, template: NARXModel, experiments: Sequence[Experiment], training: Training) -> _Task:
-        layout = Layout.of(template.network, len(template.mapping.inputs))
+    def of(
+        cls, template: NARXModel, experiments: Sequence[Experiment], training: Training, without: tuple[str, ...] = ()
+    ) -> _Task:
+        whole = Layout.of(template.network, len(template.mapping.inputs))
+        layout = part_of(whole, template.mapping, without)
         basis = _basis(training, template, experiments, layout)
         inner = RecursionProvider(
             template=template.recursion,
@@ -139,13 +143,38 @@ class _Task(committee.Task):
             closed=training.loop is Loop.CLOSED,
             stride=training.stride,
         )
-        to_plain = basis.to_plain(layout)
+        to_plain = embedding(layout, whole) @ basis.to_plain(layout)
         provider = RebasedProvider(inner=inner, to_plain=to_plain)
         return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider, inner=inner)
 
     def within(self, horizon: int) -> RebasedProvider:
         """Residuals of free runs over so many samples."""
         return RebasedProvider(inner=replace(self.inner, horizon=horizon), to_plain=self.to_plain)
+
+
+def _raced(race: starts.Race, task: _Task, experiments: Sequence[Experiment]) -> dict[starts.Candidate, _Task]:
+    """Every start at every look with what it minimises; those that do without some inputs race among themselves."""
+    tasks: dict[starts.Candidate, _Task] = {}
+    for view in views(race.training, task.template.mapping):
+        own = replace(race, training=view.training, on_progress=view.report(race.on_progress), iterations={})
+        if view.without:
+            part = _Task.of(task.template, experiments, race.training, view.without)
+            own = replace(
+                own,
+                layout=PartLayout(part=part.layout, whole=task.layout),
+                provider=part.provider,
+                to_plain=part.to_plain,
+                initial=None,
+                resume=None,
+                prelude=_prelude(view.training, part, experiments),
+                curriculum=[part.within(horizon) for horizon in race.training.curriculum],
+            )
+        found = starts.run(own)
+        named = [replace(one, number=one.number + view.first, without=view.without) for one in found]
+        tasks |= dict.fromkeys(named, part if view.without else task)
+        if race.stop.is_set():
+            break
+    return tasks
 
 
 def _with_committee(
@@ -232,7 +261,7 @@ def _basis(
     records = []
     for experiment in experiments:
         u, y = template.recursion.extended(experiment.inputs, experiment.history)
-        y[layout.lags.depth :] = template.scaling.scale_output(experiment.output)
+        y[-len(experiment.output) :] = template.scaling.scale_output(experiment.output)
         records.append(lagged(u, y, layout.lags, len(experiment.output)))
     return RegressorBasis.levels_and_rates(layout.lags, np.concatenate(records))
 

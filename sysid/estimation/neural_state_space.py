@@ -21,7 +21,7 @@ from sysid.estimation.training import FitProgress, Training
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
 from sysid.traces import Trace
 
-LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "curriculum", "scouts", "committee")
+LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "curriculum", "scouts", "committee", "leave_out")
 """Options of a training that concern lagged regressors."""
 
 

@@ -91,7 +91,7 @@ class StepSamples(AbstractProvider):
         for experiment in experiments:
             u, y = template.recursion.extended(experiment.inputs, experiment.history)
             target = template.scaling.scale_output(experiment.output)
-            y[layout.lags.depth :] = target
+            y[-len(target) :] = target
             counted = np.ones(len(target), dtype=bool) if experiment.weights is None else experiment.weights > 0.0
             rows.append(lagged(u, y, layout.lags, len(target))[counted])
             targets.append(target[counted])

@@ -102,6 +102,7 @@ def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[A
             stable=stable,
             chosen=candidate is choice.chosen,
             members=tuple(number + 1 for number in candidate.members),
+            without=candidate.without,
         )
         for candidate, stable in zip(candidates, choice.stable, strict=True)
     ]

@@ -47,10 +47,10 @@ def regressor_matrix(experiment: Experiment, lags: Lags) -> NDArray[np.float64]:
 
 
 def lagged(u: NDArray[np.float64], y: NDArray[np.float64], lags: Lags, n: int) -> NDArray[np.float64]:
-    """Columns of lagged signals that carry ``lags.depth`` samples of history.
+    """Columns of lagged signals that carry their history.
 
     Args:
-        u: Inputs with history, shape ``(depth + n, n_inputs)``.
+        u: Inputs with history, shape ``(depth + n, n_inputs)``; ``depth`` is at least that of the lags.
         y: Output with history, shape ``(depth + n,)``.
         lags: The regressors.
         n: Rows wanted.
@@ -58,7 +58,7 @@ def lagged(u: NDArray[np.float64], y: NDArray[np.float64], lags: Lags, n: int) -
     Returns:
         Shape ``(n, n_regressors)``.
     """
-    depth = lags.depth
+    depth = len(y) - n
     columns = [u[depth - lag : depth - lag + n, i] for i, lags_i in enumerate(lags.inputs) for lag in lags_i]
     columns += [y[depth - lag : depth - lag + n] for lag in lags.output]
     return np.column_stack(columns) if columns else np.empty((n, 0))

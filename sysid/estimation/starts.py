@@ -100,6 +100,7 @@ class Candidate:
         model: The model there.
         score: Geometric mean over the selection traces of the mean squared error; NaN without such traces.
         members: Starts that a committee unites, once for each vote; empty for a single start.
+        without: Inputs that it does without.
     """
 
     number: int
@@ -108,6 +109,7 @@ class Candidate:
     model: Network
     score: float
     members: tuple[int, ...] = ()
+    without: tuple[str, ...] = ()
 
     @property
     def log_evidence(self) -> float:

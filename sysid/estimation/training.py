@@ -53,6 +53,9 @@ class Training:
             them are the starts. 0 for none.
         committee: Votes that unite the candidates of the race into one network whose one-step map is the mean of theirs
             (``committee.py``), elected on the selection traces; 1 for none. Each member adds its neurons.
+        leave_out: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs and
+            networks that do without each of the sets (``views.py``), for a committee whose members differ in what they
+            rely on. All see everything by default.
         device: Where scouts run: ``auto`` sends them out only where there is a graphics processor, ``cuda`` insists on
             one, ``cpu`` does without, slowly.
     """
@@ -76,11 +79,13 @@ class Training:
     curriculum_iterations: int = 20
     scouts: int = 0
     committee: int = 1
+    leave_out: tuple[tuple[str, ...], ...] = ()
     device: str = "auto"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loop", Loop(self.loop))
         object.__setattr__(self, "offsets", tuple(dict(offset) for offset in self.offsets))
+        object.__setattr__(self, "leave_out", tuple(tuple(names) for names in self.leave_out))
         for name, choices in CHOICES.items():
             if getattr(self, name) not in choices:
                 raise ConfigError(
@@ -119,6 +124,14 @@ class Training:
                 got=f"{self.scouts} scouts for {self.starts} starts, {self.loop.value} loop, prelude {self.prelude}, "
                 f"stride {self.stride}",
                 remedy="leave scouts out, or the other option",
+            )
+        if self.leave_out and (self.starts <= len(self.leave_out) or self.scouts):
+            raise ConfigError(
+                "not every set of inputs has a start",
+                where="leave_out",
+                expected=f"{1 + len(self.leave_out)} starts or more, none of them scouted",
+                got=f"{self.starts} starts, {self.scouts} scouts",
+                remedy="raise starts, or leave out fewer sets",
             )
         if self.prelude < 0:
             raise ConfigError("prelude is too small", where="prelude", expected="0 or more", got=self.prelude)

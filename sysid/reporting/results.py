@@ -146,6 +146,7 @@ class AttemptRecord(_Record):
     stable: bool | None = Field(default=None, description="What the check of its free run said, where it was asked.")
     chosen: bool = False
     members: list[int] = Field(default=[], description="Of a committee, the starts that it unites, once for each vote.")
+    without: list[str] = Field(default=[], description="Inputs that it does without.")
 
 
 class StabilityRecord(_Record):

@@ -163,6 +163,8 @@ def attempts_table(fit: FitRecord) -> Table:
 
 def _attempt_row(attempt: AttemptRecord) -> tuple[Cell, ...]:
     name, origin = f"{attempt.start}", "from the initial fit" if attempt.seed is None else f"seed {attempt.seed}"
+    if attempt.without:
+        origin += f", without {' and '.join(attempt.without)}"
     if attempt.members:
         name, origin = "committee", f"of starts {', '.join(map(str, attempt.members))}"
     words = {None: "not checked", True: "stable", False: "not stable"}[attempt.stable]

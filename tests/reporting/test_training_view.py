@@ -76,6 +76,13 @@ def test_a_committee_is_listed_with_the_starts_that_it_unites(results):
     assert row[0].below == "of starts 3, 1, 3"
 
 
+def test_a_start_says_which_inputs_it_did_without(results):
+    blind = results.fits[2].attempts[0].model_copy(update={"start": 5, "seed": 4, "without": ["BP", "AR"]})
+    fit = results.fits[2].model_copy(update={"attempts": [*results.fits[2].attempts, blind]})
+    (row,) = (row for row in attempts_table(fit).rows if row[0].text == "5")
+    assert row[0].below.startswith("seed 4, without BP and AR")
+
+
 def test_every_look_is_a_point_and_the_chosen_one_stands_out(results):
     left, right = attempts_figure(results.fits[2]).axes
     points = [line.get_xydata() for line in left.lines]
