@@ -18,8 +18,8 @@ is exported, checked and timed like any other.
 Who sits in it is found by forward selection with replacement (Caruana et al. 2004, "Ensemble selection from libraries
 of models", section 2.1) from the best candidates of the race: the vote that lowers the error of the united free run on
 the selection traces most is cast next, until none lowers it by :data:`WORTH`. A network that sticks or runs away on
-some inputs takes the mean with it, though, so that after every vote the united network has to pass the check of its
-free run, where there is one.
+some inputs takes the mean with it, though: the united network has to pass the check of its free run, where there is
+one, and where it does not, votes are cast once more and it has to after every vote.
 
 Limits: the price of a free run grows with the members; all must agree on what a regressor means, so that hidden states,
 which have no common coordinates, cannot be united; the selection traces choose more often than between single starts,
@@ -33,6 +33,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +119,7 @@ def elected(
     Args:
         race: The race; its training says how many votes there are.
         candidates: Every start at every look.
-        vet: Whether a model's free run is stable; a committee must be after every vote.
+        vet: Whether a model's free run is stable; a committee must be.
 
     Returns:
         The committee and those whom its votes count; ``None`` where no second vote helps.
@@ -216,21 +217,49 @@ def elect(
 ) -> Committee | None:
     """Cast the votes one after the other, each for the member that helps most.
 
+    A check of a free run costs as much as a vote. The one that matters is that of the network that comes out: votes are
+    first cast unchecked, and only where that network fails they are cast once more, with a check after every one.
+
     Args:
         models: The candidates, all of one structure and scaling.
         scores: Error of each on the selection traces; one that is not finite is not eligible.
         score: The error of a model on them.
         votes: At most so many.
         origins: The start that each candidate comes from; by default each is its own.
-        accept: Whether a united network may stand; whoever would make it one that may not is passed over from then on,
-            and with him all that come from the same start.
+        accept: Whether a united network may stand; where votes are cast once more, whoever would make it one that may
+            not is passed over from then on, and with him all that come from the same start.
         workers: Models that are run at the same time.
         on_vote: Called with the number of each vote that is about to be cast.
 
     Returns:
         The committee, of one member where no second vote helps; ``None`` where not even one may stand.
     """
-    origins = origins or range(len(models))
+    ballot = partial(
+        _cast,
+        models,
+        scores,
+        score,
+        votes=votes,
+        origins=origins or range(len(models)),
+        workers=workers,
+        on_vote=on_vote,
+    )
+    unchecked = ballot(accept=lambda _: True)
+    return unchecked if unchecked is None or accept(unchecked.model) else ballot(accept=accept)
+
+
+def _cast(
+    models: Sequence[NARXModel],
+    scores: Sequence[float],
+    score: Callable[[NARXModel], float],
+    *,
+    votes: int,
+    origins: Sequence[int],
+    accept: Callable[[NARXModel], bool],
+    workers: int,
+    on_vote: Callable[[int], None],
+) -> Committee | None:
+    """The votes cast, each checked; see :func:`elect`."""
     order = sorted((i for i, value in enumerate(scores) if np.isfinite(value)), key=lambda i: scores[i])
     eligible, found, committee = order[:ELIGIBLE], dict(enumerate(scores)), None
     with ThreadPoolExecutor(workers) as pool:

@@ -118,6 +118,19 @@ def test_whoever_makes_it_unstable_is_passed_over_with_all_of_his_start():
     assert elect(models, [1.0, 2.0, 2.0, 3.0], score, votes=2, accept=lambda _: False) is None
 
 
+def test_a_committee_that_passes_is_checked_once():
+    models, asked = [linear(0.0), linear(4.0), linear(9.0)], []
+    score = distance(4.0 / 3.0)
+
+    def accept(model):
+        asked.append(model)
+        return True
+
+    committee = elect(models, [score(m) for m in models], score, votes=3, accept=accept)
+    assert sum(committee.votes.values()) == 3
+    assert asked == [committee.model]
+
+
 def test_the_network_that_was_accepted_is_the_one_that_comes_back():
     models, accepted = [linear(0.0), linear(4.0)], []
     score = distance(2.0)
