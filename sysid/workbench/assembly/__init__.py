@@ -1,17 +1,18 @@
 """Pipelines of kind ``assembly``: models wired into one system, chosen, trained and proven as one.
 
-============  ===================================================================================
-``config``    the pipeline's YAML
-``members``   the members: where each stands, what it is fitted on, how it is put in its place
-``known``     members that are declared and not fitted
-``stages``    alone, chosen together, retrained downstream, trained end to end
-``growth``    more training data, where the whole is worst
-``line``      the places between those that are modelled
-``stress``    the whole on many random sequences, against the reference
-``document``  what came of it, as tables and charts
-``context``   where a run stores, whom it tells, what it loads and fits
-``course``    the stages in a run, every fit on disk before it is announced
-``finish``    scored, proven, exported, reported and tracked
-``runner``    the run, and what it leaves
-============  ===================================================================================
+================  ===================================================================================
+``config``        the pipeline's YAML
+``stage_config``  what it asks of retraining, growing and training end to end
+``members``       the members: where each stands, what it is fitted on, how it is put in its place
+``known``         members that are declared and not fitted
+``stages``        alone, chosen together, retrained downstream, trained end to end
+``growth``        more training data, where the whole is worst
+``line``          the places between those that are modelled
+``stress``        the whole on many random sequences, against the reference
+``document``      what came of it, as tables and charts
+``context``       where a run stores, whom it tells, what it loads and fits
+``course``        the stages in a run, every fit on disk before it is announced
+``finish``        scored, proven, exported, reported and tracked
+``runner``        the run, and what it leaves
+================  ===================================================================================
 """

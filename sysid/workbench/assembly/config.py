@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, model_validator
 
 from sysid.errors import ConfigError
-from sysid.estimation import JointTraining, Training
+from sysid.estimation import Training
 from sysid.models import NARX
+from sysid.workbench.assembly.stage_config import GrowConfig, RetrainConfig, TogetherConfig
 from sysid.workbench.config import ExportConfig
-from sysid.workbench.fields import STRICT, JointConfig, MappingField, StructureField, TrainingConfig, as_field_error
+from sysid.workbench.fields import STRICT, MappingField, StructureField, TrainingConfig, as_field_error
 from sysid.workbench.naming import slug
 from sysid.yaml_files import FieldError
 
@@ -118,67 +119,6 @@ class KnownConfig(BaseModel):
         return self
 
 
-class RetrainConfig(BaseModel):
-    """Members that are trained again on what the others really put out.
-
-    Args:
-        members: Their outputs, in the order of the training.
-        max_iterations: Of each training.
-        rounds: How often all of them are gone through.
-    """
-
-    model_config = STRICT
-
-    members: tuple[str, ...] = Field(min_length=1)
-    max_iterations: int = Field(default=60, ge=1)
-    rounds: int = Field(default=1, ge=1)
-
-
-class TogetherConfig(BaseModel):
-    """Members that are trained end to end, for the free run of the whole.
-
-    Args:
-        members: Outputs of the members that are trained; all by default.
-        measured: Outputs that are as measured while the others are trained, such as a switch: where the free run
-            decides when it flips, the loss has an edge there, and no step of the training sees across it.
-        targets: The error of each output that counts as one, in its unit.
-        training: How.
-        traces: Estimation traces used, the first so many; all by default.
-    """
-
-    model_config = STRICT
-
-    members: tuple[str, ...] | None = None
-    measured: tuple[str, ...] = ()
-    targets: dict[str, float] = Field(min_length=1)
-    training: JointConfig = Field(default_factory=JointConfig)
-    traces: int | None = Field(default=None, ge=1)
-
-    @model_validator(mode="after")
-    def _check(self) -> TogetherConfig:
-        both = set(self.measured) & {*(self.members or ()), *self.targets}
-        if both:
-            raise FieldError(
-                f"{', '.join(sorted(both))} is to be as measured, and trained or judged",
-                expected="outputs under measured that are neither under members nor under targets",
-                got=f"measured {', '.join(self.measured)}",
-                remedy="take it out of measured, or out of the others",
-            )
-        return self
-
-    def training_options(self, seed: int) -> JointTraining:
-        """The options of the training, with a seed where none is named.
-
-        Args:
-            seed: The seed.
-
-        Returns:
-            The options.
-        """
-        given = {name: getattr(self.training, name) for name in self.training.model_fields_set}
-        return JointTraining(**{"seed": seed, **given})
-
-
 class LimitConfig(BaseModel):
     """Values between which an output is held: a number in its unit, or the name of a channel."""
 
@@ -204,35 +144,6 @@ class StressConfig(BaseModel):
     output: str
     within: float = Field(gt=0.0)
     states: str | None = None
-
-
-class GrowConfig(BaseModel):
-    """Training data that grow by what the whole is worst at, round by round.
-
-    Args:
-        data: Data set of the pool: cases with ``role: estimation`` are added from, cases with ``role: selection`` say
-            what a round has brought. Never sequences that are scored.
-        outputs: Outputs that are looked at; the one with the largest error counts.
-        within: Root mean square error in their unit that a sequence should stay under.
-        members: Outputs of the members that are trained again in each round, in this order, on what the others put out.
-        add: Sequences added in each round.
-        rounds: At most.
-        until: Share of the sequences within the limit at which no further round is begun.
-        patience: Rounds without an improvement after which no further one is begun.
-        max_iterations: Of each training.
-    """
-
-    model_config = STRICT
-
-    data: str
-    outputs: tuple[str, ...] = Field(min_length=1)
-    within: float = Field(gt=0.0)
-    members: tuple[str, ...] = Field(min_length=1)
-    add: int = Field(default=20, ge=1)
-    rounds: int = Field(default=5, ge=1)
-    until: float = Field(default=0.99, gt=0.0, le=1.0)
-    patience: int = Field(default=2, ge=1)
-    max_iterations: int = Field(default=60, ge=1)
 
 
 class LineConfig(BaseModel):
@@ -366,7 +277,7 @@ class AssemblyConfig(BaseModel):
             "limits": tuple(self.limits),
             "published": tuple(self.published),
             "stress": (self.stress.output,) if self.stress else (),
-            "together, targets": tuple(self.together.targets) if self.together else (),
+            "together, targets": self.together.judged if self.together else (),
             "together, measured": self.together.measured if self.together else (),
             "grow, outputs": self.grow.outputs if self.grow else (),
             "line": (self.line.channel, *self.line.knots, *self.line.outputs) if self.line else (),

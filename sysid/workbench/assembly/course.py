@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -19,7 +19,14 @@ from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
 from sysid.workbench.assembly.known import known_model, with_known
 from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
-from sysid.workbench.assembly.stages import choose_together, fit_member, model_of, retrain, train_together
+from sysid.workbench.assembly.stages import (
+    Report,
+    choose_together,
+    fit_member,
+    model_of,
+    retrain,
+    train_together,
+)
 from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
 
 ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
@@ -207,36 +214,38 @@ class Course:
         return grown.models, grown.key, tuple(trace for trace in sources if trace.name in grown.added)
 
     def _together(self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
-        if self.context.config.together is None:
-            return
-        step = "Training end to end"
-        name = "together"
-        terms = {
-            "code": code_digest(*CODE),
-            "before": key,
-            "together": self.context.config.together.model_dump(mode="json"),
-            "start": assembled(self.context.config, models).to_dict(),
-        }
-        whole_key, file = digest(strict(terms)), self.context.store.path / "together.json"
+        """Every round of training end to end, each from where the one before ended."""
+        asked, whole = self.context.config.together, assembled(self.context.config, models)
+        for number, one in enumerate(asked.rounds if asked else (), start=1):
+            suffix = "" if number == 1 else f", round {number}"
+            terms = {
+                "code": code_digest(*CODE),
+                "before": key,
+                "together": one.model_dump(mode="json", exclude={"again"}),
+                "start": whole.to_dict(),
+            }
+            key = digest(strict(terms))
+            train = partial(train_together, self.context.config, one, whole, estimation=estimation, selection=selection)
+            name = "together" if number == 1 else f"together-{number}"
+            fit = self._round(name, f"Training end to end{suffix}", key, train)
+            self.notes.extend(fit.notes)
+            self.stages[f"{TOGETHER}{suffix}"] = whole = fit.model
+
+    def _round(self, name: str, step: str, key: str, train: Callable[[Report], CascadeFit]) -> CascadeFit:
+        """One round, stored under what it depends on."""
+        file = self.context.store.path / f"{name}.json"
         self.context.tell(events.StepStarted(step=step))
-        stored = not self.context.fresh and self.context.store.is_done(name, whole_key)
+        stored = not self.context.fresh and self.context.store.is_done(name, key)
         if stored:
             fit = CascadeFit.from_dict(read_json(file))
         else:
-            fit = train_together(
-                self.context.config,
-                assembled(self.context.config, models),
-                estimation,
-                selection,
-                self.context.reporter(step),
-            )
+            fit = train(self.context.reporter(step))
             write_json(file, fit.to_dict())
-            self.context.store.mark_done(name, whole_key, [file])
+            self.context.store.mark_done(name, key, [file])
         self.context.tell(
             events.StepDone(step=step, stored=stored, detail=f"{fit.train_time_s:.1f} s, {fit.status.value}")
         )
-        self.notes.extend(fit.notes)
-        self.stages[TOGETHER] = fit.model
+        return fit
 
 
 def _lacks_a_role(what: str, *found: TraceSet) -> ConfigError:

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from sysid.models import Cascade, NARXModel
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig, GrowConfig, MemberConfig
+from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
 from sysid.workbench.assembly.members import Members, assembled, whole_score
+from sysid.workbench.assembly.stage_config import GrowConfig
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,6 +16,7 @@ from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
 from sysid.workbench.assembly.members import Members, assembled, own_traces, simulated_inputs, whole_score
+from sysid.workbench.assembly.stage_config import TogetherConfig
 
 Report = Callable[[FitProgress], None]
 SWEEPS = 3
@@ -166,23 +167,27 @@ def retrain(
 
 
 def train_together(
-    config: AssemblyConfig, cascade: Cascade, estimation: Sequence[Trace], selection: Sequence[Trace], report: Report
+    config: AssemblyConfig,
+    asked: TogetherConfig,
+    cascade: Cascade,
+    report: Report,
+    *,
+    estimation: Sequence[Trace],
+    selection: Sequence[Trace],
 ) -> CascadeFit:
     """Train end to end, for the free run of the whole.
 
     Args:
-        config: The pipeline, with ``together``.
+        config: The pipeline.
+        asked: The round.
         cascade: Where it starts.
+        report: Told after every iteration.
         estimation: Traces to fit.
         selection: Traces that choose among the states on the way.
-        report: Told after every iteration.
 
     Returns:
         The fit; a member that stood in several places may now differ between them.
     """
-    asked = config.together
-    if asked is None:
-        raise TypeError("the pipeline trains nothing together")
     trained = [
         f"{member.mapping.output}{place}"
         for member in config.members

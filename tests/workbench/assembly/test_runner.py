@@ -106,6 +106,34 @@ def test_every_stage_is_tracked_once(workspace: Path, empty_store: Path) -> None
     assert all(any(name.endswith("V/mse") for name in one.data.metrics) for one in runs)
 
 
+def test_rounds_end_to_end_go_on_from_one_another_and_are_found_again(workspace: Path) -> None:
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8").replace(
+        "stride: 2, looks: 2}\n",
+        "stride: 2, looks: 2}\n  traces: 1\n  again:\n    - {traces: 2}\n"
+        "    - {targets: {upper: 0.2, lower: 0.1}, max_iterations: 2}\n",
+    )
+    pipeline.write_text(text, encoding="utf-8")
+    assert run(workspace) == 0
+    folder = workspace / "runs" / "tanks"
+    files = [folder / f"{name}.json" for name in ("together", "together-2", "together-3")]
+    fits = [CascadeFit.from_dict(json.loads(file.read_text(encoding="utf-8"))) for file in files]
+    assert [fit.errors["upper"] for fit in fits] == [0.1, 0.1, 0.2]
+    assert all(max(fit.history["iteration"], default=0) <= most for fit, most in zip(fits, (4, 4, 2), strict=True))
+    results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    stages = [row[0].removesuffix(" (chosen)") for row in results["judgement"]["tables"][0]["rows"]]
+    rounds = ["trained end to end", "trained end to end, round 2", "trained end to end, round 3"]
+    assert [name for name in stages if name in rounds] == rounds
+    stamps = [file.stat().st_mtime_ns for file in files]
+    assert run(workspace) == 0
+    assert [file.stat().st_mtime_ns for file in files] == stamps
+    # another third round leaves the first two as they are
+    pipeline.write_text(text.replace("max_iterations: 2}", "max_iterations: 3}"), encoding="utf-8")
+    assert run(workspace) == 0
+    changed = [file.stat().st_mtime_ns != stamp for file, stamp in zip(files, stamps, strict=True)]
+    assert changed == [False, False, True]
+
+
 def test_what_is_as_measured_while_the_others_are_trained_stays_as_it_was(workspace: Path) -> None:
     pipeline = workspace / "pipelines" / "tanks.yaml"
     text = pipeline.read_text(encoding="utf-8").replace(

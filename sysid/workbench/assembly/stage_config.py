@@ -1,0 +1,134 @@
+"""What a pipeline asks of each stage of an assembly's training: retraining, growing, training end to end."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, Field, model_validator
+
+from sysid.estimation import JointTraining
+from sysid.workbench.fields import STRICT, JointConfig
+from sysid.yaml_files import FieldError
+
+
+class RetrainConfig(BaseModel):
+    """Members that are trained again on what the others really put out.
+
+    Args:
+        members: Their outputs, in the order of the training.
+        max_iterations: Of each training.
+        rounds: How often all of them are gone through.
+    """
+
+    model_config = STRICT
+
+    members: tuple[str, ...] = Field(min_length=1)
+    max_iterations: int = Field(default=60, ge=1)
+    rounds: int = Field(default=1, ge=1)
+
+
+class AgainConfig(BaseModel):
+    """A further round of training end to end, from where the round before ended; what it does not name stays.
+
+    Args:
+        targets: The error of each output that counts as one, in its unit.
+        traces: Estimation traces used, the first so many.
+        max_iterations: Of its training.
+    """
+
+    model_config = STRICT
+
+    targets: dict[str, float] | None = Field(default=None, min_length=1)
+    traces: int | None = Field(default=None, ge=1)
+    max_iterations: int | None = Field(default=None, ge=1)
+
+
+class TogetherConfig(BaseModel):
+    """Members that are trained end to end, for the free run of the whole.
+
+    Args:
+        members: Outputs of the members that are trained; all by default.
+        measured: Outputs that are as measured while the others are trained, such as a switch: where the free run
+            decides when it flips, the loss has an edge there, and no step of the training sees across it.
+        targets: The error of each output that counts as one, in its unit.
+        training: How.
+        traces: Estimation traces used, the first so many; all by default.
+        again: Further rounds, for what is too slow from the beginning, such as more traces.
+    """
+
+    model_config = STRICT
+
+    members: tuple[str, ...] | None = None
+    measured: tuple[str, ...] = ()
+    targets: dict[str, float] = Field(min_length=1)
+    training: JointConfig = Field(default_factory=JointConfig)
+    traces: int | None = Field(default=None, ge=1)
+    again: tuple[AgainConfig, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> TogetherConfig:
+        both = set(self.measured) & {*(self.members or ()), *self.judged}
+        if both:
+            raise FieldError(
+                f"{', '.join(sorted(both))} is to be as measured, and trained or judged",
+                expected="outputs under measured that are neither under members nor under targets",
+                got=f"measured {', '.join(self.measured)}",
+                remedy="take it out of measured, or out of the others",
+            )
+        return self
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Outputs that are a target in some round."""
+        return tuple(dict.fromkeys(name for one in self.rounds for name in one.targets))
+
+    @property
+    def rounds(self) -> tuple[TogetherConfig, ...]:
+        """Every round with all that it uses, in order."""
+        found = [self.model_copy(update={"again": ()})]
+        for more in self.again:
+            given = more.model_dump(exclude_none=True)
+            training = found[-1].training
+            if "max_iterations" in given:
+                training = training.model_copy(update={"max_iterations": given.pop("max_iterations")})
+            found.append(found[-1].model_copy(update={**given, "training": training}))
+        return tuple(found)
+
+    def training_options(self, seed: int) -> JointTraining:
+        """The options of the training, with a seed where none is named.
+
+        Args:
+            seed: The seed.
+
+        Returns:
+            The options.
+        """
+        given = {name: getattr(self.training, name) for name in self.training.model_fields_set}
+        return JointTraining(**{"seed": seed, **given})
+
+
+class GrowConfig(BaseModel):
+    """Training data that grow by what the whole is worst at, round by round.
+
+    Args:
+        data: Data set of the pool: cases with ``role: estimation`` are added from, cases with ``role: selection`` say
+            what a round has brought. Never sequences that are scored.
+        outputs: Outputs that are looked at; the one with the largest error counts.
+        within: Root mean square error in their unit that a sequence should stay under.
+        members: Outputs of the members that are trained again in each round, in this order, on what the others put out.
+        add: Sequences added in each round.
+        rounds: At most.
+        until: Share of the sequences within the limit at which no further round is begun.
+        patience: Rounds without an improvement after which no further one is begun.
+        max_iterations: Of each training.
+    """
+
+    model_config = STRICT
+
+    data: str
+    outputs: tuple[str, ...] = Field(min_length=1)
+    within: float = Field(gt=0.0)
+    members: tuple[str, ...] = Field(min_length=1)
+    add: int = Field(default=20, ge=1)
+    rounds: int = Field(default=5, ge=1)
+    until: float = Field(default=0.99, gt=0.0, le=1.0)
+    patience: int = Field(default=2, ge=1)
+    max_iterations: int = Field(default=60, ge=1)
