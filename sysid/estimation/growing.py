@@ -13,13 +13,15 @@ Scaled numbers differ between records. With :math:`x = A x' + c` between the sca
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.models import Lags, Recursion, Scaling
+from sysid.estimation.initialise import Layout
+from sysid.models import NARX, Lags, NARXModel, Recursion, Scaling
 
 
 def contains(larger: Lags, smaller: Lags) -> bool:
@@ -93,6 +95,57 @@ def grown(source: Recursion, template: Recursion, fresh: NDArray[np.float64]) ->
         if small.V is not None:
             V[: source.neurons, kept] = small.V
     return theta
+
+
+def widened(model: NARXModel, reads: Dict[str, tuple[int, ...]], sources: Dict[str, NARXModel]) -> NARXModel:
+    """A network that reads more channels than it did, with weights of zero for them: the same function.
+
+    Members of an assembly that read each other may run away when they are wired as each was fitted alone. Begun as a
+    chain and widened, they close their circle from zero, as far as it helps.
+
+    Args:
+        model: The network.
+        reads: Lags of each channel that it is to read.
+        sources: For each of them the network that writes it, whose scaling and unit are taken.
+
+    Returns:
+        The wider network.
+
+    Raises:
+        ConfigError: If it reads one of them already.
+    """
+    known = [name for name in reads if name in model.mapping.inputs]
+    if known:
+        raise ConfigError(
+            f"{model.mapping} reads {', '.join(known)} already",
+            where="reads",
+            expected="channels that it does not read",
+            got=", ".join(reads),
+            remedy="leave them out, or give the member these lags from the beginning",
+        )
+    new, lags = tuple(sources[name] for name in reads), model.recursion.lags
+    scaling = replace(
+        model.scaling,
+        input_offset=(*model.scaling.input_offset, *(source.scaling.output_offset for source in new)),
+        input_scale=(*model.scaling.input_scale, *(source.scaling.output_scale for source in new)),
+    )
+    before = replace(model.recursion, lags=replace(lags, inputs=(*lags.inputs, *(() for _ in new))), scaling=scaling)
+    network = NARX(
+        input_delays=(*lags.inputs, *reads.values()),
+        output_delays=lags.output,
+        neurons=model.network.neurons,
+        feedthrough=model.network.feedthrough,
+        gated=model.network.gated,
+    )
+    wider = replace(
+        model,
+        network=network,
+        mapping=replace(model.mapping, inputs=(*model.mapping.inputs, *reads)),
+        scaling=scaling,
+        input_units=(*model.input_units, *(source.output_unit for source in new)),
+        theta=np.zeros(Layout.of(network, len(scaling.input_scale)).n_parameters),
+    )
+    return replace(wider, theta=grown(before, wider.recursion, wider.theta))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

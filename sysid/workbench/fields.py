@@ -25,6 +25,7 @@ from sysid.models import (
     TransferFunction,
     structure_from_dict,
 )
+from sysid.models.lags import LagSpec, parse_lags
 from sysid.yaml_files import FieldError
 
 STRICT = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
@@ -141,6 +142,21 @@ def _mapping(value: object) -> Mapping:
         raise as_field_error(error) from error
 
 
+def _past_lags(value: object) -> tuple[int, ...]:
+    """Lags from 1 on, in the forms that people write."""
+    try:
+        return parse_lags(typing.cast("LagSpec", value), first=1, where="lags")
+    except ConfigError as error:
+        raise as_field_error(error) from error
+
+
+LagsField = Annotated[
+    tuple[int, ...],
+    PlainValidator(_past_lags),
+    WithJsonSchema(
+        {"anyOf": [{"type": "integer"}, {"type": "string"}, {"type": "array", "items": {"type": "integer"}}]}
+    ),
+]
 StructureField = Annotated[
     AbstractStructure,
     PlainValidator(_structure),

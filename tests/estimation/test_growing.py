@@ -11,8 +11,8 @@ import pytest
 from sysid.errors import ConfigError
 from sysid.estimation import Training, fit_arx, fit_narx
 from sysid.estimation.checkpoint import Checkpoint
-from sysid.estimation.growing import grown
-from sysid.models import ARX, NARX, History, Mapping, Recursion, Scaling, parameter_count
+from sysid.estimation.growing import grown, widened
+from sysid.models import ARX, NARX, Cascade, History, Mapping, NARXModel, Recursion, Scaling, parameter_count
 from sysid.traces import Channel, Trace
 
 MAPPING = Mapping.parse("u+v -> y")
@@ -132,3 +132,47 @@ def test_a_checkpoint_of_another_structure_is_refused() -> None:
     fit_narx([trace], MAPPING, small, training, on_checkpoint=kept.append)
     with pytest.raises(ConfigError, match="another structure"):
         fit_narx([trace], MAPPING, large, training, resume=kept[0])
+
+
+def network(mapping: str, structure: NARX, seed: int) -> NARXModel:
+    asked = Mapping.parse(mapping)
+    n = len(asked.inputs)
+    size = parameter_count(structure.lags(n), structure.neurons, linear=structure.feedthrough, gated=structure.gated)
+    return NARXModel(
+        network=structure,
+        theta=0.2 * np.random.default_rng(seed).standard_normal(size),
+        scaling=Scaling(
+            input_offset=(0.1,) * n, input_scale=(1.5,) * n, output_offset=0.1 * seed, output_scale=1.0 + 0.1 * seed
+        ),
+        mapping=asked,
+        sample_time=0.1,
+        input_units=("V",) * n,
+        output_unit="V",
+        rest_output=0.0,
+    )
+
+
+CHAIN = {
+    "plain": NARX(input_delays="0:1", output_delays="1:2", neurons=3),
+    "gated": NARX(input_delays=[[0, 1]], output_delays=1, neurons=2, gated=True),
+    "without feedthrough": NARX(input_delays=1, output_delays=[1, 3], neurons=3, feedthrough=False),
+}
+
+
+@pytest.mark.parametrize("structure", CHAIN.values(), ids=CHAIN)
+def test_a_circle_that_is_closed_from_zero_runs_as_the_chain_did(structure: NARX) -> None:
+    first, second = network("u -> a", structure, 1), network("a -> b", structure, 2)
+    wider = widened(first, {"b": (1, 4)}, {"b": second})
+    assert wider.mapping == Mapping.parse("u+b -> a")
+    assert wider.network.lags(2).inputs == (*first.network.lags(1).inputs, (1, 4))
+    assert (wider.scaling.input_offset[1], wider.scaling.input_scale[1]) == (0.2, 1.2)
+    chain, circle = Cascade(models=(first, second)), Cascade(models=(wider, second))
+    inputs = np.random.default_rng(3).uniform(-1.0, 1.0, (60, 1))
+    for name in ("a", "b"):
+        np.testing.assert_allclose(circle.simulate(inputs)[name], chain.simulate(inputs)[name], rtol=1e-11)
+
+
+def test_what_a_network_reads_already_it_cannot_be_given_once_more() -> None:
+    first, second = network("u -> a", CHAIN["plain"], 1), network("a -> b", CHAIN["plain"], 2)
+    with pytest.raises(ConfigError, match="reads a already"):
+        widened(second, {"a": (1,)}, {"a": first})

@@ -24,6 +24,7 @@ from sysid.workbench.assembly.stages import (
     choose_together,
     fit_member,
     model_of,
+    reading_more,
     retrain,
     train_together,
 )
@@ -218,6 +219,7 @@ class Course:
         asked, whole = self.context.config.together, assembled(self.context.config, models)
         for number, one in enumerate(asked.rounds if asked else (), start=1):
             suffix = "" if number == 1 else f", round {number}"
+            whole = reading_more(whole, one.reads)
             terms = {
                 "code": code_digest(*CODE),
                 "before": key,

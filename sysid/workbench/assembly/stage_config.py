@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import BaseModel, Field, model_validator
 
 from sysid.estimation import JointTraining
-from sysid.workbench.fields import STRICT, JointConfig
+from sysid.workbench.fields import STRICT, JointConfig, LagsField
 from sysid.yaml_files import FieldError
 
 
@@ -25,10 +25,15 @@ class RetrainConfig(BaseModel):
     rounds: int = Field(default=1, ge=1)
 
 
+Reads = dict[str, dict[str, LagsField]]
+"""By the output of a member, lags of the channels that it reads more."""
+
+
 class AgainConfig(BaseModel):
     """A further round of training end to end, from where the round before ended; what it does not name stays.
 
     Args:
+        reads: Channels of others that members read from this round on, as under ``together``.
         targets: The error of each output that counts as one, in its unit.
         traces: Estimation traces used, the first so many.
         max_iterations: Of its training.
@@ -36,6 +41,7 @@ class AgainConfig(BaseModel):
 
     model_config = STRICT
 
+    reads: Reads = {}
     targets: dict[str, float] | None = Field(default=None, min_length=1)
     traces: int | None = Field(default=None, ge=1)
     max_iterations: int | None = Field(default=None, ge=1)
@@ -49,6 +55,9 @@ class TogetherConfig(BaseModel):
         measured: Outputs that are as measured while the others are trained, such as a switch: where the free run
             decides when it flips, the loss has an edge there, and no step of the training sees across it.
         targets: The error of each output that counts as one, in its unit.
+        reads: Channels of other members that members read from here on, beside those of their mappings, with the lags:
+            ``{AR: {ER: 1}}``. Their weights begin at zero, so that a circle closes from a chain that runs and cannot
+            run away at once.
         training: How.
         traces: Estimation traces used, the first so many; all by default.
         again: Further rounds, for what is too slow from the beginning, such as more traces.
@@ -59,6 +68,7 @@ class TogetherConfig(BaseModel):
     members: tuple[str, ...] | None = None
     measured: tuple[str, ...] = ()
     targets: dict[str, float] = Field(min_length=1)
+    reads: Reads = {}
     training: JointConfig = Field(default_factory=JointConfig)
     traces: int | None = Field(default=None, ge=1)
     again: tuple[AgainConfig, ...] = ()
@@ -81,11 +91,16 @@ class TogetherConfig(BaseModel):
         return tuple(dict.fromkeys(name for one in self.rounds for name in one.targets))
 
     @property
+    def circles(self) -> tuple[str, ...]:
+        """Every channel that some round's ``reads`` names."""
+        return tuple(name for one in self.rounds for member, more in one.reads.items() for name in (member, *more))
+
+    @property
     def rounds(self) -> tuple[TogetherConfig, ...]:
         """Every round with all that it uses, in order."""
         found = [self.model_copy(update={"again": ()})]
         for more in self.again:
-            given = more.model_dump(exclude_none=True)
+            given = {**more.model_dump(exclude_none=True), "reads": more.reads}
             training = found[-1].training
             if "max_iterations" in given:
                 training = training.model_copy(update={"max_iterations": given.pop("max_iterations")})

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, FitProgress, FitResult, fit_cascade, fit_narx
+from sysid.estimation.growing import widened
 from sysid.estimation.result import Status
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
@@ -164,6 +166,34 @@ def retrain(
         member, simulated_inputs(others, estimation[: member.traces]), simulated_inputs(others, selection), report,
         seed=config.seed, initial=start, max_iterations=max_iterations,
     )  # fmt: skip
+
+
+def reading_more(cascade: Cascade, reads: Mapping[str, Mapping[str, tuple[int, ...]]]) -> Cascade:
+    """The same whole with members that read more, with weights of zero: closed circles that run as the chain did.
+
+    Args:
+        cascade: The whole.
+        reads: By the output of a member, lags of each channel that it reads more.
+
+    Returns:
+        The cascade.
+
+    Raises:
+        ConfigError: If a member is no network of one output, or reads one of the channels already.
+    """
+    for output, more in reads.items():
+        models = {name: cascade.member(name) for name in (output, *more)}
+        networks = {name: model for name, model in models.items() if isinstance(model, NARXModel)}
+        if len(networks) < len(models):
+            raise ConfigError(
+                f"{', '.join(sorted(set(models) - set(networks)))} cannot take part in a circle",
+                where="reads",
+                expected="outputs of fitted networks",
+                got=f"{output}: {', '.join(more)}",
+                remedy="name such outputs",
+            )
+        cascade = cascade.with_member(widened(networks[output], dict(more), networks))
+    return cascade
 
 
 def train_together(

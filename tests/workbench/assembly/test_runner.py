@@ -134,6 +134,40 @@ def test_rounds_end_to_end_go_on_from_one_another_and_are_found_again(workspace:
     assert changed == [False, False, True]
 
 
+def test_a_circle_may_be_closed_in_a_later_round(workspace: Path) -> None:
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8").replace("mapping: pump+lower -> upper", "mapping: pump -> upper")
+    text = text.replace("input_delays: [[0, 1], [1]]", "input_delays: [0, 1]").replace(
+        "stride: 2, looks: 2}\n", "stride: 2, looks: 2}\n  again: [{reads: {upper: {lower: 1}}}]\n"
+    )
+    pipeline.write_text(text, encoding="utf-8")
+    assert run(workspace) == 0
+    folder = workspace / "runs" / "tanks"
+    chain, circle = (
+        CascadeFit.from_dict(json.loads((folder / name).read_text(encoding="utf-8"))).model
+        for name in ("together.json", "together-2.json")
+    )
+    assert str(chain.member("upper").mapping) == "pump -> upper"
+    assert str(circle.member("upper").mapping) == "pump+lower -> upper"
+    assert chain.inputs == circle.inputs == ("pump",)
+
+
+@pytest.mark.parametrize(
+    ("reads", "complaint"),
+    [
+        ("{upper: {level: 1}}", "together, reads names level"),
+        ("{upper: {lower: 0}}", "not a set of lags"),
+        ("{lower: {upper: 2}}", "reads upper already"),
+    ],
+)
+def test_a_circle_of_what_is_not_there_is_refused(workspace: Path, reads: str, complaint: str) -> None:
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8").replace("  targets: {upper", f"  reads: {reads}\n  targets: {{upper")
+    pipeline.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=complaint):
+        run(workspace)
+
+
 def test_what_is_as_measured_while_the_others_are_trained_stays_as_it_was(workspace: Path) -> None:
     pipeline = workspace / "pipelines" / "tanks.yaml"
     text = pipeline.read_text(encoding="utf-8").replace(
