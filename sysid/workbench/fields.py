@@ -153,6 +153,7 @@ def _past_lags(value: object) -> tuple[int, ...]:
 LagsField = Annotated[
     tuple[int, ...],
     PlainValidator(_past_lags),
+    PlainSerializer(list),
     WithJsonSchema(
         {"anyOf": [{"type": "integer"}, {"type": "string"}, {"type": "array", "items": {"type": "integer"}}]}
     ),
