@@ -11,7 +11,8 @@ import numpy as np
 from sysid.export.cell import Cell
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.onnx_step import added, space_step, within_bound
+from sysid.export.onnx_space import space_step, within_bound
+from sysid.export.onnx_step import added
 from sysid.export.rates import RateForm
 from sysid.export.surrogate import Side, Stage
 

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import DTypeLike
 
 from sysid.export.cell import Cell
 from sysid.export.flags import MEANING, Flag
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
+from sysid.export.onnx_space import space_step, within_bound
 from sysid.export.rates import RateForm
-from sysid.export.space import Neurons, SpaceCell
+from sysid.export.space import SpaceCell
 from sysid.export.surrogate import Port, Side, Stage, Surrogate
 
 STATE_TEXT = "past samples, scaled; the layout stands in model.json under state"
@@ -233,53 +234,6 @@ def _space_stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder:
     following, lost = added(nodes, state, change, remainder)
     following = within_bound(nodes, cell, following)
     return _Draft(scaled=clipped(nodes, output, stage), following=lambda _: following, remainder=lost)
-
-
-def space_step(nodes: Nodes, cell: SpaceCell, z: str, *, rows: bool) -> tuple[str, str]:
-    """One step of a state space.
-
-    Args:
-        nodes: The graph.
-        cell: The state space.
-        z: State and scaled inputs.
-        rows: Whether ``z`` is ``(n_state + n_inputs, batch)``; ``(batch, n_state + n_inputs)`` otherwise.
-
-    Returns:
-        The scaled output, not yet within its bounds, and what is added to the state, both laid as ``z`` is.
-    """
-
-    def product(name: str, matrix: NDArray[np.float64], value: str, plus: str, output: str) -> str:
-        table = nodes.numbers(name, matrix if rows else matrix.T)
-        return nodes.add("Gemm", [table, value, plus] if rows else [value, table, plus], output)
-
-    def column(name: str, values: ArrayLike) -> str:
-        numbers = np.atleast_1d(np.asarray(values))
-        return nodes.numbers(name, numbers[:, np.newaxis] if rows else numbers)
-
-    def summed(name: str, matrix: NDArray[np.float64], constant: ArrayLike, neurons: Neurons) -> str:
-        total = product(f"{name}_matrix", matrix, z, column(f"{name}_constant", constant), f"{name}_linear")
-        if not len(neurons):
-            return total
-        hidden = product(f"{name}_W", neurons.weights, z, column(f"{name}_b", neurons.bias), f"{name}_hidden_sum")
-        if cell.cubic:
-            square = nodes.add("Mul", [hidden, hidden], f"{name}_square")
-            hidden = nodes.add("Mul", [square, hidden], f"{name}_hidden")
-        else:
-            hidden = nodes.add("Tanh", [hidden], f"{name}_hidden")
-        return product(f"{name}_V", neurons.readout, hidden, total, f"{name}_network")
-
-    output = summed("output", cell.readout[np.newaxis], cell.constant, cell.output_neurons)
-    if cell.rectified:
-        output = nodes.add("Abs", [output], "output_rectified")
-    return output, summed("change", cell.change, cell.drift, cell.state_neurons)
-
-
-def within_bound(nodes: Nodes, cell: SpaceCell, state: str) -> str:
-    """A state within its bound; no node where there is none."""
-    if not np.isfinite(cell.bound):
-        return state
-    bounds = [nodes.numbers(f"state_{name}", value) for name, value in (("low", -cell.bound), ("high", cell.bound))]
-    return nodes.add("Clip", [state, *bounds], "state_bounded")
 
 
 def _within_limits(nodes: Nodes, stage: Stage, draft: _Draft, known: str) -> Made:
