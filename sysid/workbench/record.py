@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.estimation import FitResult, Posterior, Status
+from sysid.estimation import CascadeFit, FitResult, Posterior, Status
 from sysid.models import StartKind
 from sysid.reporting.results import SCHEMA_VERSION
 from sysid.traces import Role
@@ -246,6 +246,6 @@ def export_record(entry: Any, folder: str, unit: str, run_times: Sequence[Any] =
     }
 
 
-def is_final(fit: FitResult) -> bool:
+def is_final(fit: FitResult | CascadeFit) -> bool:
     """Whether a fit ran to its end; an interrupted one is used now and done again next time."""
     return fit.status is not Status.INTERRUPTED

@@ -28,6 +28,7 @@ from sysid.workbench.assembly.stages import (
     retrain,
     train_together,
 )
+from sysid.workbench.record import is_final
 from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
 
 ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
@@ -243,7 +244,8 @@ class Course:
         else:
             fit = train(self.context.reporter(step))
             write_json(file, fit.to_dict())
-            self.context.store.mark_done(name, key, [file])
+            if is_final(fit):
+                self.context.store.mark_done(name, key, [file])
         self.context.tell(
             events.StepDone(step=step, stored=stored, detail=f"{fit.train_time_s:.1f} s, {fit.status.value}")
         )

@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.estimation import CascadeFit
+from sysid.estimation import CascadeFit, Status
 from sysid.reporting import publish_run
 from sysid.reporting.judgement_report import read_judgement_results
+from sysid.workbench.assembly import course
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.assembly.stages import train_together
 from sysid.workbench.kinds import RunRequest, kind_of
 from sysid.workbench.record import read_fit
 from sysid.workbench.tracking import connect, store_uri
@@ -132,6 +135,21 @@ def test_rounds_end_to_end_go_on_from_one_another_and_are_found_again(workspace:
     assert run(workspace) == 0
     changed = [file.stat().st_mtime_ns != stamp for file, stamp in zip(files, stamps, strict=True)]
     assert changed == [False, False, True]
+
+
+def test_a_round_that_was_interrupted_is_used_now_and_trained_again_next_time(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*args, **kwargs) -> CascadeFit:
+        return replace(train_together(*args, **kwargs), status=Status.INTERRUPTED)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(course, "train_together", interrupted)
+        assert run(workspace) == 0
+    file = workspace / "runs" / "tanks" / "together.json"
+    assert json.loads(file.read_text(encoding="utf-8"))["status"] == "INTERRUPTED"
+    assert run(workspace) == 0
+    assert json.loads(file.read_text(encoding="utf-8"))["status"] != "INTERRUPTED"
 
 
 def test_a_circle_may_be_closed_in_a_later_round(workspace: Path) -> None:
