@@ -218,7 +218,8 @@ class Course:
     def _together(self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
         """Every round of training end to end, each from where the one before ended."""
         asked, whole = self.context.config.together, assembled(self.context.config, models)
-        for number, one in enumerate(asked.rounds if asked else (), start=1):
+        rounds = asked.rounds if asked else ()
+        for number, one in enumerate(rounds, start=1):
             suffix = "" if number == 1 else f", round {number}"
             whole = reading_more(whole, one.reads)
             terms = {
@@ -231,7 +232,7 @@ class Course:
             train = partial(train_together, self.context.config, one, whole, estimation=estimation, selection=selection)
             name = "together" if number == 1 else f"together-{number}"
             fit = self._round(name, f"Training end to end{suffix}", key, train)
-            self.notes.extend(fit.notes)
+            self.notes.extend(fit.notes if len(rounds) == 1 else [f"Round {number}: {note}" for note in fit.notes])
             self.stages[f"{TOGETHER}{suffix}"] = whole = fit.model
 
     def _round(self, name: str, step: str, key: str, train: Callable[[Report], CascadeFit]) -> CascadeFit:

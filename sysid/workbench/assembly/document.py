@@ -119,7 +119,7 @@ def _headline(config: AssemblyConfig, found: Outcome) -> str:
     for output in config.outputs:
         worst = max(scores[output], key=lambda case: scores[output][case])
         parts.append(f"{output} at worst {quantity(scores[output][worst], _squared(output, found))} ({worst})")
-    return f"From the command alone, {found.chosen}: mean squared error of {'; '.join(parts)}."
+    return f"From {' and '.join(found.whole.inputs)} alone, {found.chosen}: mean squared error of {'; '.join(parts)}."
 
 
 def _points(config: AssemblyConfig, found: Outcome) -> list[tuple[str, str]]:

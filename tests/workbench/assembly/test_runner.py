@@ -55,7 +55,7 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
     chosen = next(row for row in lower.rows if str(row[0]).endswith("(chosen)"))
     assert error == pytest.approx(chosen[4], rel=1e-6)
     assert (folder / "report" / "index.html").is_file()
-    assert "From the command alone" in capsys.readouterr().out
+    assert "From pump alone" in capsys.readouterr().out
     _is_published(folder, workspace / "reports")
 
     stamps = {file: file.stat().st_mtime_ns for file in folder.rglob("fit.json")}
