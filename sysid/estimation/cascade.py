@@ -59,6 +59,7 @@ def fit_cascade(
         errors=unit_errors(cascade, traces, targets),
         trained=None if trained is None else tuple(trained),
         stride=training.stride,
+        soft_margin=training.soft_margin,
         workers=training.workers,
     )
     records = [_channels(cascade, trace) for trace in traces]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.correlation import correlation_time
 from sysid.estimation.provider import AbstractProvider, Linearisation
+from sysid.estimation.soft_margin import counted
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_sensitivities import sensitivities
 from sysid.models import Cascade, Ends, Member, VectorNARXModel
@@ -79,6 +80,8 @@ class CascadeProvider(AbstractProvider):
         trained: Outputs of the members that are trained; all members by default.
         stride: Every so-manieth sample counts. Residuals of a free run are correlated over tens of samples: a few of
             them say nearly as much as all, and the price of the normal equations falls with them.
+        soft_margin: Root mean squared residual of a trace from which on it counts by its logarithm
+            (``soft_margin.py``); infinity for plain squares.
         workers: Records that are worked on at the same time.
 
     Raises:
@@ -91,6 +94,7 @@ class CascadeProvider(AbstractProvider):
     errors: Dict[str, float]
     trained: tuple[str, ...] | None = None
     stride: int = 1
+    soft_margin: float = np.inf
     workers: int = 1
     n_samples: int = field(init=False)
     members: tuple[Member, ...] = field(init=False)
@@ -144,8 +148,7 @@ class CascadeProvider(AbstractProvider):
 
         def one(record: _Record) -> float:
             values, _ = self._pass(program, record, keep=False)
-            residual = self._residual(record, values)
-            return 0.5 * float(np.vdot(residual, residual))
+            return counted(self._residual(record, values), self.soft_margin)[0]
 
         total = sum(self._each(one))
         return total if np.isfinite(total) else np.inf
@@ -162,7 +165,7 @@ class CascadeProvider(AbstractProvider):
         for part, square, residual in self._each(one):
             gradient += part
             matrix += square
-            loss += 0.5 * float(np.vdot(residual, residual))
+            loss += counted(residual, self.soft_margin)[0]
             correlated += len(residual) * float(np.mean([correlation_time(column) for column in residual.T]))
             rows += len(residual)
         return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / rows)
@@ -261,6 +264,7 @@ class CascadeProvider(AbstractProvider):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         values, passed = self._pass(program, record, keep=True)
         residual = self._residual(record, values)
+        _, weights = counted(residual, self.soft_margin)
         gradient, matrix = np.zeros(n), np.zeros((n, n))
         waiting: list[list[NDArray[np.float64]]] = [[] for _ in self.errors]
         first = 0
@@ -272,8 +276,8 @@ class CascadeProvider(AbstractProvider):
             for j, held in enumerate(waiting):
                 weighted = np.concatenate(held)
                 reach = weighted.shape[1]
-                gradient[:reach] += weighted.T @ residual[first : rows.stop, j]
-                matrix[:reach, :reach] += weighted.T @ weighted
+                gradient[:reach] += weights[j] * (weighted.T @ residual[first : rows.stop, j])
+                matrix[:reach, :reach] += weights[j] * (weighted.T @ weighted)
                 held.clear()
             first = rows.stop
         return gradient, matrix, residual

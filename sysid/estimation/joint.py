@@ -36,6 +36,8 @@ class JointTraining:
         starts: Random starts, for networks that are fitted from nothing; half of them are dropped at each look.
         seed: Seed of the first start; the others count up from it.
         stride: Every so-manieth sample counts in the loss.
+        soft_margin: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
+            its logarithm, so that a few traces on which the free run is lost do not rule the loss (``soft_margin.py``).
         workers: Records that are worked on at the same time.
         basis: ``levels and rates`` or ``plain``, as for a network alone.
         evidence_after: Iterations before the evidence first moves the precisions of the priors.
@@ -49,6 +51,7 @@ class JointTraining:
     starts: int = 1
     seed: int = 0
     stride: int = 1
+    soft_margin: float = float("inf")
     workers: int = 2
     basis: str = "levels and rates"
     evidence_after: int = 20
@@ -57,6 +60,8 @@ class JointTraining:
         for name in ("max_iterations", "patience", "looks", "starts", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
+        if not self.soft_margin > 0.0:
+            raise ConfigError("soft_margin is too small", where="soft_margin", expected="above 0", got=self.soft_margin)
         if self.basis not in {"levels and rates", "plain"}:
             raise ConfigError(
                 "unknown value of basis",

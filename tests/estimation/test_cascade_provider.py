@@ -92,6 +92,20 @@ def test_normal_equations_equal_the_dense_ones(stride, workers):
     assert_allclose(at.gauss_newton, J.T @ (weights[:, None] * J), rtol=1e-9, atol=1e-9)
 
 
+def test_beyond_the_soft_margin_a_trace_counts_by_the_logarithm_of_its_error():
+    """The gradient against finite differences of the loss; the matrix is that of the squares, weighted by trace."""
+    one = provider(service(), soft_margin=20.0, stride=2)
+    theta, at = one.theta, one.linearise(one.theta)
+    assert_allclose(at.loss, one.loss(theta))
+    slopes = finite_difference_jacobian(lambda there: np.array([one.loss(there)]), theta)[0]
+    assert_allclose(at.gradient, slopes, rtol=1e-4, atol=1e-6 * np.abs(slopes).max())
+    J, weights, H = one.jacobian(theta), [], at.gauss_newton
+    for residual in np.split(one.residuals(theta), np.cumsum([30, 30, 30, 15, 15])):
+        weights += [1.0 / (1.0 + np.mean(residual**2) / 20.0**2)] * len(residual)
+    assert min(weights) < 0.9
+    assert_allclose(H, J.T @ (np.array(weights)[:, None] * J), rtol=1e-9, atol=1e-9 * H.max())
+
+
 def test_parameters_go_in_and_come_out():
     cascade = CASCADES["a linear member"]
     one = provider(cascade)
