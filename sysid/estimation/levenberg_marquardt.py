@@ -257,11 +257,13 @@ def _solve(H: NDArray[np.float64], damping: MarquardtDamping, g: NDArray[np.floa
     """The damped step; scaled by its diagonal first, so that the factorisation does not see the units."""
     scale = damping.scale if damping.scale is not None else np.ones(len(g))
     root = 1.0 / np.sqrt(np.maximum(np.diag(H), np.finfo(np.float64).tiny))
-    A = H * root[:, None] * root[None, :]
-    A[np.diag_indices_from(A)] += damping.factor * scale * root**2
+    # A start whose free run explodes may have sensitivities near the largest number; its step is then not a number.
+    with np.errstate(over="ignore", invalid="ignore"):
+        A = H * root[:, None] * root[None, :]
+        A[np.diag_indices_from(A)] += damping.factor * scale * root**2
+        rescaled = root * g
     try:
-        factor = linalg.cho_factor(A, lower=True, overwrite_a=True, check_finite=False)
-        return np.asarray(-root * linalg.cho_solve(factor, root * g, check_finite=False))
-    except linalg.LinAlgError:
-        # Not positive definite to working precision: no step, and the caller damps more.
+        return np.asarray(-root * linalg.cho_solve(linalg.cho_factor(A, lower=True, overwrite_a=True), rescaled))
+    except (linalg.LinAlgError, ValueError):
+        # Not positive definite to working precision, or not finite: no step, and the caller damps more.
         return np.zeros(len(g))

@@ -25,6 +25,7 @@ LENGTHS = {
     },
     "abdx-selection": {f"SEL{k:02d}": 500.0 for k in range(1, 13)},
     "abdx-combined-selection": {f"SEL{k:02d}": 1500.0 for k in range(1, 9)},
+    "abdx-combined-selection-literal": {f"SEL{k:02d}": 1500.0 for k in range(1, 9)},
     "ab-linear": {"EST01": 2700.0, "VAL01": 2700.0, "VAL02": 420.0, "VAL03": 720.0, "VAL04": 620.0, "VAL05": 720.0},
     "ab-linear-selection": {f"SEL{k:02d}": 1500.0 for k in range(1, 5)},
 }
@@ -35,6 +36,7 @@ SHORT = {
     "abdx-combined": ["VAL03", "VAL05"],
     "abdx-selection": ["SEL02"],
     "abdx-combined-selection": ["SEL03"],
+    "abdx-combined-selection-literal": ["SEL08"],
     "ab-linear": ["VAL02", "VAL04"],
     "ab-linear-selection": ["SEL04"],
 }
