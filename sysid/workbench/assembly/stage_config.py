@@ -37,6 +37,7 @@ class AgainConfig(BaseModel):
         targets: The error of each output that counts as one, in its unit.
         traces: Estimation traces used, the first so many.
         max_iterations: Of its training.
+        soft_margin: Of its training.
     """
 
     model_config = STRICT
@@ -45,6 +46,7 @@ class AgainConfig(BaseModel):
     targets: dict[str, float] | None = Field(default=None, min_length=1)
     traces: int | None = Field(default=None, ge=1)
     max_iterations: int | None = Field(default=None, ge=1)
+    soft_margin: float | None = Field(default=None, gt=0)
 
 
 class TogetherConfig(BaseModel):
@@ -101,9 +103,8 @@ class TogetherConfig(BaseModel):
         found = [self.model_copy(update={"again": ()})]
         for more in self.again:
             given = {**more.model_dump(exclude_none=True), "reads": more.reads}
-            training = found[-1].training
-            if "max_iterations" in given:
-                training = training.model_copy(update={"max_iterations": given.pop("max_iterations")})
+            own = {name: given.pop(name) for name in ("max_iterations", "soft_margin") if name in given}
+            training = found[-1].training.model_copy(update=own)
             found.append(found[-1].model_copy(update={**given, "training": training}))
         return tuple(found)
 
