@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import BaseModel, Field, model_validator
 
 from sysid.estimation import JointTraining
@@ -103,7 +105,7 @@ class TogetherConfig(BaseModel):
         found = [self.model_copy(update={"again": ()})]
         for more in self.again:
             given = {**more.model_dump(exclude_none=True), "reads": more.reads}
-            own = {name: given.pop(name) for name in ("max_iterations", "soft_margin") if name in given}
+            own: dict[str, Any] = {name: given.pop(name) for name in ("max_iterations", "soft_margin") if name in given}
             training = found[-1].training.model_copy(update=own)
             found.append(found[-1].model_copy(update={**given, "training": training}))
         return tuple(found)

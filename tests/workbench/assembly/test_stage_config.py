@@ -1,0 +1,43 @@
+"""What each round of training end to end is asked for: what it names, and else what the round before was."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from sysid.workbench.assembly.stage_config import TogetherConfig
+
+
+def together(**fields) -> TogetherConfig:
+    given = {"targets": {"BC": 0.1}, "traces": 2, "training": {"max_iterations": 9, "stride": 3, "soft_margin": 2.0}}
+    return TogetherConfig.model_validate(given | fields)
+
+
+def test_without_again_there_is_one_round():
+    (only,) = together().rounds
+    assert only == together()
+
+
+def test_a_round_keeps_what_it_does_not_name():
+    first, second, third = together(again=[{"traces": 5}, {"max_iterations": 4, "soft_margin": 1.0}]).rounds
+    assert (first.traces, second.traces, third.traces) == (2, 5, 5)
+    assert second.targets == first.targets
+    options = [one.training_options(seed=7) for one in (first, second, third)]
+    assert [(one.max_iterations, one.soft_margin) for one in options] == [(9, 2.0), (9, 2.0), (4, 1.0)]
+    assert {(one.stride, one.seed) for one in options} == {(3, 7)}
+
+
+def test_what_is_read_from_a_round_on_is_not_wired_again_in_the_next():
+    rounds = together(reads={"BC": {"AR": (1,)}}, again=[{"traces": 3}, {"reads": {"AR": {"BC": (1,)}}}]).rounds
+    assert [set(one.reads) for one in rounds] == [{"BC"}, set(), {"AR"}]
+
+
+def test_without_a_soft_margin_squares_count():
+    assert together(training={"max_iterations": 9}).training_options(seed=0).soft_margin == np.inf
+
+
+@pytest.mark.parametrize("margin", [0, -1.0])
+def test_a_margin_of_a_round_that_is_none_is_refused(margin):
+    with pytest.raises(ValidationError, match="soft_margin"):
+        together(again=[{"soft_margin": margin}])
