@@ -25,7 +25,16 @@ LENGTHS = {
     },
     "abdx-selection": {f"SEL{k:02d}": 500.0 for k in range(1, 13)},
     "abdx-combined-selection": {f"SEL{k:02d}": 1500.0 for k in range(1, 9)},
-    "abdx-combined-selection-literal": {f"SEL{k:02d}": 1500.0 for k in range(1, 9)},
+    "abdx-combined-selection-literal": {
+        "SEL01": 2116.1,
+        "SEL02": 2231.7,
+        "SEL03": 2158.6,
+        "SEL04": 2078.8,
+        "SEL05": 2117.1,
+        "SEL06": 2069.5,
+        "SEL07": 2212.1,
+        "SEL08": 2284.5,
+    },
     "ab-linear": {"EST01": 2700.0, "VAL01": 2700.0, "VAL02": 420.0, "VAL03": 720.0, "VAL04": 620.0, "VAL05": 720.0},
     "ab-linear-selection": {f"SEL{k:02d}": 1500.0 for k in range(1, 5)},
 }
