@@ -279,7 +279,7 @@ class AssemblyConfig(BaseModel):
             "stress": (self.stress.output,) if self.stress else (),
             "together, targets": self.together.judged if self.together else (),
             "together, reads": self.together.circles if self.together else (),
-            "together, measured": self.together.measured if self.together else (),
+            "together, measured": self.together.spared if self.together else (),
             "grow, outputs": self.grow.outputs if self.grow else (),
             "line": (self.line.channel, *self.line.knots, *self.line.outputs) if self.line else (),
         }

@@ -36,6 +36,7 @@ class AgainConfig(BaseModel):
 
     Args:
         reads: Channels of others that members read from this round on, as under ``together``.
+        measured: As under ``together``; ``[]`` for none any more.
         targets: The error of each output that counts as one, in its unit.
         traces: Estimation traces used, the first so many.
         max_iterations: Of its training.
@@ -45,6 +46,7 @@ class AgainConfig(BaseModel):
     model_config = STRICT
 
     reads: Reads = {}
+    measured: tuple[str, ...] | None = None
     targets: dict[str, float] | None = Field(default=None, min_length=1)
     traces: int | None = Field(default=None, ge=1)
     max_iterations: int | None = Field(default=None, ge=1)
@@ -79,20 +81,26 @@ class TogetherConfig(BaseModel):
 
     @model_validator(mode="after")
     def _check(self) -> TogetherConfig:
-        both = set(self.measured) & {*(self.members or ()), *self.judged}
-        if both:
-            raise FieldError(
-                f"{', '.join(sorted(both))} is to be as measured, and trained or judged",
-                expected="outputs under measured that are neither under members nor under targets",
-                got=f"measured {', '.join(self.measured)}",
-                remedy="take it out of measured, or out of the others",
-            )
+        for one in self.rounds:
+            both = set(one.measured) & {*(one.members or ()), *one.targets}
+            if both:
+                raise FieldError(
+                    f"{', '.join(sorted(both))} is to be as measured, and trained or judged",
+                    expected="outputs under measured that the same round has neither under members nor under targets",
+                    got=f"measured {', '.join(one.measured)}",
+                    remedy="take it out of measured, or out of the others",
+                )
         return self
 
     @property
     def judged(self) -> tuple[str, ...]:
         """Outputs that are a target in some round."""
         return tuple(dict.fromkeys(name for one in self.rounds for name in one.targets))
+
+    @property
+    def spared(self) -> tuple[str, ...]:
+        """Outputs that are as measured in some round."""
+        return tuple(dict.fromkeys(name for one in self.rounds for name in one.measured))
 
     @property
     def circles(self) -> tuple[str, ...]:

@@ -33,6 +33,18 @@ def test_what_is_read_from_a_round_on_is_not_wired_again_in_the_next():
     assert [set(one.reads) for one in rounds] == [{"BC"}, set(), {"AR"}]
 
 
+def test_a_channel_that_was_measured_in_one_round_may_be_trained_in_the_next():
+    both = {"targets": {"BP": 0.2, "BC": 0.1}, "measured": []}
+    one = together(measured=["BP"], again=[{"traces": 3}, both])
+    assert [one.measured for one in one.rounds] == [("BP",), ("BP",), ()]
+    assert (one.spared, one.judged) == (("BP",), ("BC", "BP"))
+
+
+def test_a_round_that_inherits_a_measured_channel_does_not_judge_it():
+    with pytest.raises(ValidationError, match="BP is to be as measured"):
+        together(measured=["BP"], again=[{"targets": {"BP": 0.2}}])
+
+
 def test_without_a_soft_margin_squares_count():
     assert together(training={"max_iterations": 9}).training_options(seed=0).soft_margin == np.inf
 
