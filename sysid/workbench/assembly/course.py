@@ -11,6 +11,7 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit
+from sysid.estimation.result import Status
 from sysid.models import Cascade, NARXModel
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench import events
@@ -232,7 +233,8 @@ class Course:
             train = partial(train_together, self.context.config, one, whole, estimation=estimation, selection=selection)
             name = "together" if number == 1 else f"together-{number}"
             fit = self._round(name, f"Training end to end{suffix}", key, train)
-            self.notes.extend(fit.notes if len(rounds) == 1 else [f"Round {number}: {note}" for note in fit.notes])
+            said = (*fit.notes, fit.status.value) if fit.status is Status.UNSTABLE else fit.notes
+            self.notes.extend(said if len(rounds) == 1 else [f"Round {number}: {note}" for note in said])
             self.stages[f"{TOGETHER}{suffix}"] = whole = fit.model
 
     def _round(self, name: str, step: str, key: str, train: Callable[[Report], CascadeFit]) -> CascadeFit:

@@ -137,6 +137,16 @@ def test_rounds_end_to_end_go_on_from_one_another_and_are_found_again(workspace:
     assert changed == [False, False, True]
 
 
+def test_a_whole_that_is_lost_says_so_in_its_report(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(*args, **kwargs) -> CascadeFit:
+        return replace(train_together(*args, **kwargs), status=Status.UNSTABLE)
+
+    monkeypatch.setattr(course, "train_together", lost)
+    assert run(workspace) == 0
+    results = json.loads((workspace / "runs" / "tanks" / "results.json").read_text(encoding="utf-8"))
+    assert Status.UNSTABLE.value in results["judgement"]["sentences"]
+
+
 def test_a_round_that_was_interrupted_is_used_now_and_trained_again_next_time(
     workspace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
