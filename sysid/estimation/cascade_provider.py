@@ -148,7 +148,7 @@ class CascadeProvider(AbstractProvider):
 
         def one(record: _Record) -> float:
             values, _ = self._pass(program, record, keep=False)
-            return counted(self._residual(record, values), self.soft_margin)[0]
+            return counted(self._residual(record, values), self.soft_margin, _counted(record))[0]
 
         total = sum(self._each(one))
         return total if np.isfinite(total) else np.inf
@@ -159,13 +159,13 @@ class CascadeProvider(AbstractProvider):
         n = len(theta)
         gradient, matrix, loss, correlated, rows = np.zeros(n), np.zeros((n, n)), 0.0, 0.0, 0
 
-        def one(record: _Record) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        def one(record: _Record) -> tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
             return self._normal_equations(program, record, n)
 
-        for part, square, residual in self._each(one):
+        for own, part, square, residual in self._each(one):
+            loss += own
             gradient += part
             matrix += square
-            loss += counted(residual, self.soft_margin)[0]
             correlated += len(residual) * float(np.mean([correlation_time(column) for column in residual.T]))
             rows += len(residual)
         return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / rows)
@@ -261,10 +261,10 @@ class CascadeProvider(AbstractProvider):
 
     def _normal_equations(
         self, program: kernel.Program, record: _Record, n: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         values, passed = self._pass(program, record, keep=True)
         residual = self._residual(record, values)
-        _, weights = counted(residual, self.soft_margin)
+        loss, weights = counted(residual, self.soft_margin, _counted(record))
         gradient, matrix = np.zeros(n), np.zeros((n, n))
         waiting: list[list[NDArray[np.float64]]] = [[] for _ in self.errors]
         first = 0
@@ -280,7 +280,7 @@ class CascadeProvider(AbstractProvider):
                 matrix[:reach, :reach] += weights[j] * (weighted.T @ weighted)
                 held.clear()
             first = rows.stop
-        return gradient, matrix, residual
+        return loss, gradient, matrix, residual
 
     def _blocks(
         self, program: kernel.Program, record: _Record, passed: _Passed, n: int

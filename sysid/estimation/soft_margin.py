@@ -1,7 +1,7 @@
 r"""What a trace counts in the loss where a few traces on which the free run is lost must not rule it.
 
-A sum of squares is ruled by its largest terms. Where the free run loses its way on a few traces, their squares are a
-hundred times those of all others: training works on these few, learns them by heart, and pays with the many. With a
+A sum of squares is ruled by its largest terms. Where the free run loses its way on a few traces, their squares outweigh
+those of all others: training works on these few, learns them by heart, and pays with the many. With a
 soft margin :math:`m` a trace's mean squared residual :math:`S` over :math:`n` samples counts as
 
 .. math:: \tfrac12\, n\, m^2 \ln\bigl(1 + S / m^2\bigr),
@@ -25,25 +25,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def counted(residual: NDArray[np.float64], margin: float) -> tuple[float, NDArray[np.float64]]:
+def counted(residual: NDArray[np.float64], margin: float, samples: int) -> tuple[float, NDArray[np.float64]]:
     """What the residuals of one trace count.
 
     Args:
-        residual: Residuals over the errors that count as one, shape ``(n_samples, n_targets)``.
+        residual: Residuals over the errors that count as one, shape ``(n_rows, n_targets)``; zero in rows that do not
+            count.
         margin: Root mean square of a target's residuals from which on they count by its logarithm; infinity for plain
             squares.
+        samples: Rows that count, ``n``.
 
     Returns:
         The trace's part of the loss, summed over targets, and the weight of each target's squares in gradient and
         Gauss-Newton matrix, shape ``(n_targets,)``.
 
     Example:
-        >>> loss, weights = counted(np.full((50, 1), 2.0), margin=2.0)
+        >>> loss, weights = counted(np.full((50, 1), 2.0), margin=2.0, samples=50)
         >>> round(loss, 2), weights.tolist()
         (69.31, [0.5])
     """
     squares = np.sum(residual**2, axis=0)
     if np.isinf(margin):
         return 0.5 * float(np.sum(squares)), np.ones(len(squares))
-    within = len(residual) * margin**2
+    within = max(samples, 1) * margin**2
     return 0.5 * float(np.sum(within * np.log1p(squares / within))), 1.0 / (1.0 + squares / within)

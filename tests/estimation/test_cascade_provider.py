@@ -106,6 +106,13 @@ def test_beyond_the_soft_margin_a_trace_counts_by_the_logarithm_of_its_error():
     assert_allclose(H, J.T @ (np.array(weights)[:, None] * J), rtol=1e-9, atol=1e-9 * H.max())
 
 
+def test_a_gap_does_not_make_a_trace_count_as_better_than_it_is():
+    usable = np.arange(60) >= 40
+    one = provider(service(), traces=(trace(service(), usable=usable),), soft_margin=20.0)
+    S = np.mean(one.residuals(one.theta).reshape(3, 60)[:, usable] ** 2, axis=1)
+    assert_allclose(one.loss(one.theta), 0.5 * np.sum(20 * 20.0**2 * np.log1p(S / 20.0**2)))
+
+
 def test_parameters_go_in_and_come_out():
     cascade = CASCADES["a linear member"]
     one = provider(cascade)
