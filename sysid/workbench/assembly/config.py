@@ -82,7 +82,8 @@ class KnownConfig(BaseModel):
 
     Args:
         mapping: Inputs and output, such as ``BP+PS -> EM``.
-        gains: The weight of each input, in the output's unit per the input's.
+        gains: The weight of each input, in the output's unit per the input's; under the output's own name the weight
+            of its last value: 1 sums up, more is a relay with hysteresis.
         constant: What is added, in the output's unit.
         low: Least value.
         high: Greatest value.
@@ -102,10 +103,10 @@ class KnownConfig(BaseModel):
 
     @model_validator(mode="after")
     def _check(self) -> KnownConfig:
-        if set(self.gains) != set(self.mapping.inputs):
+        if set(self.gains) - {self.mapping.output} != set(self.mapping.inputs):
             raise FieldError(
                 f"the gains of {self.mapping} are not those of its inputs",
-                expected=f"one for each of {', '.join(self.mapping.inputs)}",
+                expected=f"one for each of {', '.join(self.mapping.inputs)}, with or without {self.mapping.output}",
                 got=", ".join(self.gains) or "none",
                 remedy="correct the gains or the mapping",
             )

@@ -1,8 +1,16 @@
-"""Known members: what is known of a system is declared, and only the rest is fitted.
+r"""Known members: what is known of a system is declared, and only the rest is fitted.
 
 A known member is a weighted sum of channels, held between two bounds: a valve that opens fully within one psi of its
 setting, a limit switch, a difference that a member reads better than its two terms. Networks that stand beside it are
 fitted with it as one more measured channel; in the whole it runs on what the others put out, and nothing trains it.
+
+With its own last value in the sum it has a memory. Between the bounds 0 and 1 a weight of 1 is a latch: one input sets
+it, another resets it. A weight :math:`h > 1` is a relay with hysteresis (a Schmitt trigger): with
+
+.. math:: y(n) = \tfrac12 + k\,(x(n) - m) + h\,\bigl(y(n-1) - \tfrac12\bigr), \quad h = 1 + 2 k w,
+
+it goes to 1 once :math:`x` is above :math:`m + w` and back to 0 once it is below :math:`m - w`, the quicker the larger
+:math:`k`. No network learns such a switch well from the traces of a free run: what follows it jumps.
 """
 
 from __future__ import annotations
@@ -12,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.models import NARX, NARXModel, Scaling
+from sysid.models import NARX, Cascade, Limit, NARXModel, Scaling
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import KnownConfig
 
@@ -33,7 +41,9 @@ def known_model(known: KnownConfig, like: Trace) -> NARXModel:
     inputs = known.mapping.inputs
     return NARXModel(
         network=NARX(input_delays=[0], output_delays=1, neurons=0),
-        theta=np.array([known.constant, *(known.gains[name] for name in inputs), 0.0]),
+        theta=np.array(
+            [known.constant, *(known.gains[name] for name in inputs), known.gains.get(known.mapping.output, 0.0)]
+        ),
         scaling=Scaling.identity(len(inputs)),
         mapping=known.mapping,
         sample_time=like.sample_time,
@@ -57,12 +67,13 @@ def with_known(known: Sequence[KnownConfig], traces: Sequence[Trace]) -> list[Tr
 
     def one(trace: Trace) -> Trace:
         for member in known:
-            column = known_model(member, trace).simulate(trace.columns(member.mapping.inputs))
-            column = np.clip(column, member.low, member.high)
+            name = member.mapping.output
+            bounds = {name: Limit(low=member.low, high=member.high)}
+            run = Cascade(models=(known_model(member, trace),), limits=bounds).simulate_trace(trace)
             trace = replace(
                 trace,
-                channels=(*trace.channels, Channel(name=member.mapping.output, unit=member.unit)),
-                values=np.column_stack([trace.values, column]),
+                channels=(*trace.channels, Channel(name=name, unit=member.unit)),
+                values=np.column_stack([trace.values, run[name]]),
             )
         return trace
 

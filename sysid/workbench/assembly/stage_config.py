@@ -35,6 +35,7 @@ class AgainConfig(BaseModel):
     """A further round of training end to end, from where the round before ended; what it does not name stays.
 
     Args:
+        members: Outputs of the members that are trained.
         reads: Channels of others that members read from this round on, as under ``together``.
         measured: As under ``together``; ``[]`` for none any more.
         targets: The error of each output that counts as one, in its unit.
@@ -45,6 +46,7 @@ class AgainConfig(BaseModel):
 
     model_config = STRICT
 
+    members: tuple[str, ...] | None = Field(default=None, min_length=1)
     reads: Reads = {}
     measured: tuple[str, ...] | None = None
     targets: dict[str, float] | None = Field(default=None, min_length=1)

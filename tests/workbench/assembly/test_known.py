@@ -48,6 +48,40 @@ def test_it_is_the_sum_that_is_declared_held_between_its_bounds(rows, low, high,
     assert np.isinf(known_model(declared, trace(values)).clamp)
 
 
+@given(
+    st.lists(st.tuples(*[st.floats(-10.0, 10.0)] * 2), min_size=1, max_size=40),
+    st.floats(1.0, 50.0),
+    st.floats(0.2, 3.0),
+)
+def test_with_a_weight_above_one_on_its_last_value_it_is_a_relay_with_hysteresis(rows, slope, width):
+    """Its plain twin: past one threshold up, past the other down, between them as it was."""
+    values = np.array(rows)
+    weight = 1.0 + 2.0 * slope * width
+    declared = KnownConfig(
+        mapping=Mapping.parse("a+b -> d"),
+        gains={"a": slope, "b": -slope, "d": weight},
+        constant=0.5 - 0.5 * weight,
+        low=0,
+        high=1,
+        rest=0,
+    )
+    (seen,) = with_known([declared], [trace(values)])
+    state = 0.0
+    for x, y in zip(values[:, 0] - values[:, 1], seen["d"], strict=True):
+        if state in {0.0, 1.0}:
+            far = abs(x) > width + 1.0 / slope + 1e-9  # beyond the threshold by what moves it in one step
+            if far or (abs(x) < width - 1e-9):
+                assert y == pytest.approx(float(x > 0) if far else state)
+        state = y
+
+
+def test_with_a_weight_of_one_it_is_a_latch():
+    latch = known("{mapping: a+b -> d, gains: {a: 1, b: -1, d: 1}, low: 0, high: 1, rest: 0}")
+    values = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    (seen,) = with_known([latch], [trace(values)])
+    assert_allclose(seen["d"], [0, 1, 1, 1, 0, 0])
+
+
 def test_a_later_one_may_read_an_earlier_one():
     second = known("{mapping: d -> e, gains: {d: 1}, low: 0, high: 1, rest: 0}")
     values = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 1.0]])
