@@ -40,6 +40,11 @@ def test_a_channel_that_was_measured_in_one_round_may_be_trained_in_the_next():
     assert (one.spared, one.judged) == (("BP",), ("BC", "BP"))
 
 
+def test_a_round_may_train_other_members():
+    one = together(members=["BP"], again=[{"traces": 3}, {"members": ["BC"]}])
+    assert [one.members for one in one.rounds] == [("BP",), ("BP",), ("BC",)]
+
+
 def test_a_round_that_inherits_a_measured_channel_does_not_judge_it():
     with pytest.raises(ValidationError, match="BP is to be as measured"):
         together(measured=["BP"], again=[{"targets": {"BP": 0.2}}])
