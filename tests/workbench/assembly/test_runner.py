@@ -104,7 +104,7 @@ def test_every_stage_is_tracked_once(workspace: Path, empty_store: Path) -> None
     experiment = client.get_experiment_by_name("assembly")
     runs = client.search_runs([experiment.experiment_id])
     assert sorted(one.info.run_name for one in runs) == [
-        "assembly · chosen together", "assembly · each alone", "assembly · retrained", "assembly · trained end to end"
+        "tanks · chosen together", "tanks · each alone", "tanks · retrained", "tanks · trained end to end"
     ]  # fmt: skip
     assert all(any(name.endswith("V/mse") for name in one.data.metrics) for one in runs)
 
