@@ -22,6 +22,10 @@ from sysid.estimation.training import FitProgress
 from sysid.models import Cascade, cascade_from_dict
 from sysid.traces import Trace
 
+NEGLIGIBLE = 1e-6
+"""Squared residual below which a target counts as met: that of a thousandth of the error that counts as one. Without it
+a target that is exactly right on a trace, such as a channel held at its bound, would outweigh all others."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class JointTraining:
@@ -260,8 +264,7 @@ class Joint:
             run, usable = model.simulate_trace(trace), trace.usable_samples
             for name, error in self.provider.errors.items():
                 scores.append(float(np.mean((run[name] - trace[name])[usable] ** 2)) / error**2)
-        tiny = np.finfo(np.float64).tiny
-        return float(np.exp(np.mean(np.log(np.maximum(scores, tiny))))) if scores else float("nan")
+        return float(np.exp(np.mean(np.log(np.maximum(scores, NEGLIGIBLE))))) if scores else float("nan")
 
     def _result(self, seen: Sequence[_Candidate], *, interrupted: bool, seconds: float) -> CascadeFit:
         chosen = min(seen, key=lambda one: _last(one.score if self.selection else one.loss))

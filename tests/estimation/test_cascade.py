@@ -88,6 +88,15 @@ def test_a_start_that_the_selection_traces_prefer_is_kept():
     assert_array_equal(fit.model.simulate_trace(other).values, TRUTH.simulate_trace(other).values)
 
 
+def test_what_is_exactly_right_does_not_outweigh_the_rest():
+    """A state that is exact on every selection trace scores as one that is right to a thousandth of what counts."""
+    errors = dict.fromkeys(TRUTH.outputs, 0.5)
+    fit = fit_cascade(
+        TRUTH, [measured()], targets=errors, training=replace(TRAINING, max_iterations=1), selection=[measured(seed=2)]
+    )
+    assert "on the selection traces 1e-06" in fit.notes[0]
+
+
 @pytest.mark.parametrize("basis", ["levels and rates", "plain"])
 def test_a_fit_is_the_same_every_time(basis):
     training = replace(TRAINING, max_iterations=4, looks=2, basis=basis)
