@@ -287,6 +287,7 @@ class AssemblyConfig(BaseModel):
         named = {
             "retrain, members": self.retrain.members if self.retrain else (),
             "grow, members": self.grow.members if self.grow else (),
+            "together, members": self.together.trained if self.together else (),
         }
         for known, places in ((written, asked), (bases, named)):
             for where, names in places.items():

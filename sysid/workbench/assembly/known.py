@@ -10,7 +10,7 @@ it, another resets it. A weight :math:`h > 1` is a relay with hysteresis (a Schm
 .. math:: y(n) = \tfrac12 + k\,(x(n) - m) + h\,\bigl(y(n-1) - \tfrac12\bigr), \quad h = 1 + 2 k w,
 
 it goes to 1 once :math:`x` is above :math:`m + w` and back to 0 once it is below :math:`m - w`, the quicker the larger
-:math:`k`. No network learns such a switch well from the traces of a free run: what follows it jumps.
+:math:`k`. A network would have to learn it from traces in which what follows jumps.
 """
 
 from __future__ import annotations

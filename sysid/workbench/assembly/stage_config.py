@@ -95,6 +95,11 @@ class TogetherConfig(BaseModel):
         return self
 
     @property
+    def trained(self) -> tuple[str, ...]:
+        """Every member that some round's ``members`` names."""
+        return tuple(dict.fromkeys(name for one in self.rounds for name in one.members or ()))
+
+    @property
     def judged(self) -> tuple[str, ...]:
         """Outputs that are a target in some round."""
         return tuple(dict.fromkeys(name for one in self.rounds for name in one.targets))

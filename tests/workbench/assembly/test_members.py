@@ -155,3 +155,8 @@ def test_an_assembly_that_cannot_be_is_refused(old, new, match):
     assert old in PIPELINE
     with pytest.raises(ConfigError, match=match):
         config(PIPELINE.replace(old, new))
+
+
+def test_a_round_that_trains_a_stranger_is_refused():
+    with pytest.raises(ConfigError, match="together, members names BQ, which no member writes"):
+        config(TWO_PLACES + "together: {targets: {AR: 1}, again: [{members: [AR]}, {members: [BQ]}]}\n")
