@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from collections.abc import Mapping as Dict
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -151,6 +151,35 @@ class Cascade:
             )
         models = tuple(model if yes else other for other, yes in zip(self.models, same, strict=True))
         return replace(self, models=models)
+
+    def upstream_of(self, outputs: Collection[str], *, given: Collection[str] = ()) -> Cascade:
+        """The part that some outputs depend on.
+
+        Args:
+            outputs: Outputs of members.
+            given: Channels that are inputs of the part, whoever writes them here.
+
+        Returns:
+            The cascade of those members.
+        """
+        writer = {name: model for model in self.models for name in Ends.of(model).outputs}
+        wanted, waiting = set[str](), [name for name in outputs if name not in given]
+        while waiting:
+            name = waiting.pop()
+            if name in writer and name not in wanted:
+                wanted |= set(Ends.of(writer[name]).outputs)
+                bounds = [own for out in Ends.of(writer[name]).outputs for own in self._bounds(out)]
+                waiting += [source for source in (*Ends.of(writer[name]).inputs, *bounds) if source not in given]
+        models = tuple(model for model in self.models if set(Ends.of(model).outputs) & wanted)
+        channels = {name for model in models for end in (Ends.of(model),) for name in (*end.inputs, *end.outputs)}
+        limits = {name: limit for name, limit in self.limits.items() if name in wanted}
+        rest = {name: level for name, level in self.rest.items() if name in channels}
+        return Cascade(models=models, rest=rest, limits=limits)
+
+    def _bounds(self, output: str) -> list[str]:
+        """Channels between which an output is held."""
+        limit = self.limits.get(output)
+        return [] if limit is None else [name for name in (limit.low, limit.high) if isinstance(name, str)]
 
     @cached_property
     def stages(self) -> tuple[CompiledStage | ModelStage, ...]:

@@ -82,8 +82,9 @@ class KnownConfig(BaseModel):
 
     Args:
         mapping: Inputs and output, such as ``BP+PS -> EM``.
-        gains: The weight of each input, in the output's unit per the input's; under the output's own name the weight
-            of its last value: 1 sums up, more is a relay with hysteresis.
+        gains: The weight of each input, in the output's unit per the input's, or its weights by lag (``{0: 2, 1: -1}``
+            looks one sample ahead); under the output's own name the weight of its last value: 1 sums up, more is a
+            relay with hysteresis.
         constant: What is added, in the output's unit.
         low: Least value.
         high: Greatest value.
@@ -94,7 +95,7 @@ class KnownConfig(BaseModel):
     model_config = STRICT
 
     mapping: MappingField
-    gains: dict[str, float]
+    gains: dict[str, float | Annotated[dict[Annotated[int, Field(ge=0)], float], Field(min_length=1)]]
     constant: float = 0.0
     low: float
     high: float
@@ -110,6 +111,14 @@ class KnownConfig(BaseModel):
                 got=", ".join(self.gains) or "none",
                 remedy="correct the gains or the mapping",
             )
+        own = self.gains.get(self.mapping.output, 0.0)
+        if isinstance(own, dict):
+            raise FieldError(
+                f"{self.mapping.output} has weights by lag for its own past",
+                expected="one number, the weight of its last value",
+                got=", ".join(f"{lag}: {weight:g}" for lag, weight in own.items()),
+                remedy="write the weight of its last value",
+            )
         if not self.low <= self.rest <= self.high or self.low == self.high:
             raise FieldError(
                 f"the bounds of {self.mapping.output} do not hold its rest",
@@ -118,6 +127,18 @@ class KnownConfig(BaseModel):
                 remedy="correct the bounds",
             )
         return self
+
+    @property
+    def weights(self) -> tuple[dict[int, float], ...]:
+        """For each input its weights by lag."""
+        given = (self.gains[name] for name in self.mapping.inputs)
+        return tuple(one if isinstance(one, dict) else {0: one} for one in given)
+
+    @property
+    def memory(self) -> float:
+        """The weight of its own last value."""
+        own = self.gains.get(self.mapping.output, 0.0)
+        return 0.0 if isinstance(own, dict) else own
 
 
 class LimitConfig(BaseModel):

@@ -59,12 +59,13 @@ class Finish:
         outputs = config.choose_on or config.outputs
         scores, timing, chosen_by = {}, {}, {}
         for stage, cascade in self.course.stages.items():
-            evaluation = evaluate_cascade(cascade, cases, outputs=config.outputs)
+            # What only the training looked at is no part of the surrogate, nor of its run time.
+            evaluation = evaluate_cascade(cascade.upstream_of(self._wanted), cases, outputs=config.outputs)
             scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
             timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
             chosen_by[stage] = whole_score(cascade, selection, outputs)
         chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
-        whole = self.course.stages[chosen]
+        whole = self.course.stages[chosen].upstream_of(self._wanted)
         write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
         stressed, worst = self._stressed(whole)
         line = self._line(whole)
@@ -97,6 +98,14 @@ class Finish:
         )
         write_judgement_results(self.context.store.path, results)
         return results
+
+    @property
+    def _wanted(self) -> set[str]:
+        """Outputs that the pipeline asks of the whole."""
+        config = self.context.config
+        stressed = {config.stress.output} if config.stress else set[str]()
+        line = {config.line.channel, *config.line.knots, *config.line.outputs} if config.line else set[str]()
+        return {*config.outputs, *config.choose_on, *stressed, *line}
 
     def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...]]:
         """What came of the random sequences, and those that the whole did worst on."""

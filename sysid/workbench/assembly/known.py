@@ -11,6 +11,11 @@ it, another resets it. A weight :math:`h > 1` is a relay with hysteresis (a Schm
 
 it goes to 1 once :math:`x` is above :math:`m + w` and back to 0 once it is below :math:`m - w`, the quicker the larger
 :math:`k`. A network would have to learn it from traces in which what follows jumps.
+
+With weights by lag it looks ahead: :math:`2x(n) - x(n-1)` is what :math:`x` will be in the next sample if nothing
+happens. A switch with such a sum, and with one over what :math:`x` moves in a sample as its gain, says for how much of
+the next sample it will be open. That goes from 0 to 1 as steadily as the instant of switching moves, where a steeper
+switch jumps from one sample to the next: what follows has no edge, and training sees which way to move the instant.
 """
 
 from __future__ import annotations
@@ -39,11 +44,11 @@ def known_model(known: KnownConfig, like: Trace) -> NARXModel:
         ChannelError: If the trace lacks an input.
     """
     inputs = known.mapping.inputs
+    lags = [sorted(one) for one in known.weights]
+    weights = [one[lag] for one, own in zip(known.weights, lags, strict=True) for lag in own]
     return NARXModel(
-        network=NARX(input_delays=[0], output_delays=1, neurons=0),
-        theta=np.array(
-            [known.constant, *(known.gains[name] for name in inputs), known.gains.get(known.mapping.output, 0.0)]
-        ),
+        network=NARX(input_delays=lags, output_delays=1, neurons=0),
+        theta=np.array([known.constant, *weights, known.memory]),
         scaling=Scaling.identity(len(inputs)),
         mapping=known.mapping,
         sample_time=like.sample_time,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.models import Cascade, Ends, Line
+from sysid.models import Cascade, Line
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference
 from sysid.workbench.assembly.config import LineConfig
@@ -124,7 +124,7 @@ def line_of(asked: LineConfig, whole: Cascade) -> Line:
     Raises:
         ConfigError: If the outputs cannot be had from the channel at a place.
     """
-    there = _needed(whole, asked.outputs, given=(asked.channel, *whole.inputs))
+    there = whole.upstream_of(asked.outputs, given=(asked.channel, *whole.inputs))
     unread = [name for name in there.inputs if name != asked.channel and name not in whole.inputs]
     if unread or asked.channel not in there.inputs:
         raise ConfigError(
@@ -134,23 +134,7 @@ def line_of(asked: LineConfig, whole: Cascade) -> Line:
             got=f"{', '.join(asked.outputs)} from {', '.join(there.inputs)}",
             remedy="name the channel that the places read, and outputs of members that stand there",
         )
-    return Line(along=_needed(whole, tuple(asked.knots)), knots=asked.knots, at_place=there, channel=asked.channel)
-
-
-def _needed(whole: Cascade, outputs: Sequence[str], *, given: Sequence[str] = ()) -> Cascade:
-    """Members of a cascade that some outputs depend on, but for what is given."""
-    writer = {name: model for model in whole.models for name in Ends.of(model).outputs}
-    wanted, waiting = list[str](), [name for name in outputs if name not in given]
-    while waiting:
-        name = waiting.pop()
-        if name in writer and name not in wanted:
-            wanted.append(name)
-            waiting += [source for source in Ends.of(writer[name]).inputs if source not in given]
-    models = tuple(model for model in whole.models if set(Ends.of(model).outputs) & set(wanted))
-    channels = {name for model in models for end in (Ends.of(model),) for name in (*end.inputs, *end.outputs)}
-    limits = {name: limit for name, limit in whole.limits.items() if name in wanted}
-    rest = {name: level for name, level in whole.rest.items() if name in channels}
-    return Cascade(models=models, rest=rest, limits=limits)
+    return Line(along=whole.upstream_of(asked.knots), knots=asked.knots, at_place=there, channel=asked.channel)
 
 
 def places_of(case: Trace, output: str) -> dict[float, str]:

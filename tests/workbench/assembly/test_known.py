@@ -82,6 +82,31 @@ def test_with_a_weight_of_one_it_is_a_latch():
     assert_allclose(seen["d"], [0, 1, 1, 1, 0, 0])
 
 
+def test_with_weights_by_lag_it_says_for_how_much_of_the_next_sample_a_ramp_will_be_past_a_threshold():
+    """A ramp of ``slope`` per sample; its plain twin counts the next sample's instants past the threshold."""
+    slope, threshold = 0.4, 3.05
+    declared = known(
+        f"{{mapping: a+b -> d, gains: {{a: {{0: {2 / slope}, 1: {-1 / slope}}}, b: 0}}, "
+        f"constant: {0.5 - threshold / slope}, low: 0, high: 1, rest: 0}}"
+    )
+    values = np.column_stack([slope * np.arange(12.0), np.zeros(12)])  # means over samples: the middle of each
+    (seen,) = with_known([declared], [trace(values)])
+    instants = slope * (np.arange(1, 13)[:, None] + (np.arange(1000) + 0.5) / 1000 - 0.5)
+    assert_allclose(seen["d"][1:], np.mean(instants > threshold, axis=1)[1:], atol=2e-3)
+
+
+@given(st.lists(st.tuples(*[st.floats(-10.0, 10.0)] * 2), min_size=1, max_size=20), st.floats(-2.0, 2.0))
+def test_before_the_first_sample_everything_stood_as_in_it(rows, weight):
+    values = np.array(rows)
+    declared = KnownConfig(
+        mapping=Mapping.parse("a+b -> d"), gains={"a": {0: 1.0, 3: weight}, "b": {2: -1.0}}, low=-99, high=99, rest=0
+    )
+    (seen,) = with_known([declared], [trace(values)])
+    past = np.vstack([np.repeat(values[:1], 3, axis=0), values])
+    expected = past[3:, 0] + weight * past[:-3, 0] - past[1:-2, 1]
+    assert_allclose(seen["d"], expected, rtol=1e-12, atol=1e-12)
+
+
 def test_a_later_one_may_read_an_earlier_one():
     second = known("{mapping: d -> e, gains: {d: 1}, low: 0, high: 1, rest: 0}")
     values = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 1.0]])
@@ -96,10 +121,20 @@ def test_a_later_one_may_read_an_earlier_one():
     ("change", "said"),
     [
         ({"gains: {a: 2, b: -1}": "gains: {a: 2}"}, "gains of a\\+b -> d"),
+        ({"gains: {a: 2, b: -1}": "gains: {a: 2, b: {}}"}, "gains"),
+        ({"gains: {a: 2, b: -1}": "gains: {a: 2, b: {-1: 3}}"}, "gains"),
+        ({"gains: {a: 2, b: -1}": "gains: {a: 2, b: -1, d: {1: 1}}"}, "weights by lag for its own past"),
         ({"low: -1": "low: 1"}, "bounds of d"),
         ({"low: -1, high: 3": "low: 0, high: 0"}, "bounds of d"),
     ],
-    ids=["an input without a gain", "rest below low", "no room between the bounds"],
+    ids=[
+        "an input without a gain",
+        "no lag",
+        "a lag of what is to come",
+        "lags of its own",
+        "rest below low",
+        "no room between the bounds",
+    ],
 )
 def test_what_cannot_be_meant_is_refused(change, said):
     text = FIELDS
