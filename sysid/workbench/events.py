@@ -161,6 +161,7 @@ class JudgementReady(Event):
         page: The HTML file.
         document: The judgement as JSON.
         command: The command that makes it again.
+        chosen: Whether it is the one of several that the pipeline keeps.
     """
 
     kind: str
@@ -173,6 +174,7 @@ class JudgementReady(Event):
     page: Path
     document: Path
     command: str
+    chosen: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -315,7 +315,7 @@ class Tracker:
     def _log_judgement(self, ready: JudgementReady) -> None:
         if self.client is None:
             self.client = connect(self.uri)
-        experiment, metric = self._experiment(ready.kind), _entities().metric
+        experiment, metric = self._experiment(ready.pipeline), _entities().metric
         log_judgement(self.client, ready, key_tag=KEY_TAG, experiment=experiment, metric=metric)
 
     def _log_sweep(self, ready: SweepReady) -> None:

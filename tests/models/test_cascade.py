@@ -291,6 +291,30 @@ def test_members_are_found_and_replaced_by_their_outputs():
         cascade.with_member(network("BP -> ER"))
 
 
+def test_the_part_that_an_output_depends_on_runs_as_in_the_whole():
+    cascade = Cascade(
+        models=(linear("STP -> BP"), network("BP -> AR"), network("BP+AR -> BC"), linear("AR -> ER")),
+        rest={"BP": "STP"},
+        limits={"BC": Limit(low=0.0, high=40.0), "ER": Limit(low=0.0)},
+    )
+    part = cascade.upstream_of(["BC"])
+    assert set(part.outputs) == {"BP", "AR", "BC"}
+    assert part.rest == {"BP": "STP"} and set(part.limits) == {"BC"}
+    run = cascade.simulate(command())
+    for name in part.outputs:
+        assert_array_equal(part.simulate(command())[name], run[name])
+    behind = cascade.upstream_of(["BC"], given=["AR"])
+    assert set(behind.outputs) == {"BP", "BC"}
+    assert set(behind.inputs) == {"STP", "AR"}
+
+
+def test_a_channel_that_holds_an_output_belongs_to_its_part():
+    cascade = Cascade(
+        models=(linear("STP -> BP"), linear("STP -> AR"), network("BP -> BC")), limits={"BC": Limit(high="AR")}
+    )
+    assert set(cascade.upstream_of(["BC"]).outputs) == {"BP", "AR", "BC"}
+
+
 @pytest.mark.parametrize("shape", [(5, 2), (5,), (0, 1)], ids=str)
 def test_inputs_of_the_wrong_shape_are_refused(shape):
     with pytest.raises(TraceError, match="inputs do not fit the cascade"):

@@ -33,6 +33,10 @@ Scores = Mapping[str, Mapping[str, float]]
 """Mean squared error of the free run of the whole by output and case, in the output's unit squared."""
 
 
+SELECTION = "selection"
+"""Metric of a stage by which one is chosen: its error on the selection traces."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcome:
     """What came of a run.
@@ -102,7 +106,8 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
         ],
         "scores": [_score(config, name, found) for name in config.outputs],
         "metrics": {
-            stage: {f"{output}/{case}/mse": value for output, by in scores.items() for case, value in by.items()}
+            stage: {SELECTION: found.selection[stage]}
+            | {f"{output}/{case}/mse": value for output, by in scores.items() for case, value in by.items()}
             | (line_metrics(found.line) if found.line is not None and stage == found.chosen else {})
             for stage, scores in found.stages.items()
         },

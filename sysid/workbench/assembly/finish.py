@@ -22,7 +22,7 @@ from sysid.workbench import events
 from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.course import Course
-from sysid.workbench.assembly.document import Outcome, document
+from sysid.workbench.assembly.document import SELECTION, Outcome, document
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.members import whole_score, written
 from sysid.workbench.assembly.stress import Stress, stress
@@ -172,18 +172,21 @@ class Finish:
             results: What is reported.
             page: The report.
         """
-        for stage, metrics in results.judgement.metrics.items():
+        by_stage = results.judgement.metrics
+        chosen = min(by_stage, key=lambda stage: by_stage[stage][SELECTION])
+        for stage, metrics in by_stage.items():
             self.context.tell(
                 events.JudgementReady(
                     kind=self.context.config.kind,
                     pipeline=self.context.config.name,
                     subject=stage,
-                    digest=digest(strict({"pipeline": self.context.config.name, "stage": stage, "metrics": metrics})),
+                    digest=digest(strict({"stage": stage, "metrics": metrics, "chosen": stage == chosen})),
                     metrics=metrics,
                     fit_keys=(),
                     tracked_as=(),
                     page=page,
                     document=self.context.store.results,
                     command=self.context.command,
+                    chosen=stage == chosen,
                 )
             )

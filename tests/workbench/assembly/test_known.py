@@ -160,3 +160,12 @@ def test_members_read_it_and_the_whole_runs_it(workspace: Path):
     ran = whole.simulate(np.full((60, 1), 1.5))
     assert_allclose(ran["head"], np.maximum(ran["upper"] - 0.3 * ran["lower"], 0.0), atol=1e-12)
     assert ran.activity["head"].lost == 0
+
+
+def test_what_only_the_training_looked_at_is_no_part_of_the_surrogate(workspace: Path):
+    file = workspace / "pipelines" / "tanks.yaml"
+    declared = "known: [{mapping: upper -> near, gains: {upper: 1}, low: 1, high: 2, rest: 1, unit: cm}]\n"
+    text = file.read_text(encoding="utf-8").replace("retrain:", f"{declared}retrain:")
+    file.write_text(text.replace("targets: {upper: 0.1", "targets: {near: 0.05, upper: 0.1"), encoding="utf-8")
+    assert run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
+    assert set(read_assembly(workspace / "runs" / "tanks").outputs) == {"upper", "lower"}
