@@ -5,6 +5,7 @@
 ``stage_config``  what it asks of retraining, growing and training end to end
 ``members``       the members: where each stands, what it is fitted on, how it is put in its place
 ``known``         members that are declared and not fitted
+``rehearsal``     the whole wired once before anything is fitted
 ``stages``        alone, chosen together, retrained downstream, trained end to end
 ``growth``        more training data, where the whole is worst
 ``line``          the places between those that are modelled
