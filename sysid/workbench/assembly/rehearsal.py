@@ -1,4 +1,4 @@
-"""Rehearsal: the whole is wired once with members that know nothing, so that what cannot run is said before the fitting."""
+"""Rehearsal: the whole is wired once by members that know nothing, so that what cannot run is said before any fit."""
 
 from __future__ import annotations
 
