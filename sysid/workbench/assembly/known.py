@@ -20,6 +20,7 @@ switch jumps from one sample to the next: what follows has no edge, and training
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -30,12 +31,13 @@ from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import KnownConfig
 
 
-def known_model(known: KnownConfig, like: Trace) -> NARXModel:
+def known_model(known: KnownConfig, like: Trace, units: Dict[str, str] | None = None) -> NARXModel:
     """A declared member as a network without neurons, so that it runs and is exported like the others.
 
     Args:
         known: What is declared.
         like: A trace with its inputs, for their units and the sample time.
+        units: Units of inputs that the trace need not have.
 
     Returns:
         The model, without its bounds.
@@ -52,7 +54,7 @@ def known_model(known: KnownConfig, like: Trace) -> NARXModel:
         scaling=Scaling.identity(len(inputs)),
         mapping=known.mapping,
         sample_time=like.sample_time,
-        input_units=tuple(like.channel(name).unit for name in inputs),
+        input_units=tuple((units or {}).get(name) or like.channel(name).unit for name in inputs),
         output_unit=known.unit,
         rest_output=known.rest,
         clamp=np.inf,  # its bounds are limits of the whole: a model at its own bound counts as lost
@@ -63,23 +65,26 @@ def with_known(known: Sequence[KnownConfig], traces: Sequence[Trace]) -> list[Tr
     """Traces with what the known members say of their measured channels, as further channels.
 
     Args:
-        known: The known members; a later one may read an earlier one.
+        known: The known members; they may read each other, in a circle through the past too.
         traces: Measured traces.
 
     Returns:
-        As many traces.
+        As many traces, the new channels in the order of the members.
+
+    Raises:
+        ConfigError: If the known members cannot be wired.
+        ChannelError: If a trace lacks an input.
     """
+    bounds = {member.mapping.output: Limit(low=member.low, high=member.high) for member in known}
+    units = {member.mapping.output: member.unit for member in known}
 
     def one(trace: Trace) -> Trace:
-        for member in known:
-            name = member.mapping.output
-            bounds = {name: Limit(low=member.low, high=member.high)}
-            run = Cascade(models=(known_model(member, trace),), limits=bounds).simulate_trace(trace)
-            trace = replace(
-                trace,
-                channels=(*trace.channels, Channel(name=name, unit=member.unit)),
-                values=np.column_stack([trace.values, run[name]]),
-            )
-        return trace
+        declared = tuple(known_model(member, trace, units) for member in known)
+        run = Cascade(models=declared, limits=bounds).simulate_trace(trace)
+        return replace(
+            trace,
+            channels=(*trace.channels, *(Channel(name=name, unit=unit) for name, unit in units.items())),
+            values=np.column_stack([trace.values, *(run[name] for name in units)]),
+        )
 
     return [one(trace) for trace in traces] if known else list(traces)
