@@ -117,6 +117,20 @@ def test_a_later_one_may_read_an_earlier_one():
     assert [channel.unit for channel in seen.channels] == ["psi", "V", "1", "1"]
 
 
+@given(st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 2), min_size=1, max_size=40))
+def test_they_may_read_each_other_in_a_circle_through_the_past(rows):
+    """A vent that opens once and, shut, stays shut until it is reset; beside it the same written plainly."""
+    values = np.array(rows)
+    vent = known("{mapping: a+t -> v, gains: {a: 5, t: {1: -50}, v: 50}, low: 0, high: 1, rest: 0}")
+    tripped = known("{mapping: v+b -> t, gains: {v: 1, b: -1, t: 1}, low: 0, high: 1, rest: 0}")
+    (seen,) = with_known([vent, tripped], [trace(values)])
+    v = t = 0.0
+    for n, (a, b) in enumerate(values):
+        v = min(max(5.0 * a - 50.0 * t + 50.0 * v, 0.0), 1.0)
+        t = min(max(v - b + t, 0.0), 1.0)
+        assert_allclose([seen["v"][n], seen["t"][n]], [v, t], atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
