@@ -167,19 +167,15 @@ class Cascade:
         while waiting:
             name = waiting.pop()
             if name in writer and name not in wanted:
-                wanted |= set(Ends.of(writer[name]).outputs)
-                bounds = [own for out in Ends.of(writer[name]).outputs for own in self._bounds(out)]
-                waiting += [source for source in (*Ends.of(writer[name]).inputs, *bounds) if source not in given]
+                ends = Ends.of(writer[name])
+                wanted |= set(ends.outputs)
+                held_by = [bound for n in ends.outputs if n in self.limits for bound in self.limits[n].channels]
+                waiting += [source for source in (*ends.inputs, *held_by) if source not in given]
         models = tuple(model for model in self.models if set(Ends.of(model).outputs) & wanted)
         channels = {name for model in models for end in (Ends.of(model),) for name in (*end.inputs, *end.outputs)}
         limits = {name: limit for name, limit in self.limits.items() if name in wanted}
         rest = {name: level for name, level in self.rest.items() if name in channels}
         return Cascade(models=models, rest=rest, limits=limits)
-
-    def _bounds(self, output: str) -> list[str]:
-        """Channels between which an output is held."""
-        limit = self.limits.get(output)
-        return [] if limit is None else [name for name in (limit.low, limit.high) if isinstance(name, str)]
 
     @cached_property
     def stages(self) -> tuple[CompiledStage | ModelStage, ...]:

@@ -151,7 +151,6 @@ class JudgementReady(Event):
     """A judge has said what the error of some models does, and it is on disk.
 
     Args:
-        kind: Name of the judge.
         pipeline: Name of the pipeline.
         subject: Name of what was judged.
         digest: Of what was said of it.
@@ -164,7 +163,6 @@ class JudgementReady(Event):
         chosen: Whether it is the one of several that the pipeline keeps.
     """
 
-    kind: str
     pipeline: str
     subject: str
     digest: str

@@ -177,7 +177,6 @@ class Finish:
         for stage, metrics in by_stage.items():
             self.context.tell(
                 events.JudgementReady(
-                    kind=self.context.config.kind,
                     pipeline=self.context.config.name,
                     subject=stage,
                     digest=digest(strict({"stage": stage, "metrics": metrics, "chosen": stage == chosen})),

@@ -37,8 +37,9 @@ def log_judgement(client: Any, ready: JudgementReady, *, key_tag: str, experimen
     if known:
         return
     words = {"pipeline": ready.pipeline, "fit": ready.subject, "mlflow.source.name": ready.command}
-    # The pipeline is the experiment: a name that began with it would be cut off before what tells runs apart.
-    name = f"{ready.subject} (chosen)" if ready.chosen else ready.subject
+    # The pipeline is the experiment, and the mark stands in front: MLflow cuts long names off at their end, where what
+    # tells runs apart is.
+    name = f"✓ {ready.subject}" if ready.chosen else ready.subject
     run = client.create_run(experiment, run_name=name, tags=words)
     _log(client, run.info.run_id, ready, metric)
     client.set_tag(run.info.run_id, tag, ready.digest)

@@ -166,7 +166,6 @@ class _Run:
             parts = found[subject]
             self._tell(
                 JudgementReady(
-                    kind=self.config.kind,
                     pipeline=self.config.name,
                     subject=subject,
                     digest=digest(strict({"metrics": metrics, "headline": results.judgement.headline})),

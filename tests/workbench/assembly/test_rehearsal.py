@@ -24,11 +24,13 @@ DECLARED = "known: [{mapping: lower -> near, gains: {lower: 1}, low: 0, high: 9,
             id="through a declared member",
         ),
         pytest.param(
-            {"lower: 0.1}\n": "lower: 0.1}\n  again: [{reads: {upper: {lower: 0}}}]\n"}, "lower", id="in a later round"
+            {"lower: 0.1}\n": "lower: 0.1}\n  again: [{reads: {upper: {lower: 2}}}]\n"},
+            "reads lower already",
+            id="in a later round",
         ),
     ],
 )
-def test_a_circle_is_refused_and_nothing_is_fitted(workspace: Path, changes: dict[str, str], said: str) -> None:
+def test_it_is_refused_and_nothing_is_fitted(workspace: Path, changes: dict[str, str], said: str) -> None:
     file = workspace / "pipelines" / "tanks.yaml"
     text = file.read_text(encoding="utf-8")
     for old, new in changes.items():

@@ -106,8 +106,9 @@ def test_every_stage_is_tracked_once(workspace: Path, empty_store: Path) -> None
     names = {one.info.run_name: one for one in runs}
     best = min(names, key=lambda name: names[name].data.metrics["tanks/selection"])
     stages = ["each alone", "chosen together", "retrained", "trained end to end"]
-    assert sorted(names) == sorted(best if best.startswith(stage) else stage for stage in stages)
-    assert best.endswith(" (chosen)")
+    assert best.removeprefix("✓ ") in stages
+    assert sorted(names) == sorted(best if best == f"✓ {stage}" else stage for stage in stages)
+    assert best.startswith("✓ ")
     assert all(any(name.endswith("V/mse") for name in one.data.metrics) for one in runs)
 
 
