@@ -59,6 +59,8 @@ def fit_cascade(
         errors=unit_errors(cascade, traces, targets),
         trained=None if trained is None else tuple(trained),
         stride=training.stride,
+        moves=training.moves,
+        leverage=training.leverage,
         soft_margin=training.soft_margin,
         workers=training.workers,
     )

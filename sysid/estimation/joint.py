@@ -40,6 +40,10 @@ class JointTraining:
         starts: Random starts, for networks that are fitted from nothing; half of them are dropped at each look.
         seed: Seed of the first start; the others count up from it.
         stride: Every so-manieth sample counts in the loss.
+        moves: A sample counts as well where a target has moved by more than so many of its errors since the last that
+            counted, and so does the one before it: what comes with a jump is not missed (``counted_rows.py``).
+        leverage: How many times as long as their median, at the start, a row of the Jacobian may be before it counts
+            less: where sensitivities explode, the few rows that do would forbid every step (``leverage.py``).
         soft_margin: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
             its logarithm, so that a few traces on which the free run is lost do not rule the loss (``soft_margin.py``).
         workers: Records that are worked on at the same time.
@@ -55,6 +59,8 @@ class JointTraining:
     starts: int = 1
     seed: int = 0
     stride: int = 1
+    moves: float = float("inf")
+    leverage: float = float("inf")
     soft_margin: float = float("inf")
     workers: int = 2
     basis: str = "levels and rates"
@@ -64,8 +70,9 @@ class JointTraining:
         for name in ("max_iterations", "patience", "looks", "starts", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        if not self.soft_margin > 0.0:
-            raise ConfigError("soft_margin is too small", where="soft_margin", expected="above 0", got=self.soft_margin)
+        for name in ("moves", "leverage", "soft_margin"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
         if self.basis not in {"levels and rates", "plain"}:
             raise ConfigError(
                 "unknown value of basis",

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.estimation.cascade_provider import CascadeProvider, with_theta
+from sysid.estimation.cascade_provider import CascadeProvider
 from sysid.estimation.joint import CascadeFit, Joint, JointTraining
 from sysid.estimation.member_layout import JointLayout, MemberLayout
+from sysid.estimation.trained_members import with_theta
 from sysid.estimation.training import FitProgress
 from sysid.models import Cascade, Scaling, VectorMapping, VectorNARX, VectorNARXModel, VectorScaling
 from sysid.models.cascade_program import Limit, Part
@@ -62,7 +63,13 @@ def fit_vector_narx(
         name: 0.02 * scale for name, scale in zip(mapping.outputs, template.scaling.output_scale, strict=True)
     }
     provider = CascadeProvider(
-        cascade=cascade, traces=tuple(traces), errors=errors, stride=training.stride, workers=training.workers
+        cascade=cascade,
+        traces=tuple(traces),
+        errors=errors,
+        stride=training.stride,
+        moves=training.moves,
+        leverage=training.leverage,
+        workers=training.workers,
     )
     records = [{name: trace[name] for name in (*mapping.inputs, *mapping.outputs)} for trace in traces]
     layout = JointLayout.of(provider.members, records, plain=training.basis == "plain")

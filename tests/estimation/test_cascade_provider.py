@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.cascade_provider import BLOCK, CascadeProvider
+from sysid.estimation.counted_rows import counted_rows
 from sysid.models import Cascade, Limit
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace
@@ -76,14 +77,17 @@ def test_blocks_join_without_a_seam():
     assert_allclose(one.jacobian(theta) @ direction, expected, rtol=1e-5, atol=1e-4)
 
 
-@pytest.mark.parametrize("stride", [1, 3, 7])
+@pytest.mark.parametrize(("stride", "moves"), [(1, np.inf), (3, np.inf), (7, np.inf), (7, 150.0)])
 @pytest.mark.parametrize("workers", [1, 2])
-def test_normal_equations_equal_the_dense_ones(stride, workers):
+def test_normal_equations_equal_the_dense_ones(stride, moves, workers):
     cascade = service()
     usable = np.random.default_rng(5).random(BLOCK + 90) > 0.2
     traces = (trace(cascade, BLOCK + 90, usable=usable), trace(cascade, 50, 1))
-    one = provider(cascade, traces=traces, errors={"BC": 2.0, "BP": 0.5}, stride=stride, workers=workers)
-    weights = np.concatenate([np.tile(t.usable_samples[::stride], 2) for t in traces]).astype(float)
+    errors = {"BC": 2.0, "BP": 0.5}
+    one = provider(cascade, traces=traces, errors=errors, stride=stride, moves=moves, workers=workers)
+    rows = [counted_rows(t.columns(list(errors)) / list(errors.values()), stride, moves) for t in traces]
+    weights = np.concatenate([np.tile(t.usable_samples[own], 2) for t, own in zip(traces, rows, strict=True)])
+    weights = weights.astype(float)
     at, J, e = one.linearise(one.theta), one.jacobian(one.theta), one.residuals(one.theta)
     assert one.n_samples == weights.sum()
     assert_allclose(at.loss, 0.5 * np.sum(weights * e**2), rtol=1e-12)
@@ -104,6 +108,19 @@ def test_beyond_the_soft_margin_a_trace_counts_by_the_logarithm_of_its_error():
         weights += [1.0 / (1.0 + np.mean(residual**2) / 20.0**2)] * len(residual)
     assert min(weights) < 0.9
     assert_allclose(H, J.T @ (np.array(weights)[:, None] * J), rtol=1e-9, atol=1e-9 * H.max())
+
+
+def test_long_rows_count_less_in_the_matrix_and_not_in_the_loss():
+    plain = provider(service(), stride=2)
+    one = provider(service(), stride=2, leverage=1.5)
+    theta, J = one.theta, one.jacobian(one.theta)
+    lengths = np.linalg.norm(J, axis=1)
+    weights = np.minimum(1.0, 1.5 * np.median(lengths[lengths > 0.0]) / np.maximum(lengths, 1e-300)) ** 2
+    assert 0.1 < np.mean(weights < 1.0) < 0.9
+    at = one.linearise(theta)
+    assert_allclose(at.gradient, J.T @ (weights * one.residuals(theta)), rtol=1e-9, atol=1e-9)
+    assert_allclose(at.gauss_newton, J.T @ (weights[:, None] * J), rtol=1e-9, atol=1e-9)
+    assert at.loss == plain.linearise(theta).loss == pytest.approx(one.loss(theta))
 
 
 def test_a_gap_does_not_make_a_trace_count_as_better_than_it_is():

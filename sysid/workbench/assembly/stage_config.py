@@ -31,6 +31,10 @@ Reads = dict[str, dict[str, LagsField]]
 """By the output of a member, lags of the channels that it reads more."""
 
 
+OF_TRAINING = ("max_iterations", "moves", "leverage", "soft_margin")
+"""Options of a training that a round may have for itself."""
+
+
 class AgainConfig(BaseModel):
     """A further round of training end to end, from where the round before ended; what it does not name stays.
 
@@ -41,6 +45,8 @@ class AgainConfig(BaseModel):
         targets: The error of each output that counts as one, in its unit.
         traces: Estimation traces used, the first so many.
         max_iterations: Of its training.
+        moves: Of its training.
+        leverage: Of its training.
         soft_margin: Of its training.
     """
 
@@ -52,6 +58,8 @@ class AgainConfig(BaseModel):
     targets: dict[str, float] | None = Field(default=None, min_length=1)
     traces: int | None = Field(default=None, ge=1)
     max_iterations: int | None = Field(default=None, ge=1)
+    moves: float | None = Field(default=None, gt=0)
+    leverage: float | None = Field(default=None, gt=0)
     soft_margin: float | None = Field(default=None, gt=0)
 
 
@@ -120,7 +128,7 @@ class TogetherConfig(BaseModel):
         found = [self.model_copy(update={"again": ()})]
         for more in self.again:
             given = {**more.model_dump(exclude_none=True), "reads": more.reads}
-            own: dict[str, Any] = {name: given.pop(name) for name in ("max_iterations", "soft_margin") if name in given}
+            own: dict[str, Any] = {name: given.pop(name) for name in OF_TRAINING if name in given}
             training = found[-1].training.model_copy(update=own)
             found.append(found[-1].model_copy(update={**given, "training": training}))
         return tuple(found)

@@ -7,7 +7,7 @@ upstream, and training end to end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sysid.errors import ConfigError
@@ -218,15 +218,17 @@ def train_together(
     Returns:
         The fit; a member that stood in several places may now differ between them.
     """
+    # What no target depends on would be run, and its sensitivities with it, for nothing.
+    part = cascade.upstream_of(asked.targets, given=asked.measured)
     trained = [
         f"{member.mapping.output}{place}"
         for member in config.members
-        if asked.members is None or member.mapping.output in asked.members
+        if (member.mapping.output in asked.members if asked.members else member.mapping.output in part.outputs)
         for place in member.places
         if f"{member.mapping.output}{place}" not in asked.measured
     ]
     fit = fit_cascade(
-        _without(cascade, asked.measured),
+        part,
         estimation[: asked.traces],
         targets=asked.targets,
         trained=trained,
@@ -234,13 +236,7 @@ def train_together(
         selection=selection,
         on_progress=report,
     )
-    left_out = [cascade.member(name) for name in asked.measured]
-    return replace(fit, model=replace(cascade, models=(*fit.model.models, *left_out)))
-
-
-def _without(cascade: Cascade, names: Collection[str]) -> Cascade:
-    """The cascade without some of its members: whoever reads their outputs reads what was measured."""
-    left_out = [cascade.member(name) for name in names]
-    models = tuple(model for model in cascade.models if model not in left_out)
-    limits = {name: limit for name, limit in cascade.limits.items() if name not in names}
-    return replace(cascade, models=models, limits=limits)
+    whole = cascade
+    for model in fit.model.models:
+        whole = whole.with_member(model)
+    return replace(fit, model=whole)

@@ -1,0 +1,178 @@
+"""Which members of a cascade change while some are trained, and where their parameters and sensitivities stand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.kernels import cascade as kernel
+from sysid.models import Cascade, Ends, Member, VectorNARXModel
+from sysid.models.arx import ARXModel
+from sysid.models.cascade_program import Part, program_of
+from sysid.models.narx import NARXModel
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedMembers:
+    """A cascade as its training runs it.
+
+    Members that neither are trained nor read a trained one are not run.
+
+    Args:
+        members: The trained members, in the order of the parameters.
+        program: The members that are run, with all their parameters.
+        depth: Rows of regressors that the program holds before the first sample.
+        places: For each trained member where its parameters stand among those of the program, and among those that are
+            trained.
+        own_first: For each member that is run the first of its trained parameters; -1 where it has none.
+        extent: For each output the parameters up to which its sensitivities are not zero.
+        source: For each column of regressors the output that it holds; -1 for an input.
+        carry: Rows of sensitivities that a block needs of the one before.
+    """
+
+    members: tuple[Member, ...]
+    program: kernel.Program
+    depth: int
+    places: tuple[tuple[slice, slice], ...]
+    own_first: NDArray[np.int64]
+    extent: NDArray[np.int64]
+    source: NDArray[np.int64]
+    carry: int
+
+    @classmethod
+    def of(cls, cascade: Cascade, trained: Sequence[str] | None) -> TrainedMembers:
+        """Those of a cascade.
+
+        Args:
+            cascade: The whole.
+            trained: Outputs of the members that are trained; all members by default.
+
+        Returns:
+            Them.
+
+        Raises:
+            ConfigError: If a member that would have to pass on sensitivities cannot.
+        """
+        run, flags = _to_run(cascade, trained)
+        parts = [_part(model) for model in run]
+        program = program_of(parts, [Ends.of(model) for model in run], cascade.wiring.channels, cascade.limits)
+        places = _places(parts, flags)
+        output_of = {int(channel): i for i, channel in enumerate(program.output_channel)}
+        source = np.array([output_of.get(int(channel), -1) for channel in program.column_channel], dtype=np.int64)
+        own_first = np.full(len(run), -1, dtype=np.int64)
+        own_first[np.flatnonzero(flags)] = [own.start for _, own in places]
+        feeds = source[program.regressor_column] >= 0
+        return cls(
+            members=tuple(m for m, yes in zip(run, flags, strict=True) if yes),
+            program=program,
+            depth=max(part.lags.depth for part in parts),
+            places=places,
+            own_first=own_first,
+            extent=_extent(program, flags, [own for _, own in places]),
+            source=source,
+            carry=int(program.regressor_lag[feeds].max(initial=0)),
+        )
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """The parameters that the trained members have, shape ``(n_parameters,)``."""
+        return np.concatenate([self.program.theta[whole] for whole, _ in self.places])
+
+    def program_at(self, theta: NDArray[np.float64]) -> kernel.Program:
+        """The program with these parameters of the trained members."""
+        whole = self.program.theta.copy()
+        for place, own in self.places:
+            whole[place] = theta[own]
+        return self.program._replace(theta=whole)
+
+    def put(self, cascade: Cascade, theta: NDArray[np.float64]) -> Cascade:
+        """The cascade with these parameters of the trained members."""
+        for member, (_, own) in zip(self.members, self.places, strict=True):
+            cascade = cascade.with_member(with_theta(member, theta[own]))
+        return cascade
+
+
+def with_theta(member: Member, theta: NDArray[np.float64]) -> Member:
+    """A member with other parameters.
+
+    Args:
+        member: An ARX model or a network of one or several outputs.
+        theta: Its flat parameters, as its recursion has them.
+
+    Returns:
+        The member.
+
+    Raises:
+        ConfigError: If it has no flat parameters.
+    """
+    if isinstance(member, ARXModel):
+        return replace(member, intercept=float(theta[0]), coefficients=theta[1:])
+    if isinstance(member, (NARXModel, VectorNARXModel)):
+        return replace(member, theta=theta)
+    raise _cannot(member)
+
+
+def _to_run(cascade: Cascade, trained: Sequence[str] | None) -> tuple[list[Member], list[bool]]:
+    """Members that change while the trained ones do, and which of them are trained."""
+    if any(cascade.wiring.feeds_back(Ends.of(model)) for model in cascade.models):
+        return list(cascade.models), [
+            trained is None or bool(set(Ends.of(model).outputs) & set(trained)) for model in cascade.models
+        ]
+    changing: set[str] = set()
+    run, flags = [], []
+    for model in cascade.models:
+        ends = Ends.of(model)
+        own = trained is None or bool(set(ends.outputs) & set(trained))
+        reads = {*ends.inputs, *(c for n in ends.outputs if n in cascade.limits for c in cascade.limits[n].channels)}
+        if own or reads & changing:
+            changing |= set(ends.outputs)
+            run.append(model)
+            flags.append(own)
+    return run, flags
+
+
+def _part(model: Member) -> Part:
+    part = Part.of(model)
+    if part is None:
+        raise _cannot(model)
+    return part
+
+
+def _cannot(model: Member) -> ConfigError:
+    return ConfigError(
+        "a member cannot be trained with the others, or lies between trained members and a target",
+        where=str(model.mapping),
+        expected="ARX or NARX models from the first trained member on",
+        got=model.structure.label,
+        remedy="train only members downstream of it, or fit it as ARX or NARX",
+    )
+
+
+def _places(parts: Sequence[Part], trained: Sequence[bool]) -> tuple[tuple[slice, slice], ...]:
+    places, first, own = [], 0, 0
+    for part, yes in zip(parts, trained, strict=True):
+        n = len(part.theta)
+        if yes:
+            places.append((slice(first, first + n), slice(own, own + n)))
+            own += n
+        first += n
+    return tuple(places)
+
+
+def _extent(program: kernel.Program, trained: Sequence[bool], own: Sequence[slice]) -> NDArray[np.int64]:
+    extent = np.zeros(len(program.output_channel), dtype=np.int64)
+    if program.column_late.any() and own:
+        extent[:] = own[-1].stop
+        return extent
+    # Members run in order and parameters stand in that order: a row ends with the last trained member so far, unless
+    # members read the past of later ones.
+    ends = iter(own)
+    reach = 0
+    for m, yes in enumerate(trained):
+        reach = next(ends).stop if yes else reach
+        extent[program.output_first[m] : program.output_first[m + 1]] = reach
+    return extent
