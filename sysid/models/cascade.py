@@ -174,7 +174,9 @@ class Cascade:
         models = tuple(model for model in self.models if set(Ends.of(model).outputs) & wanted)
         channels = {name for model in models for end in (Ends.of(model),) for name in (*end.inputs, *end.outputs)}
         limits = {name: limit for name, limit in self.limits.items() if name in wanted}
-        rest = {name: level for name, level in self.rest.items() if name in channels}
+        # A given channel begins where its record does if the channel that it would rest at is no longer there.
+        there = {name: level for name, level in self.rest.items() if name in channels}
+        rest = {name: level for name, level in there.items() if not isinstance(level, str) or level in channels}
         return Cascade(models=models, rest=rest, limits=limits)
 
     @cached_property

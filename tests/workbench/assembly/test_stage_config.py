@@ -54,7 +54,14 @@ def test_without_a_soft_margin_squares_count():
     assert together(training={"max_iterations": 9}).training_options(seed=0).soft_margin == np.inf
 
 
-@pytest.mark.parametrize("margin", [0, -1.0])
-def test_a_margin_of_a_round_that_is_none_is_refused(margin):
-    with pytest.raises(ValidationError, match="soft_margin"):
-        together(again=[{"soft_margin": margin}])
+def test_a_round_may_count_jumps_and_exploded_sensitivities_otherwise():
+    rounds = together(again=[{"moves": 10}, {"leverage": 100}]).rounds
+    options = [one.training_options(seed=0) for one in rounds]
+    assert [(one.moves, one.leverage) for one in options] == [(np.inf, np.inf), (10.0, np.inf), (10.0, 100.0)]
+
+
+@pytest.mark.parametrize("name", ["soft_margin", "moves", "leverage"])
+@pytest.mark.parametrize("value", [0, -1.0])
+def test_a_limit_of_a_round_that_is_none_is_refused(name, value):
+    with pytest.raises(ValidationError, match=name):
+        together(again=[{name: value}])

@@ -1,0 +1,83 @@
+"""Training end to end runs what its targets depend on, and leaves the rest of the whole as it was."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from sysid.estimation import fit_cascade
+from sysid.models import Cascade
+from sysid.traces import Channel, Trace
+from sysid.workbench.assembly import stages
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.stage_config import TogetherConfig
+from sysid.workbench.assembly.stages import train_together
+from tests.models.cascades import command, service
+
+
+def member(mapping: str) -> dict[str, object]:
+    structure = {"kind": "NARX", "input_delays": "0:1", "output_delays": 1, "neurons": 3}
+    return {"mapping": mapping, "structure": structure, "rest": 0}
+
+
+CONFIG = AssemblyConfig.model_validate(
+    {
+        "kind": "assembly",
+        "name": "chain",
+        "data": "chain",
+        "training": "chain",
+        "outputs": ["BC"],
+        "members": [member("STP -> BP"), member("BP -> AR"), member("BP+AR -> BC")],
+        "together": {"targets": {"BC": 1.0}},
+    }
+)
+
+
+def record(seed: int = 0, n: int = 120) -> Trace:
+    """The chain's own run, with an error of every channel."""
+    run = service().simulate(command(n, 1, seed))
+    noise = np.random.default_rng(seed).normal(0.0, 1.0, run.values.shape)
+    channels = tuple(Channel(name=name, unit="psi") for name in service().wiring.channels)
+    return Trace(name=f"record {seed}", sample_time=0.1, channels=channels, values=run.values + noise)
+
+
+def trained(monkeypatch: pytest.MonkeyPatch, **asked) -> tuple[Cascade, Cascade, list[str]]:
+    """The whole after a round, what the fit was given of it, and the members it trained."""
+    given: list[tuple[Cascade, list[str]]] = []
+
+    def fit(cascade, *args, **kwargs):
+        given.append((cascade, kwargs["trained"]))
+        return fit_cascade(cascade, *args, **kwargs)
+
+    monkeypatch.setattr(stages, "fit_cascade", fit)
+    asked = TogetherConfig.model_validate({"training": {"max_iterations": 2, "looks": 1, "workers": 1}, **asked})
+    found = train_together(CONFIG, asked, service(), lambda _: None, estimation=[record()], selection=[])
+    ((part, names),) = given
+    return found.model, part, names
+
+
+def changed(whole: Cascade) -> set[str]:
+    return {
+        name for name in whole.outputs if not np.array_equal(whole.member(name).theta, service().member(name).theta)
+    }
+
+
+def test_what_no_target_depends_on_is_neither_run_nor_trained(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, part, names = trained(monkeypatch, targets={"AR": 1.0})
+    assert (part.outputs, names) == (("BP", "AR"), ["BP", "AR"])
+    assert changed(whole) == {"BP", "AR"}
+    assert whole.outputs == service().outputs
+
+
+def test_what_is_measured_is_an_input_and_comes_back_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, part, names = trained(monkeypatch, targets={"BC": 1.0}, measured=["BP"])
+    assert (set(part.inputs), set(part.outputs), names) == ({"BP"}, {"AR", "BC"}, ["AR", "BC"])
+    assert changed(whole) == {"AR", "BC"}
+    assert_array_equal(whole.member("BP").theta, service().member("BP").theta)
+
+
+def test_members_that_are_named_are_the_ones_trained(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, _, names = trained(monkeypatch, targets={"BC": 1.0}, members=["AR"])
+    assert names == ["AR"]
+    assert changed(whole) == {"AR"}
