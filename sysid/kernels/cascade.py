@@ -92,57 +92,59 @@ def gates_at(theta_first, m, n, n_x, n_y):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _unpacked(p):
-    """All members' hidden weights by column, biases, readouts and gates, ``[member, row, neuron]``, padded with zeros.
+def _side_by_side(p):
+    """All members' weights ``[member, row, neuron]``, padded with zeros, and how wide each member's rows are.
 
-    A member without gates has none of their rows; whether it has is said by :func:`gates_at`.
+    A row for each regressor and one for the constants: hidden weights and biases, and beside them, where there are
+    gates, those of the gates, so that one pass over the regressors serves both. Without gates the readouts follow, row
+    by row.
     """
     members = len(p.neurons)
-    rows, wide = 0, 0
+    rows, across = 0, np.empty(members, dtype=np.int64)
     for m in range(members):
         n_x, n_y = p.regressor_first[m + 1] - p.regressor_first[m], p.output_first[m + 1] - p.output_first[m]
-        own = n_x + 1 + n_y + (n_x if gates_at(p.theta_first, m, p.neurons[m], n_x, n_y) >= 0 else 0)
-        rows, wide = max(rows, own), max(wide, padded(p.neurons[m]))
-    weights = np.zeros((members, rows, wide))
+        gated = gates_at(p.theta_first, m, p.neurons[m], n_x, n_y) >= 0
+        rows, across[m] = max(rows, n_x + 1 + n_y), padded(p.neurons[m]) * (2 if gated else 1)
+    weights = np.zeros((members, rows, across.max()))
     for m in range(members):
         n_x, n_y = p.regressor_first[m + 1] - p.regressor_first[m], p.output_first[m + 1] - p.output_first[m]
         n, at = p.neurons[m], p.theta_first[m]
-        gates = gates_at(p.theta_first, m, n, n_x, n_y)
+        gates, beside = gates_at(p.theta_first, m, n, n_x, n_y), padded(n)
         for k in range(n):
             for i in range(n_x):
                 weights[m, i, k] = p.theta[at + k * n_x + i]
+                if gates >= 0:
+                    weights[m, i, beside + k] = p.theta[gates + k * n_x + i]
             weights[m, n_x, k] = p.theta[at + n * n_x + k]
             for j in range(n_y):
-                weights[m, n_x + 1 + j, k] = p.theta[at + n * (n_x + 1) + j * n + k]
-            if gates >= 0:
-                for i in range(n_x):
-                    weights[m, n_x + 1 + n_y + i, k] = p.theta[gates + k * n_x + i]
-    return weights
+                row, column = (n_x, beside + k) if gates >= 0 else (n_x + 1 + j, k)
+                weights[m, row, column] = p.theta[at + n * (n_x + 1) + j * n + k]
+    return weights, across
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _affine(weights, m, row, constant, n_x, x, out):
-    """One affine function of the regressors for each neuron of a member, from ``row`` on.
+def _affine(weights, m, n_x, x, out):
+    """The affine functions of the regressors of a member's neurons and gates.
 
     Four columns at a time, or loading and storing the sums would take most of it.
     """
     n = len(out)
     for k in range(n):
-        out[k] = weights[m, constant, k]
+        out[k] = weights[m, n_x, k]
     fours = n_x // 4 * 4
     for i in range(0, fours, 4):
         x0, x1, x2, x3 = x[i], x[i + 1], x[i + 2], x[i + 3]
         for k in range(n):
             out[k] += (
-                weights[m, row + i, k] * x0
-                + weights[m, row + i + 1, k] * x1
-                + weights[m, row + i + 2, k] * x2
-                + weights[m, row + i + 3, k] * x3
+                weights[m, i, k] * x0
+                + weights[m, i + 1, k] * x1
+                + weights[m, i + 2, k] * x2
+                + weights[m, i + 3, k] * x3
             )
     for i in range(fours, n_x):
         value = x[i]
         for k in range(n):
-            out[k] += weights[m, row + i, k] * value
+            out[k] += weights[m, i, k] * value
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -179,9 +181,12 @@ def run(p, depth, rest, values, z, kept, held):
             where nobody needs them.
         held: What held each output at each sample, shape ``(n_samples, n_outputs)``, written.
     """
-    weights = _unpacked(p)
+    weights, across = _side_by_side(p)
     x = np.empty(weights.shape[1])
-    sums, gains = np.empty(weights.shape[2]), np.empty(weights.shape[2])
+    flat, wide_z = z.reshape(-1), z.shape[1]
+    back = p.regressor_lag * wide_z - p.regressor_column
+    per_scale = 1.0 / p.column_scale
+    sums = np.empty(weights.shape[2])
     for t in range(depth):
         for column in range(len(p.column_channel)):
             z[t, column] = (rest[p.column_channel[column]] - p.column_offset[column]) / p.column_scale[column]
@@ -196,17 +201,16 @@ def run(p, depth, rest, values, z, kept, held):
                 late = 1 if p.column_late[column] else 0
                 if late <= t:  # what came before sample 0 stands there already
                     value = values[t - late, p.column_channel[column]]
-                    z[now - late, column] = (value - p.column_offset[column]) / p.column_scale[column]
+                    z[now - late, column] = (value - p.column_offset[column]) * per_scale[column]
+            here = now * wide_z
             for i in range(n_x):
-                x[i] = z[now - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
-            h, g = sums[:wide], gains[:wide]
-            _affine(weights, m, 0, n_x, n_x, x, h)
+                x[i] = flat[here - back[first_x + i]]
+            _affine(weights, m, n_x, x, sums[: across[m]])
+            h, g = sums[:wide], sums[wide : across[m]]
             tanh_in_place(h)
             at = p.theta_first[m] + n * (n_x + 1 + n_y)
             linear = p.theta_first[m + 1] > at + n_y
-            gated = gates_at(p.theta_first, m, n, n_x, n_y) >= 0
-            if gated:
-                _affine(weights, m, n_x + 2, n_x + 1, n_x, x, g)
+            gated = across[m] > wide
             for j in range(n_y):
                 total = p.theta[at + j]
                 if gated:
@@ -229,7 +233,7 @@ def run(p, depth, rest, values, z, kept, held):
                     high, high_code = values[t, p.limit_channel[o, 1]], HIGH_CHANNEL
                 limited, held_by = _limited(value, code, low, high, low_code, high_code)
                 if held_by != code:
-                    scaled = (limited - p.column_offset[column]) / p.column_scale[column]
+                    scaled = (limited - p.column_offset[column]) * per_scale[column]
                 z[now, column] = scaled
                 values[t, p.output_channel[o]] = limited
                 held[t, o] = held_by
