@@ -51,7 +51,7 @@ class _Record:
 class _Passed:
     """What one pass leaves for the sensitivities."""
 
-    z: NDArray[np.float64]
+    values: NDArray[np.float64]
     kept: NDArray[np.float64]
     held: NDArray[np.int8]
 
@@ -135,8 +135,8 @@ class CascadeProvider(AbstractProvider):
         program = self._trained.program_at(theta)
 
         def one(record: _Record) -> float:
-            values, _ = self._pass(program, record, keep=False)
-            return counted(self._residual(record, values), self.soft_margin, _counted(record))[0]
+            passed = self._pass(program, record, keep=False)
+            return counted(self._residual(record, passed.values), self.soft_margin, _counted(record))[0]
 
         total = sum(self._each(one))
         return total if np.isfinite(total) else np.inf
@@ -169,7 +169,7 @@ class CascadeProvider(AbstractProvider):
         """
         program, found = self._trained.program_at(theta), []
         for record in self._records:
-            _, passed = self._pass(program, record, keep=True)
+            passed = self._pass(program, record, keep=True)
             columns: list[list[NDArray[np.float64]]] = [[] for _ in self.errors]
             for _, blocks in self._blocks(program, record, passed, len(theta)):
                 for column, block in zip(columns, blocks, strict=True):
@@ -189,7 +189,7 @@ class CascadeProvider(AbstractProvider):
         program, sizes = self._trained.program_at(theta), np.array(list(self.errors.values()))
         found = []
         for record in self._records:
-            values, _ = self._pass(program, record, keep=False)
+            values = self._pass(program, record, keep=False).values
             found.append(((values[record.rows][:, self._columns] - record.target) / sizes).T.ravel())
         return np.concatenate(found)
 
@@ -224,16 +224,15 @@ class CascadeProvider(AbstractProvider):
         with ThreadPoolExecutor(self.workers) as pool:  # results come in the order of the records: sums do not depend
             yield from pool.map(work, self._records)  # on which thread was first
 
-    def _pass(self, program: kernel.Program, record: _Record, *, keep: bool) -> tuple[NDArray[np.float64], _Passed]:
+    def _pass(self, program: kernel.Program, record: _Record, *, keep: bool) -> _Passed:
         n = len(record.values)
-        values = record.values.copy()
         passed = _Passed(
-            np.empty((self._trained.depth + n, len(program.column_channel))),
+            record.values.copy(),
             np.empty((n, int(program.neurons.sum()))) if keep else np.empty((0, 0)),
             np.empty((n, len(program.output_channel)), dtype=np.int8),
         )
-        kernel.run(program, self._trained.depth, record.levels, values, passed.z, passed.kept, passed.held)
-        return values, passed
+        kernel.run(program, self._trained.depth, record.levels, passed.values, passed.kept, passed.held)
+        return passed
 
     def _residual(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weighted residuals over their errors, shape ``(n_counted, n_targets)``."""
@@ -244,8 +243,8 @@ class CascadeProvider(AbstractProvider):
     def _normal_equations(
         self, program: kernel.Program, record: _Record, n: int
     ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        values, passed = self._pass(program, record, keep=True)
-        residual = self._residual(record, values)
+        passed = self._pass(program, record, keep=True)
+        residual = self._residual(record, passed.values)
         loss, weights = counted(residual, self.soft_margin, _counted(record))
         gradient, matrix = np.zeros(n), np.zeros((n, n))
         waiting: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in self.errors]
@@ -272,7 +271,7 @@ class CascadeProvider(AbstractProvider):
         theta = self.theta
 
         def one(record: _Record) -> NDArray[np.float64]:
-            _, passed = self._pass(self._trained.program, record, keep=True)
+            passed = self._pass(self._trained.program, record, keep=True)
             blocks = self._blocks(self._trained.program, record, passed, len(theta))
             return np.concatenate([np.linalg.norm(block, axis=1) for _, some in blocks for block in some])
 
@@ -292,7 +291,7 @@ class CascadeProvider(AbstractProvider):
             if first:
                 J[:, :carry] = J[:, BLOCK : BLOCK + carry]
             sensitivities(
-                program, self._trained.depth, first, rows, passed.z, passed.kept, passed.held,
+                program, record.levels, first, rows, passed.values, passed.kept, passed.held,
                 trained.own_first, trained.extent, trained.source, carry, J,
             )  # fmt: skip
             picked = record.rows[slice(*np.searchsorted(record.rows, (first, first + rows)))] - first + carry
@@ -301,7 +300,7 @@ class CascadeProvider(AbstractProvider):
                 if output < 0:
                     blocks.append(np.zeros((len(picked), 0)))
                     continue
-                scale = program.column_scale[program.output_column[output]] / error
+                scale = program.output_scale[output] / error
                 blocks.append(J[output, picked, : trained.extent[output]] * scale)
             yield slice(at, at + len(picked)), blocks
             at += len(picked)

@@ -30,7 +30,7 @@ class TrainedMembers:
             trained.
         own_first: For each member that is run the first of its trained parameters; -1 where it has none.
         extent: For each output the parameters up to which its sensitivities are not zero.
-        source: For each column of regressors the output that it holds; -1 for an input.
+        source: For each regressor the output that it holds; -1 for an input.
         carry: Rows of sensitivities that a block needs of the one before.
     """
 
@@ -62,19 +62,18 @@ class TrainedMembers:
         program = program_of(parts, [Ends.of(model) for model in run], cascade.wiring.channels, cascade.limits)
         places = _places(parts, flags)
         output_of = {int(channel): i for i, channel in enumerate(program.output_channel)}
-        source = np.array([output_of.get(int(channel), -1) for channel in program.column_channel], dtype=np.int64)
+        source = np.array([output_of.get(int(channel), -1) for channel in program.regressor_channel], dtype=np.int64)
         own_first = np.full(len(run), -1, dtype=np.int64)
         own_first[np.flatnonzero(flags)] = [own.start for _, own in places]
-        feeds = source[program.regressor_column] >= 0
         return cls(
             members=tuple(m for m, yes in zip(run, flags, strict=True) if yes),
             program=program,
             depth=max(part.lags.depth for part in parts),
             places=places,
             own_first=own_first,
-            extent=_extent(program, flags, [own for _, own in places]),
+            extent=_extent(program, source, flags, [own for _, own in places]),
             source=source,
-            carry=int(program.regressor_lag[feeds].max(initial=0)),
+            carry=int(program.regressor_lag[source >= 0].max(initial=0)),
         )
 
     @property
@@ -163,9 +162,13 @@ def _places(parts: Sequence[Part], trained: Sequence[bool]) -> tuple[tuple[slice
     return tuple(places)
 
 
-def _extent(program: kernel.Program, trained: Sequence[bool], own: Sequence[slice]) -> NDArray[np.int64]:
+def _extent(
+    program: kernel.Program, source: NDArray[np.int64], trained: Sequence[bool], own: Sequence[slice]
+) -> NDArray[np.int64]:
     extent = np.zeros(len(program.output_channel), dtype=np.int64)
-    if program.column_late.any() and own:
+    # The last output of the member that each regressor belongs to: one that reads a later output stands in a circle.
+    last = np.repeat(program.output_first[1:], np.diff(program.regressor_first)) - 1
+    if own and (source > last).any():
         extent[:] = own[-1].stop
         return extent
     # Members run in order and parameters stand in that order: a row ends with the last trained member so far, unless

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, _bounded, _limited, gates_at
+from sysid.kernels.cascade import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, _bounded, _limited, gates_at, in_units
 from sysid.kernels.recursion import tanh_in_place
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -65,12 +65,6 @@ def _products(total, g, n, h):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _scaled(z, levels, offset, scale):
-    for lane in range(len(z)):
-        z[lane] = (levels[lane] - offset) / scale
-
-
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _outside(total, value, offset, scale, low_bound, high_bound, low, high):
     """Bring totals to their unit; count the lanes in which something holds them."""
     count = 0
@@ -85,23 +79,12 @@ def _outside(total, value, offset, scale, low_bound, high_bound, low, high):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _hold(total, value, codes, offset, scale, low_bound, high_bound, low, high, low_code, high_code):
-    """Hold totals and values within bounds and limits, lane by lane."""
+    """Hold values within bounds and limits, lane by lane."""
     for lane in range(len(total)):
         scaled, code = _bounded(total[lane], low_bound, high_bound)
         limited, held_by = _limited(scaled * scale + offset, code, low[lane], high[lane], low_code, high_code)
-        total[lane] = (limited - offset) / scale if held_by != code else scaled
         value[lane] = limited
         codes[lane] = held_by
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _fill_past(p, depth, rest, record, z):
-    """Write what every column was before sample 0, in every lane."""
-    for column in range(len(p.column_channel)):
-        for lane in range(len(record)):
-            level = rest[record[lane], p.column_channel[column]]
-            for t in range(depth):
-                z[t, column, lane] = (level - p.column_offset[column]) / p.column_scale[column]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -142,17 +125,19 @@ def run(p, depth, rest, lanes, values, held):
     x, hidden, total = np.zeros((width, lanes)), np.zeros(most * lanes), np.zeros(lanes)
     h, g = hidden.reshape(most, lanes), np.zeros((most, lanes))
     low, high, codes = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes, dtype=np.int8)
-    z = np.zeros((depth + CHUNK, len(p.column_channel), lanes))
-    now_values = np.zeros((channels, lanes))
+    theta = in_units(p)
     # Lanes without a record of their own repeat the last one.
     record = np.minimum(np.arange(lanes), records - 1)
+    past = np.zeros((depth + CHUNK, channels, lanes))
+    for lane in range(lanes):
+        past[:depth, :, lane] = rest[record[lane]]
     is_output = np.zeros(channels, dtype=np.bool_)
     is_output[p.output_channel] = True
-    _fill_past(p, depth, rest, record, z)
     for t in range(samples):
         if t > 0 and t % CHUNK == 0:
-            z[:depth] = z[CHUNK : CHUNK + depth].copy()
+            past[:depth] = past[CHUNK : CHUNK + depth].copy()
         now = depth + t % CHUNK
+        now_values = past[now]
         for channel in range(channels):
             if not is_output[channel]:
                 for lane in range(lanes):
@@ -161,38 +146,31 @@ def run(p, depth, rest, lanes, values, held):
             n = p.neurons[m]
             first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
             first_y, n_y = p.output_first[m], p.output_first[m + 1] - p.output_first[m]
-            for column in range(p.column_first[m], p.column_first[m + 1] - n_y):
-                levels = now_values[p.column_channel[column]]  # of a channel that is computed later: the sample before
-                late = 1 if p.column_late[column] else 0
-                if late <= t:  # what came before sample 0 stands there already
-                    _scaled(z[now - late, column], levels, p.column_offset[column], p.column_scale[column])
             for i in range(n_x):
-                x[i] = z[now - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
+                x[i] = past[now - p.regressor_lag[first_x + i], p.regressor_channel[first_x + i]]
             own, gates = p.theta_first[m], gates_at(p.theta_first, m, n, n_x, n_y)
-            _affine(p.theta, own, own + n * n_x, n, n_x, x, h)
+            _affine(theta, own, own + n * n_x, n, n_x, x, h)
             tanh_in_place(hidden[: n * lanes])
             if gates >= 0:
-                _affine(p.theta, gates, own + n * (n_x + 1), n, n_x, x, g)
+                _affine(theta, gates, own + n * (n_x + 1), n, n_x, x, g)
             at = own + n * (n_x + 1 + n_y)
             linear = p.theta_first[m + 1] > at + n_y
             for j in range(n_y):
                 o = first_y + j
-                column, channel = p.output_column[o], p.output_channel[o]
-                offset, scale = p.column_offset[column], p.column_scale[column]
+                channel, offset, scale = p.output_channel[o], p.output_offset[o], p.output_scale[o]
                 low_code, high_code = _limits(p, o, now_values, low, high)
-                total[:] = p.theta[at + j]
+                total[:] = theta[at + j]
                 if gates >= 0:
                     _products(total, g, n, h)
                 else:
-                    _weighted(total, p.theta, own + n * (n_x + 1) + j * n, n, h)
+                    _weighted(total, theta, own + n * (n_x + 1) + j * n, n, h)
                 if linear:
-                    _weighted(total, p.theta, at + n_y + j * n_x, n_x, x)
+                    _weighted(total, theta, at + n_y + j * n_x, n_x, x)
                 value = now_values[channel]
                 codes[:] = FREE
                 low_bound, high_bound = p.bounds[o, 0], p.bounds[o, 1]
                 if _outside(total, value, offset, scale, low_bound, high_bound, low, high):
                     _hold(total, value, codes, offset, scale, low_bound, high_bound, low, high, low_code, high_code)
-                z[now, column] = total
                 for lane in range(records):
                     values[lane, t, channel] = value[lane]
                     held[lane, t, o] = codes[lane]

@@ -2,15 +2,15 @@ r"""Sensitivities of a cascade's outputs with respect to the parameters of its m
 
 With the notation of ``sysid/kernels/cascade.py``, let :math:`\theta` be the parameters of all members that are trained.
 For output :math:`j` of a member, with :math:`s_{jk} = g_{jk}(1 - h_k^2)`, where :math:`g_{jk}` is what stands before
-the activation (the readout, or the gate), and regressor :math:`i` reading column :math:`\kappa(i)` with lag
-:math:`l_i`,
+the activation (the readout, or the gate), and regressor :math:`i` being output :math:`\kappa(i)`, in the member's
+scaled numbers, with lag :math:`l_i`,
 
 .. math::
     \frac{d y_{j,t}}{d\theta} = \frac{\partial y_{j,t}}{\partial\theta}
-      + \sum_i c_{ji,t}\,\frac{d z_{\kappa(i),\,t-l_i}}{d\theta},
+      + \sum_i c_{ji,t}\,\frac{d y_{\kappa(i),\,t-l_i}}{d\theta},
     \qquad c_{ji,t} = w_{ji} + \sum_k \Bigl(s_{jk,t} W_{ki} + h_{k,t} \frac{\partial g_{jk,t}}{\partial x_i}\Bigr).
 
-The sum runs over regressors whose column comes from an output of the cascade, the member's own or an upstream one: the
+The sum runs over regressors that are an output of the cascade, the member's own or an upstream one: the
 sensitivity of the upstream output is an input of the downstream recursion, scaled from the one's numbers to the
 other's. Inputs of the whole contribute nothing. An output held by a constant has a zero row; held by a channel, it has
 that channel's row.
@@ -87,21 +87,19 @@ def _factors(c, theta, first, gates, j, n, n_x, n_y, linear, h, g):
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _through_the_past(row, c, p, m, t, here, extent, source, J):
-    """Add what earlier samples and upstream outputs pass on; regressors of one column stand side by side."""
+    """Add what earlier samples and upstream outputs pass on; regressors of one channel stand side by side."""
     first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
     i = 0
     while i < n_x:
-        column = p.regressor_column[first_x + i]
-        s, end = source[column], i + 1
-        while end < n_x and p.regressor_column[first_x + end] == column:
+        s, end = source[first_x + i], i + 1
+        while end < n_x and p.regressor_channel[first_x + end] == p.regressor_channel[first_x + i]:
             end += 1
         stop = end
         # Samples before the first do not depend on the parameters.
         while end > i and t < p.regressor_lag[first_x + end - 1]:
             end -= 1
         if s >= 0 and extent[s] > 0:
-            own = p.output_column[s]
-            ratio = p.column_scale[own] / p.column_scale[column]
+            ratio = p.output_scale[s] / p.regressor_scale[first_x + i]
             while end - i >= 4:
                 lag = p.regressor_lag[first_x + i : first_x + i + 4]
                 _add_four(
@@ -117,23 +115,23 @@ def _through_the_past(row, c, p, m, t, here, extent, source, J):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, source, carry, J):
+def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent, source, carry, J):
     """Rows ``first`` to ``first + n_rows`` of the Jacobians of all outputs, in their scaled numbers.
 
     The record is walked in blocks; ``J`` holds ``carry`` rows of the block before, which the caller moves to its head.
 
     Args:
         p: The members.
-        depth: As in the pass over the samples.
+        rest: As in the pass over the samples.
         first: First sample of the block.
         n_rows: Samples in the block.
-        z: As from the pass, shape ``(depth + n_samples, n_columns)``.
+        values: As from the pass, shape ``(n_samples, n_channels)``.
         kept: As from the pass, shape ``(n_samples, n_neurons)``.
         held: As from the pass, shape ``(n_samples, n_outputs)``.
         own_first: Where each member's parameters stand in a row; -1 for a member that is not trained.
         extent: Length of each output's row: after it there are zeros, which are not written.
-        source: Output behind each column of ``z``; -1 for an input of the whole.
-        carry: Rows kept from the block before: the longest lag of a column with a source.
+        source: Output that each regressor reads; -1 for an input of the whole.
+        carry: Rows kept from the block before: the longest lag of a regressor with a source.
         J: Shape ``(n_outputs, carry + n_rows, n_parameters)``; rows from ``carry`` on are written.
     """
     members, width = len(p.neurons), 0
@@ -150,7 +148,9 @@ def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, sou
             h = kept[t, at_neuron : at_neuron + n]
             at_neuron += n
             for i in range(n_x):
-                x[i] = z[depth + t - p.regressor_lag[first_x + i], p.regressor_column[first_x + i]]
+                before, channel = t - p.regressor_lag[first_x + i], p.regressor_channel[first_x + i]
+                value = values[before, channel] if before >= 0 else rest[channel]
+                x[i] = (value - p.regressor_offset[first_x + i]) / p.regressor_scale[first_x + i]
             linear = p.theta_first[m + 1] - p.theta_first[m] > n * (n_x + 1 + n_y) + n_y
             gates = gates_at(p.theta_first, m, n, n_x, n_y)
             for j in range(n_y):
@@ -163,8 +163,7 @@ def sensitivities(p, depth, first, n_rows, z, kept, held, own_first, extent, sou
                         channel = p.limit_channel[o, 0 if code == LOW_CHANNEL else 1]
                         for s in range(o):
                             if p.output_channel[s] == channel:
-                                ratio = p.column_scale[p.output_column[s]] / p.column_scale[p.output_column[o]]
-                                _add(row, ratio, J[s, carry + r], extent[s])
+                                _add(row, p.output_scale[s] / p.output_scale[o], J[s, carry + r], extent[s])
                     continue
                 if extent[o] == 0:
                     continue

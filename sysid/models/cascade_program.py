@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from sysid.models.lags import Lags
 from sysid.models.recursion import Recursion
 from sysid.models.vector_narx import VectorNARXModel
 from sysid.models.wiring import Ends, Member
+
+_Number = TypeVar("_Number", np.int64, np.float64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,34 +118,25 @@ def program_of(
         The tables.
     """
     column_of = {name: i for i, name in enumerate(channels)}
-    names = [(*end.inputs, *end.outputs) for end in ends]
-    columns = _firsts([len(some) for some in names])
     written = [name for end in ends for name in end.outputs]
-    regressors = [part.lags.input_channel + first for part, first in zip(parts, columns, strict=False)]
     held = [_limit(limits.get(name, Limit()), column_of) for name in written]
-    done: set[str] = set()
-    late: list[bool] = []
-    for end in ends:
-        late += [name in written and name not in done for name in end.inputs] + [False] * len(end.outputs)
-        done |= set(end.outputs)
+    # Of each member the columns that it reads, and then its outputs: a regressor is one of them and a lag.
+    columns = [np.array([column_of[name] for name in (*end.inputs, *end.outputs)], dtype=np.int64) for end in ends]
+    regressors = [part.lags.input_channel for part in parts]
+    offsets, scales = [np.array(part.offset) for part in parts], [np.array(part.scale) for part in parts]
     return Program(
         theta=np.concatenate([part.theta for part in parts]),
         theta_first=_firsts([len(part.theta) for part in parts]),
         neurons=np.array([part.neurons for part in parts], dtype=np.int64),
         regressor_first=_firsts([len(some) for some in regressors]),
-        regressor_column=np.concatenate(regressors),
+        regressor_channel=_of_each(columns, regressors),
         regressor_lag=np.concatenate([part.lags.input_lag for part in parts]),
-        column_first=columns,
-        column_channel=np.array([column_of[name] for some in names for name in some], dtype=np.int64),
-        column_offset=np.array([value for part in parts for value in part.offset]),
-        column_scale=np.array([value for part in parts for value in part.scale]),
-        column_late=np.array(late),
+        regressor_offset=_of_each(offsets, regressors),
+        regressor_scale=_of_each(scales, regressors),
         output_first=_firsts([len(end.outputs) for end in ends]),
-        output_column=np.array(
-            [first + len(end.inputs) + j for first, end in zip(columns, ends, strict=False) for j in _range(end)],
-            dtype=np.int64,
-        ),
         output_channel=np.array([column_of[name] for name in written], dtype=np.int64),
+        output_offset=np.concatenate([some[len(end.inputs) :] for some, end in zip(offsets, ends, strict=True)]),
+        output_scale=np.concatenate([some[len(end.inputs) :] for some, end in zip(scales, ends, strict=True)]),
         bounds=np.array([[part.low, part.high] for part, end in zip(parts, ends, strict=True) for _ in _range(end)]),
         limits=np.array([values for values, _ in held]),
         limit_channel=np.array([indices for _, indices in held], dtype=np.int64),
@@ -151,6 +145,11 @@ def program_of(
 
 def _firsts(counts: Sequence[int]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+
+
+def _of_each(tables: Sequence[NDArray[_Number]], picked: Sequence[NDArray[np.int64]]) -> NDArray[_Number]:
+    """What each member picks of its own table, one after the other."""
+    return np.concatenate([table[some] for table, some in zip(tables, picked, strict=True)])
 
 
 def _range(end: Ends) -> range:

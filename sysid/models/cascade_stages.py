@@ -41,8 +41,7 @@ class CompiledStage:
             values: Every channel, shape ``(n_samples, n_channels)``; the stage's outputs are written.
             held: What held its outputs, shape ``(n_samples, n_outputs)``, written.
         """
-        z = np.empty((self.depth + len(values), len(self.program.column_channel)))
-        kernel.run(self.program, self.depth, levels, values, z, _NOTHING, held)
+        kernel.run(self.program, self.depth, levels, values, _NOTHING, held)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
