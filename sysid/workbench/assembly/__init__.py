@@ -7,6 +7,7 @@
 ``known``         members that are declared and not fitted
 ``rehearsal``     the whole wired once before anything is fitted
 ``stages``        alone, chosen together, retrained downstream, trained end to end
+``everywhere``    training end to end with one set of weights for all places
 ``growth``        more training data, where the whole is worst
 ``line``          the places between those that are modelled
 ``stress``        the whole on many random sequences, against the reference

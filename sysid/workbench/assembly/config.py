@@ -17,29 +17,37 @@ from sysid.workbench.naming import slug
 from sysid.yaml_files import FieldError
 
 
-class MemberConfig(BaseModel):
-    """One member, used in one place or in several.
+class StandingConfig(BaseModel):
+    """What stands in one place or in several.
 
     Args:
         mapping: Inputs and output, such as ``BP+AR -> BC``; in the first place as they are.
-        structure: What is fitted, with its ``kind``.
-        training: How a network is trained.
-        rest: The output at rest, in its unit.
-        places: Suffixes of the channel names, one for each place where the member stands: ``["", "10"]`` puts it at
-            ``BP -> AR`` and ``BP10 -> AR10``. It is fitted on traces of all its places.
+        places: Suffixes of the channel names, one for each place where it stands: ``["", "10"]`` puts it at
+            ``BP -> AR`` and ``BP10 -> AR10``.
         shared: Inputs that have the same name in every place.
-        candidates: Fits from different seeds, among which the whole chooses.
-        traces: Estimation traces that it is fitted on, the first so many; all by default.
     """
 
     model_config = STRICT
 
     mapping: MappingField
+    places: Annotated[tuple[str, ...], Field(min_length=1)] = ("",)
+    shared: tuple[str, ...] = ()
+
+
+class MemberConfig(StandingConfig):
+    """One member, fitted on traces of all its places.
+
+    Args:
+        structure: What is fitted, with its ``kind``.
+        training: How a network is trained.
+        rest: The output at rest, in its unit.
+        candidates: Fits from different seeds, among which the whole chooses.
+        traces: Estimation traces that it is fitted on, the first so many; all by default.
+    """
+
     structure: StructureField
     training: TrainingConfig | None = None
     rest: float
-    places: tuple[str, ...] = ("",)
-    shared: tuple[str, ...] = ()
     candidates: int = Field(default=1, ge=1)
     traces: int | None = Field(default=None, ge=1)
 
@@ -77,11 +85,10 @@ class MemberConfig(BaseModel):
         return Training(**{"seed": seed, **given})
 
 
-class KnownConfig(BaseModel):
+class KnownConfig(StandingConfig):
     """A member that is declared and not fitted: a weighted sum of its inputs, held between two bounds.
 
     Args:
-        mapping: Inputs and output, such as ``BP+PS -> EM``.
         gains: The weight of each input, in the output's unit per the input's, or its weights by lag (``{0: 2, 1: -1}``
             looks one sample ahead); under the output's own name the weight of its last value: 1 sums up, more is a
             relay with hysteresis.
@@ -92,9 +99,6 @@ class KnownConfig(BaseModel):
         unit: Of the output; a pure number by default.
     """
 
-    model_config = STRICT
-
-    mapping: MappingField
     gains: dict[str, float | Annotated[dict[Annotated[int, Field(ge=0)], float], Field(min_length=1)]]
     constant: float = 0.0
     low: float
@@ -281,11 +285,15 @@ class AssemblyConfig(BaseModel):
     seed: int = Field(default=0, ge=0)
     export: ExportConfig | None = ExportConfig(formats=("onnx", "c"))
 
+    @property
+    def standing(self) -> tuple[StandingConfig, ...]:
+        """All members, the fitted ones first."""
+        return (*self.members, *self.known)
+
     @model_validator(mode="after")
     def _check_outputs(self) -> AssemblyConfig:
         bases = [member.mapping.output for member in self.members]
-        written = [f"{member.mapping.output}{place}" for member in self.members for place in member.places]
-        written += [known.mapping.output for known in self.known]
+        written = [f"{one.mapping.output}{place}" for one in self.standing for place in one.places]
         if len(set(written)) < len(written):
             raise FieldError(
                 "two members write one channel",

@@ -26,13 +26,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.models import NARX, Cascade, Limit, NARXModel, Scaling
+from sysid.models import NARX, Cascade, NARXModel, Scaling
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import KnownConfig
+from sysid.workbench.assembly.members import bounds_of, placed, placed_outputs
 
 
 def known_model(known: KnownConfig, like: Trace, units: Dict[str, str] | None = None) -> NARXModel:
-    """A declared member as a network without neurons, so that it runs and is exported like the others.
+    """A declared member in its first place, as a network without neurons: it runs and is exported like the others.
 
     Args:
         known: What is declared.
@@ -69,17 +70,17 @@ def with_known(known: Sequence[KnownConfig], traces: Sequence[Trace]) -> list[Tr
         traces: Measured traces.
 
     Returns:
-        As many traces, the new channels in the order of the members.
+        As many traces, the new channels in the order of the members, each in all its places.
 
     Raises:
         ConfigError: If the known members cannot be wired.
         ChannelError: If a trace lacks an input.
     """
-    bounds = {member.mapping.output: Limit(low=member.low, high=member.high) for member in known}
-    units = {member.mapping.output: member.unit for member in known}
+    bounds, units = bounds_of(known), {name: member.unit for member in known for name in placed_outputs(member)}
 
     def one(trace: Trace) -> Trace:
-        declared = tuple(known_model(member, trace, units) for member in known)
+        first = [(member, known_model(member, trace, units)) for member in known]
+        declared = tuple(placed(member, model, place) for member, model in first for place in member.places)
         run = Cascade(models=declared, limits=bounds).simulate_trace(trace)
         return replace(
             trace,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from collections.abc import Mapping as Dict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import zip_longest
@@ -12,7 +13,7 @@ import numpy as np
 
 from sysid.models import Cascade, Ends, Limit, Mapping, NARXModel
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.config import AssemblyConfig, KnownConfig, MemberConfig, StandingConfig
 
 _T = TypeVar("_T")
 
@@ -20,7 +21,7 @@ Members = dict[str, NARXModel]
 """The members by the output of their first place, the known ones among them."""
 
 
-def placed_name(member: MemberConfig, channel: str, place: str) -> str:
+def placed_name(member: StandingConfig, channel: str, place: str) -> str:
     """Name of a member's channel in one of its places.
 
     Args:
@@ -34,7 +35,31 @@ def placed_name(member: MemberConfig, channel: str, place: str) -> str:
     return channel if channel in member.shared else f"{channel}{place}"
 
 
-def placed(member: MemberConfig, model: NARXModel, place: str) -> NARXModel:
+def placed_outputs(member: StandingConfig) -> list[str]:
+    """What a member writes, place after place.
+
+    Args:
+        member: The member.
+
+    Returns:
+        As many channels as it has places.
+    """
+    return [placed_name(member, member.mapping.output, place) for place in member.places]
+
+
+def bounds_of(known: Sequence[KnownConfig]) -> dict[str, Limit]:
+    """Between what the known members are held.
+
+    Args:
+        known: The known members.
+
+    Returns:
+        The limit of each of their outputs, in all their places.
+    """
+    return {name: Limit(low=one.low, high=one.high) for one in known for name in placed_outputs(one)}
+
+
+def placed(member: StandingConfig, model: NARXModel, place: str) -> NARXModel:
     """A member's model in one of its places.
 
     Args:
@@ -65,17 +90,15 @@ def assembled(config: AssemblyConfig, models: Members, *, without: str | None = 
     """
     wired = [
         placed(member, models[member.mapping.output], place)
-        for member in config.members
+        for member in config.standing
         if member.mapping.output != without
         for place in member.places
     ]
-    wired += [models[known.mapping.output] for known in config.known]
     outputs = {model.mapping.output for model in wired}
     read = {name for model in wired for name in model.mapping.inputs}
     rest = {name: level for name, level in config.rest.items() if name in outputs | read}
     limits = {name: Limit(low=one.low, high=one.high) for name, one in config.limits.items() if name in outputs}
-    limits |= {known.mapping.output: Limit(low=known.low, high=known.high) for known in config.known}
-    return Cascade(models=tuple(wired), rest=rest, limits=limits)
+    return Cascade(models=tuple(wired), rest=rest, limits=limits | bounds_of(config.known))
 
 
 def dealt(sets: Sequence[Sequence[_T]]) -> list[_T]:
@@ -119,24 +142,37 @@ def in_place(member: MemberConfig, trace: Trace, place: str) -> Trace:
         Its channels under the names of the first place.
     """
     names = (*member.mapping.inputs, member.mapping.output)
-    there = [placed_name(member, name, place) for name in names]
-    channels = tuple(replace(trace.channel(old), name=new) for old, new in zip(there, names, strict=True))
+    return seen_from(place, trace, {name: placed_name(member, name, place) for name in names})
+
+
+def seen_from(place: str, trace: Trace, names: Dict[str, str]) -> Trace:
+    """A trace with the channels of one place under other names.
+
+    Args:
+        place: The place's suffix, which the trace's name gets.
+        trace: A trace of the whole.
+        names: Channel there by the name that it gets.
+
+    Returns:
+        A trace of these channels alone.
+    """
     return Trace(
         name=f"{trace.name} {place}".strip(),
         sample_time=trace.sample_time,
-        channels=channels,
-        values=trace.columns(there),
+        channels=tuple(replace(trace.channel(old), name=new) for new, old in names.items()),
+        values=trace.columns(list(names.values())),
         usable=trace.usable,
         provenance=trace.provenance,
     )
 
 
-def simulated_inputs(cascade: Cascade, traces: Sequence[Trace]) -> list[Trace]:
+def simulated_inputs(cascade: Cascade, traces: Sequence[Trace], only: Collection[str] | None = None) -> list[Trace]:
     """Traces in which every channel that a cascade writes holds its free run.
 
     Args:
         cascade: The cascade, without the member that is to be retrained: its channels stay as measured.
         traces: Measured traces.
+        only: The channels that shall; all that it writes by default.
 
     Returns:
         As many traces, with the same channels.
@@ -146,7 +182,7 @@ def simulated_inputs(cascade: Cascade, traces: Sequence[Trace]) -> list[Trace]:
         run = cascade.simulate_trace(trace)
         values = np.array(trace.values)
         for column, name in enumerate(trace.channel_names):
-            if name in cascade.outputs:
+            if name in (cascade.outputs if only is None else only):
                 values[:, column] = run[name]
         said = (*trace.provenance, "what the other members put out stands for what was measured")
         return replace(trace, values=values, provenance=said)

@@ -7,6 +7,7 @@ import numpy as np
 from sysid.models import NARX, NARXModel, Scaling, parameter_count
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.everywhere import Everywhere
 from sysid.workbench.assembly.known import known_model
 from sysid.workbench.assembly.members import assembled
 from sysid.workbench.assembly.stages import reading_more
@@ -20,7 +21,8 @@ def rehearse(config: AssemblyConfig, like: Trace) -> None:
         like: A trace of the training data, with what the known members say, for units and the sample time.
 
     Raises:
-        ConfigError: If they cannot be wired: in a circle within one sample, for one.
+        ConfigError: If they cannot be wired: in a circle within one sample, for one; or a round cannot be trained
+            everywhere.
         ChannelError: If the trace lacks a channel of a member's first place.
     """
     models = {member.mapping.output: _untaught(member, like) for member in config.members}
@@ -28,6 +30,8 @@ def rehearse(config: AssemblyConfig, like: Trace) -> None:
     whole = assembled(config, models)
     for one in config.together.rounds if config.together else ():
         whole = reading_more(whole, one.reads)
+        if one.everywhere:
+            Everywhere.of(config, one, whole)
 
 
 def _untaught(member: MemberConfig, like: Trace) -> NARXModel:

@@ -42,6 +42,7 @@ class AgainConfig(BaseModel):
         members: Outputs of the members that are trained.
         reads: Channels of others that members read from this round on, as under ``together``.
         measured: As under ``together``; ``[]`` for none any more.
+        everywhere: As under ``together``.
         targets: The error of each output that counts as one, in its unit.
         traces: Estimation traces used, the first so many.
         max_iterations: Of its training.
@@ -55,6 +56,7 @@ class AgainConfig(BaseModel):
     members: tuple[str, ...] | None = Field(default=None, min_length=1)
     reads: Reads = {}
     measured: tuple[str, ...] | None = None
+    everywhere: bool | None = None
     targets: dict[str, float] | None = Field(default=None, min_length=1)
     traces: int | None = Field(default=None, ge=1)
     max_iterations: int | None = Field(default=None, ge=1)
@@ -70,6 +72,9 @@ class TogetherConfig(BaseModel):
         members: Outputs of the members that are trained; all by default.
         measured: Outputs that are as measured while the others are trained, such as a switch: where the free run
             decides when it flips, the loss has an edge there, and no step of the training sees across it.
+        everywhere: Whether the members keep one set of weights for all places where they stand. They are trained in
+            their first place, on traces of every place in turn; what they read from elsewhere is as measured, or as the
+            whole puts it out.
         targets: The error of each output that counts as one, in its unit.
         reads: Channels of other members that members read from here on, beside those of their mappings, with the lags:
             ``{AR: {ER: 1}}``. Their weights begin at zero, so that a circle closes from a chain that runs and cannot
@@ -83,6 +88,7 @@ class TogetherConfig(BaseModel):
 
     members: tuple[str, ...] | None = None
     measured: tuple[str, ...] = ()
+    everywhere: bool = False
     targets: dict[str, float] = Field(min_length=1)
     reads: Reads = {}
     training: JointConfig = Field(default_factory=JointConfig)
@@ -92,6 +98,13 @@ class TogetherConfig(BaseModel):
     @model_validator(mode="after")
     def _check(self) -> TogetherConfig:
         for one in self.rounds:
+            if one.everywhere and not one.members:
+                raise FieldError(
+                    "a round that trains everywhere names no members",
+                    expected="members that stand in the same places",
+                    got="all of them",
+                    remedy="name them under members",
+                )
             both = set(one.measured) & {*(one.members or ()), *one.targets}
             if both:
                 raise FieldError(

@@ -17,6 +17,7 @@ from sysid.estimation.result import Status
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.everywhere import Everywhere
 from sysid.workbench.assembly.members import Members, assembled, own_traces, simulated_inputs, whole_score
 from sysid.workbench.assembly.stage_config import TogetherConfig
 
@@ -216,8 +217,23 @@ def train_together(
         selection: Traces that choose among the states on the way.
 
     Returns:
-        The fit; a member that stood in several places may now differ between them.
+        The fit. A member that stood in several places may now differ between them, unless it was trained everywhere.
+
+    Raises:
+        ConfigError: If the round is to be trained everywhere and cannot.
     """
+    if asked.everywhere:
+        stand = Everywhere.of(config, asked, cascade)
+        fit = fit_cascade(
+            stand.part,
+            stand.traces(estimation[: asked.traces]),
+            targets=asked.targets,
+            trained=[member.mapping.output for member in stand.members],
+            training=asked.training_options(config.seed),
+            selection=stand.traces(selection),
+            on_progress=report,
+        )
+        return replace(fit, model=stand.put(fit.model))
     # What no target depends on would be run, and its sensitivities with it, for nothing.
     part = cascade.upstream_of(asked.targets, given=asked.measured)
     trained = [
