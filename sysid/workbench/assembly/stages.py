@@ -18,7 +18,14 @@ from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
 from sysid.workbench.assembly.everywhere import Everywhere
-from sysid.workbench.assembly.members import Members, assembled, own_traces, simulated_inputs, whole_score
+from sysid.workbench.assembly.members import (
+    Members,
+    assembled,
+    own_traces,
+    placed_outputs,
+    simulated_inputs,
+    whole_score,
+)
 from sysid.workbench.assembly.stage_config import TogetherConfig
 
 Report = Callable[[FitProgress], None]
@@ -236,13 +243,8 @@ def train_together(
         return replace(fit, model=stand.put(fit.model))
     # What no target depends on would be run, and its sensitivities with it, for nothing.
     part = cascade.upstream_of(asked.targets, given=asked.measured)
-    trained = [
-        f"{member.mapping.output}{place}"
-        for member in config.members
-        if (member.mapping.output in asked.members if asked.members else member.mapping.output in part.outputs)
-        for place in member.places
-        if f"{member.mapping.output}{place}" not in asked.measured
-    ]
+    asked_for = [one for one in config.members if not asked.members or one.mapping.output in asked.members]
+    trained = [name for member in asked_for for name in placed_outputs(member) if name in part.outputs]
     fit = fit_cascade(
         part,
         estimation[: asked.traces],
