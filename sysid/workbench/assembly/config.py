@@ -250,7 +250,7 @@ class AssemblyConfig(BaseModel):
         members: The members.
         known: Members that are declared, not fitted; members may read them, and they the members.
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
-        limits: Limits of outputs.
+        limits: Limits of outputs; in its other places a member has those of its first, unless they have their own.
         retrain: Members to train again on what the others put out.
         grow: Growing the training data by what the whole is worst at.
         together: Training end to end.

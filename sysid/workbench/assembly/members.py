@@ -97,8 +97,31 @@ def assembled(config: AssemblyConfig, models: Members, *, without: str | None = 
     outputs = {model.mapping.output for model in wired}
     read = {name for model in wired for name in model.mapping.inputs}
     rest = {name: level for name, level in config.rest.items() if name in outputs | read}
-    limits = {name: Limit(low=one.low, high=one.high) for name, one in config.limits.items() if name in outputs}
+    limits = {name: limit for name, limit in limits_of(config).items() if name in outputs}
     return Cascade(models=tuple(wired), rest=rest, limits=limits | bounds_of(config.known))
+
+
+def limits_of(config: AssemblyConfig) -> dict[str, Limit]:
+    """Between what the members are held: in each place as that is declared, or else as in the first.
+
+    Args:
+        config: The pipeline.
+
+    Returns:
+        The limit of each output that has one; a limit that is a channel is the one at the same place.
+    """
+    found = {}
+    for member in config.members:
+        for place, name in zip(member.places, placed_outputs(member), strict=True):
+            asked = config.limits.get(name)
+            if asked is not None:
+                found[name] = Limit(low=asked.low, high=asked.high)
+            elif (first := config.limits.get(member.mapping.output)) is not None:
+                low, high = (
+                    placed_name(member, one, place) if isinstance(one, str) else one for one in (first.low, first.high)
+                )
+                found[name] = Limit(low=low, high=high)
+    return found
 
 
 def dealt(sets: Sequence[Sequence[_T]]) -> list[_T]:

@@ -67,7 +67,9 @@ def test_a_member_stands_in_all_its_places():
     assert whole.inputs == ("STP",)
     assert whole.member("AR9").mapping.inputs == ("BP9", "STP")
     assert_array_equal(whole.member("AR9").theta, whole.member("AR").theta)
-    assert whole.limits["AR"].high == "BP"
+    assert (whole.limits["AR"].high, whole.limits["AR9"].high) == ("BP", "BP9")
+    own = assembled(config(TWO_PLACES.replace("limits: {", "limits: {AR9: {low: 0, high: STP}, ")), models())
+    assert (own.limits["AR9"].low, own.limits["AR9"].high) == (0, "STP")
 
 
 def test_traces_of_a_member_go_through_its_places_in_turn():
