@@ -65,7 +65,7 @@ class Everywhere:
                 "the round cannot be trained everywhere",
                 where="together, everywhere",
                 expected="members and targets that stand in the same places, two or more",
-                got=f"{', '.join(strangers or there)} beside {members[0].mapping.output} at {len(places)}",
+                got=f"{members[0].mapping.output} at {len(places)}, {', '.join(strangers) or 'nothing'} elsewhere",
                 remedy="give them the same places, or leave everywhere out",
             )
         return cls(

@@ -70,7 +70,8 @@ def placed(member: StandingConfig, model: NARXModel, place: str) -> NARXModel:
     Returns:
         The same model over that place's channels.
     """
-    inputs = tuple(placed_name(member, name, place) for name in member.mapping.inputs)
+    # The model's, not the member's: it may read more than it was fitted with (reads).
+    inputs = tuple(placed_name(member, name, place) for name in model.mapping.inputs)
     return replace(model, mapping=Mapping(inputs=inputs, output=placed_name(member, member.mapping.output, place)))
 
 

@@ -229,31 +229,26 @@ def train_together(
     Raises:
         ConfigError: If the round is to be trained everywhere and cannot.
     """
-    if asked.everywhere:
-        stand = Everywhere.of(config, asked, cascade)
-        fit = fit_cascade(
-            stand.part,
-            stand.traces(estimation[: asked.traces]),
-            targets=asked.targets,
-            trained=[member.mapping.output for member in stand.members],
-            training=asked.training_options(config.seed),
-            selection=stand.traces(selection),
-            on_progress=report,
-        )
-        return replace(fit, model=stand.put(fit.model))
-    # What no target depends on would be run, and its sensitivities with it, for nothing.
-    part = cascade.upstream_of(asked.targets, given=asked.measured)
-    asked_for = [one for one in config.members if not asked.members or one.mapping.output in asked.members]
-    trained = [name for member in asked_for for name in placed_outputs(member) if name in part.outputs]
+    used, stand = estimation[: asked.traces], Everywhere.of(config, asked, cascade) if asked.everywhere else None
+    if stand is not None:
+        part, trained = stand.part, [member.mapping.output for member in stand.members]
+        used, selection = stand.traces(used), stand.traces(selection)
+    else:
+        # What no target depends on would be run, and its sensitivities with it, for nothing.
+        part = cascade.upstream_of(asked.targets, given=asked.measured)
+        asked_for = [one for one in config.members if not asked.members or one.mapping.output in asked.members]
+        trained = [name for member in asked_for for name in placed_outputs(member) if name in part.outputs]
     fit = fit_cascade(
         part,
-        estimation[: asked.traces],
+        used,
         targets=asked.targets,
         trained=trained,
         training=asked.training_options(config.seed),
         selection=selection,
         on_progress=report,
     )
+    if stand is not None:
+        return replace(fit, model=stand.put(fit.model))
     whole = cascade
     for model in fit.model.models:
         whole = whole.with_member(model)

@@ -15,7 +15,7 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.everywhere import Everywhere
 from sysid.workbench.assembly.known import known_model, with_known
 from sysid.workbench.assembly.members import assembled
-from sysid.workbench.assembly.stages import train_together
+from sysid.workbench.assembly.stages import reading_more, train_together
 from sysid.yaml_files import check, parse_yaml
 from tests.models.cascades import network
 
@@ -136,11 +136,21 @@ def test_after_the_round_every_place_has_the_same_new_weights():
         assert_array_equal(fit.model.member(name).theta, before.member(name).theta)
 
 
+def test_what_a_member_has_come_to_read_it_reads_at_its_own_place():
+    """A circle closed in an earlier round, at the first place alone, stands in all of them after the next."""
+    asked, wider = config(), reading_more(whole(), {"AR": {"BC": (1,)}})
+    assert asked.together is not None
+    stand = Everywhere.of(asked, asked.together, wider)
+    found = stand.put(stand.part)
+    assert found.member("AR").mapping.inputs == ("BP", "STP", "BC")
+    assert found.member("AR9").mapping.inputs == ("BP9", "STP", "BC9")
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         pytest.param(("members: [AR, BC]", "members: [BP]"), "cannot be trained everywhere", id="one place"),
-        pytest.param(("targets: {AR: 1", "targets: {BP9: 1"), "BP9 beside AR", id="a target that stands elsewhere"),
+        pytest.param(("targets: {AR: 1", "targets: {BP9: 1"), "AR at 2, BP9 elsewhere", id="a target elsewhere"),
         pytest.param(("  members: [AR, BC]\n", ""), "names no members", id="no members"),
     ],
 )
