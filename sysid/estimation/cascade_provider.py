@@ -19,6 +19,7 @@ from sysid.estimation.provider import AbstractProvider, Linearisation
 from sysid.estimation.soft_margin import counted
 from sysid.estimation.trained_members import TrainedMembers
 from sysid.kernels import cascade as kernel
+from sysid.kernels.cascade_layout import Program
 from sysid.kernels.cascade_sensitivities import sensitivities
 from sysid.models import Cascade, Member
 from sysid.traces import Trace
@@ -224,7 +225,7 @@ class CascadeProvider(AbstractProvider):
         with ThreadPoolExecutor(self.workers) as pool:  # results come in the order of the records: sums do not depend
             yield from pool.map(work, self._records)  # on which thread was first
 
-    def _pass(self, program: kernel.Program, record: _Record, *, keep: bool) -> _Passed:
+    def _pass(self, program: Program, record: _Record, *, keep: bool) -> _Passed:
         n = len(record.values)
         passed = _Passed(
             record.values.copy(),
@@ -241,7 +242,7 @@ class CascadeProvider(AbstractProvider):
         return residual if record.root_weights is None else residual * record.root_weights[:, None]
 
     def _normal_equations(
-        self, program: kernel.Program, record: _Record, n: int
+        self, program: Program, record: _Record, n: int
     ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         passed = self._pass(program, record, keep=True)
         residual = self._residual(record, passed.values)
@@ -279,7 +280,7 @@ class CascadeProvider(AbstractProvider):
         return float(np.median(lengths[lengths > 0.0])) if lengths.any() else 1.0
 
     def _blocks(
-        self, program: kernel.Program, record: _Record, passed: _Passed, n: int
+        self, program: Program, record: _Record, passed: _Passed, n: int
     ) -> Iterator[tuple[slice, list[NDArray[np.float64]]]]:
         """Block by block the counted rows of every target's Jacobian over its error, up to where they are zero."""
         trained, samples = self._trained, len(record.values)

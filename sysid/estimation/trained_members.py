@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.kernels import cascade as kernel
+from sysid.kernels.cascade_layout import Program
 from sysid.models import Cascade, Ends, Member, VectorNARXModel
 from sysid.models.arx import ARXModel
 from sysid.models.cascade_program import Part, program_of
@@ -35,7 +35,7 @@ class TrainedMembers:
     """
 
     members: tuple[Member, ...]
-    program: kernel.Program
+    program: Program
     depth: int
     places: tuple[tuple[slice, slice], ...]
     own_first: NDArray[np.int64]
@@ -81,7 +81,7 @@ class TrainedMembers:
         """The parameters that the trained members have, shape ``(n_parameters,)``."""
         return np.concatenate([self.program.theta[whole] for whole, _ in self.places])
 
-    def program_at(self, theta: NDArray[np.float64]) -> kernel.Program:
+    def program_at(self, theta: NDArray[np.float64]) -> Program:
         """The program with these parameters of the trained members."""
         whole = self.program.theta.copy()
         for place, own in self.places:
@@ -163,7 +163,7 @@ def _places(parts: Sequence[Part], trained: Sequence[bool]) -> tuple[tuple[slice
 
 
 def _extent(
-    program: kernel.Program, source: NDArray[np.int64], trained: Sequence[bool], own: Sequence[slice]
+    program: Program, source: NDArray[np.int64], trained: Sequence[bool], own: Sequence[slice]
 ) -> NDArray[np.int64]:
     extent = np.zeros(len(program.output_channel), dtype=np.int64)
     # The last output of the member that each regressor belongs to: one that reads a later output stands in a circle.

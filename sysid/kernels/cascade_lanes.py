@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, _bounded, _limited, gates_at, in_units
+from sysid.kernels.cascade import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, _bounded, _limited
+from sysid.kernels.cascade_layout import gates_at, in_units
 from sysid.kernels.recursion import tanh_in_place
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -65,26 +66,23 @@ def _products(total, g, n, h):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _outside(total, value, offset, scale, low_bound, high_bound, low, high):
-    """Bring totals to their unit; count the lanes in which something holds them."""
+def _outside(value, low_bound, high_bound, low, high):
+    """Count the lanes in which something holds the value."""
     count = 0
-    for lane in range(len(total)):
-        value[lane] = total[lane] * scale + offset
+    for lane in range(len(value)):
         # Written so that a value that is not a number counts: the slow way keeps it.
-        inside = (total[lane] >= low_bound) & (total[lane] <= high_bound)
+        inside = (value[lane] >= low_bound) & (value[lane] <= high_bound)
         inside &= (value[lane] >= low[lane]) & (value[lane] <= high[lane])
         count += 0 if inside else 1
     return count
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _hold(total, value, codes, offset, scale, low_bound, high_bound, low, high, low_code, high_code):
+def _hold(value, codes, low_bound, high_bound, low, high, low_code, high_code):
     """Hold values within bounds and limits, lane by lane."""
-    for lane in range(len(total)):
-        scaled, code = _bounded(total[lane], low_bound, high_bound)
-        limited, held_by = _limited(scaled * scale + offset, code, low[lane], high[lane], low_code, high_code)
-        value[lane] = limited
-        codes[lane] = held_by
+    for lane in range(len(value)):
+        bounded, code = _bounded(value[lane], low_bound, high_bound)
+        value[lane], codes[lane] = _limited(bounded, code, low[lane], high[lane], low_code, high_code)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -122,10 +120,10 @@ def run(p, depth, rest, lanes, values, held):
     """
     width, most = _sizes(p)
     records, samples, channels = values.shape
-    x, hidden, total = np.zeros((width, lanes)), np.zeros(most * lanes), np.zeros(lanes)
+    x, hidden = np.zeros((width, lanes)), np.zeros(most * lanes)
     h, g = hidden.reshape(most, lanes), np.zeros((most, lanes))
     low, high, codes = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes, dtype=np.int8)
-    theta = in_units(p)
+    theta, bounds = in_units(p)
     # Lanes without a record of their own repeat the last one.
     record = np.minimum(np.arange(lanes), records - 1)
     past = np.zeros((depth + CHUNK, channels, lanes))
@@ -157,20 +155,19 @@ def run(p, depth, rest, lanes, values, held):
             linear = p.theta_first[m + 1] > at + n_y
             for j in range(n_y):
                 o = first_y + j
-                channel, offset, scale = p.output_channel[o], p.output_offset[o], p.output_scale[o]
+                channel = p.output_channel[o]
                 low_code, high_code = _limits(p, o, now_values, low, high)
-                total[:] = theta[at + j]
-                if gates >= 0:
-                    _products(total, g, n, h)
-                else:
-                    _weighted(total, theta, own + n * (n_x + 1) + j * n, n, h)
-                if linear:
-                    _weighted(total, theta, at + n_y + j * n_x, n_x, x)
                 value = now_values[channel]
+                value[:] = theta[at + j]
+                if gates >= 0:
+                    _products(value, g, n, h)
+                else:
+                    _weighted(value, theta, own + n * (n_x + 1) + j * n, n, h)
+                if linear:
+                    _weighted(value, theta, at + n_y + j * n_x, n_x, x)
                 codes[:] = FREE
-                low_bound, high_bound = p.bounds[o, 0], p.bounds[o, 1]
-                if _outside(total, value, offset, scale, low_bound, high_bound, low, high):
-                    _hold(total, value, codes, offset, scale, low_bound, high_bound, low, high, low_code, high_code)
+                if _outside(value, bounds[o, 0], bounds[o, 1], low, high):
+                    _hold(value, codes, bounds[o, 0], bounds[o, 1], low, high, low_code, high_code)
                 for lane in range(records):
                     values[lane, t, channel] = value[lane]
                     held[lane, t, o] = codes[lane]

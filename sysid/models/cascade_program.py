@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.kernels.cascade import Program
+from sysid.kernels.cascade_layout import Program
 from sysid.models.lags import Lags
 from sysid.models.recursion import Recursion
 from sysid.models.vector_narx import VectorNARXModel

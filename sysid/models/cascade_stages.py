@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels import cascade as kernel
+from sysid.kernels.cascade_layout import Program
 from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit, Part, program_of
 from sysid.models.history import History
@@ -31,7 +32,7 @@ class CompiledStage:
 
     n_outputs: int
     depth: int
-    program: kernel.Program
+    program: Program
 
     def run(self, levels: NDArray[np.float64], values: NDArray[np.float64], held: NDArray[np.int8]) -> None:
         """Run over one record.

@@ -1,0 +1,265 @@
+r"""How the members of a cascade are laid out for the pass over the samples.
+
+A program holds the parameters of all members as they were fitted, each in its own scaled numbers. The pass reads and
+writes channels in their units: what scales them stands in the weights. Where a member reads :math:`x = (u - o) / s`,
+the weights :math:`W / s` act on :math:`u` itself, and the constants lose :math:`W o / s`; where it puts out :math:`y`
+as :math:`s y + o`, its readouts, gates and linear part are :math:`s` times as large. So nothing is scaled sample by
+sample, and what several members read stands there for all of them as soon as it is known.
+
+Members that do not read each other at the same sample make a level, and run side by side: what they wait for, such as
+the hyperbolic tangents of their neurons, they wait for once.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sysid.kernels.registers import LANES
+
+
+class Program(NamedTuple):
+    """Members and their wiring as flat tables.
+
+    Attributes:
+        theta: Parameters of all members, one after the other.
+        theta_first: Where each member's begin; one more entry than members.
+        neurons: Neurons of each member.
+        regressor_first: Where each member's regressors begin; one more entry than members.
+        regressor_channel: Column of ``values`` that each regressor reads.
+        regressor_lag: Its lag in samples.
+        regressor_offset: In the channel's unit.
+        regressor_scale: In the channel's unit.
+        output_first: Where each member's outputs begin among all; one more entry than members.
+        output_channel: Column of ``values`` of each output.
+        output_offset: In the channel's unit.
+        output_scale: In the channel's unit.
+        bounds: Lower and upper bound of each output in scaled numbers, shape ``(n_outputs, 2)``.
+        limits: Lower and upper limit of each output in its unit, shape ``(n_outputs, 2)``; infinite for none.
+        limit_channel: Column of ``values`` that is the limit instead, shape ``(n_outputs, 2)``; -1 for none.
+    """
+
+    theta: NDArray[np.float64]
+    theta_first: NDArray[np.int64]
+    neurons: NDArray[np.int64]
+    regressor_first: NDArray[np.int64]
+    regressor_channel: NDArray[np.int64]
+    regressor_lag: NDArray[np.int64]
+    regressor_offset: NDArray[np.float64]
+    regressor_scale: NDArray[np.float64]
+    output_first: NDArray[np.int64]
+    output_channel: NDArray[np.int64]
+    output_offset: NDArray[np.float64]
+    output_scale: NDArray[np.float64]
+    bounds: NDArray[np.float64]
+    limits: NDArray[np.float64]
+    limit_channel: NDArray[np.int64]
+
+
+class Layout(NamedTuple):
+    """A program as the pass over the samples reads it.
+
+    Attributes:
+        theta: Parameters as they act between channels in their units, in the program's order.
+        bounds: Of each output in its unit, shape ``(n_outputs, 2)``.
+        order: Members level by level.
+        level_first: Where each level begins among them; one more entry than levels.
+        weights: Of neurons and gates in blocks (``sysid/kernels/registers.py``), members in the order of ``order``.
+        hidden_first: Where those of each member's neurons begin.
+        gates_first: Where those of its gates begin; -1 for a member without.
+        blocks: Blocks of neurons of each member.
+        neuron_first: Where each member's neurons stand among all, with their padding.
+        readout: Readouts of all outputs; gates write theirs anew at every sample.
+        readout_first: Where each output's begin.
+        order_y: Outputs level by level.
+        level_first_y: Where each level begins among them; one more entry than levels.
+        member: The member of each output.
+        constant: Where the constant of each output stands in ``theta``.
+        linear_first: Where its linear part begins in ``theta``; -1 for none.
+    """
+
+    theta: NDArray[np.float64]
+    bounds: NDArray[np.float64]
+    order: NDArray[np.int64]
+    level_first: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    hidden_first: NDArray[np.int64]
+    gates_first: NDArray[np.int64]
+    blocks: NDArray[np.int64]
+    neuron_first: NDArray[np.int64]
+    readout: NDArray[np.float64]
+    readout_first: NDArray[np.int64]
+    order_y: NDArray[np.int64]
+    level_first_y: NDArray[np.int64]
+    member: NDArray[np.int64]
+    constant: NDArray[np.int64]
+    linear_first: NDArray[np.int64]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def padded(n):
+    """Neurons with their padding."""
+    return (n + LANES - 1) // LANES * LANES
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gates_at(theta_first, m, n, n_x, n_y):
+    """Where the gates of a member stand in the parameters; -1 for a member without."""
+    first = theta_first[m] + n * (n_x + 1 + n_y) + n_y + n_y * n_x
+    return first if theta_first[m + 1] > first else -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def in_units(p):
+    """All members' parameters as they act between channels in their units, laid out as ``theta``, and the bounds."""
+    theta = p.theta.copy()
+    for m in range(len(p.neurons)):
+        n, at = p.neurons[m], p.theta_first[m]
+        first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
+        n_y = p.output_first[m + 1] - p.output_first[m]
+        gates, readout = gates_at(p.theta_first, m, n, n_x, n_y), at + n * (n_x + 1)
+        constants = readout + n * n_y
+        linear = p.theta_first[m + 1] > constants + n_y
+        for i in range(n_x):
+            offset, scale = p.regressor_offset[first_x + i], p.regressor_scale[first_x + i]
+            for k in range(n):
+                theta[at + k * n_x + i] /= scale
+                theta[at + n * n_x + k] -= theta[at + k * n_x + i] * offset
+                if gates >= 0:
+                    theta[gates + k * n_x + i] /= scale
+                    theta[readout + k] -= theta[gates + k * n_x + i] * offset
+            for j in range(n_y if linear else 0):
+                theta[constants + n_y + j * n_x + i] /= scale
+                theta[constants + j] -= theta[constants + n_y + j * n_x + i] * offset
+        if gates >= 0:
+            theta[gates : gates + n * n_x] *= p.output_scale[p.output_first[m]]
+        for j in range(n_y):
+            offset, scale = p.output_offset[p.output_first[m] + j], p.output_scale[p.output_first[m] + j]
+            theta[readout + j * n : readout + (j + 1) * n] *= scale
+            theta[constants + j] = theta[constants + j] * scale + offset
+            if linear:
+                theta[constants + n_y + j * n_x : constants + n_y + (j + 1) * n_x] *= scale
+    return theta, p.bounds * p.output_scale[:, np.newaxis] + p.output_offset[:, np.newaxis]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _reads(p, m, other):
+    """Whether a member reads another at the same sample."""
+    for o in range(p.output_first[other], p.output_first[other + 1]):
+        for i in range(p.regressor_first[m], p.regressor_first[m + 1]):
+            if p.regressor_lag[i] == 0 and p.regressor_channel[i] == p.output_channel[o]:
+                return True
+        for i in range(p.output_first[m], p.output_first[m + 1]):
+            if p.limit_channel[i, 0] == p.output_channel[o] or p.limit_channel[i, 1] == p.output_channel[o]:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _levels(p):
+    """Members level by level, those of one level independent of each other, and where each level begins."""
+    members = len(p.neurons)
+    level = np.zeros(members, dtype=np.int64)
+    for m in range(members):
+        for other in range(m):
+            if _reads(p, m, other):
+                level[m] = max(level[m], level[other] + 1)
+    order, first = np.empty(members, dtype=np.int64), np.zeros(level.max() + 2, dtype=np.int64)
+    at = 0
+    for one in range(len(first) - 1):
+        for m in range(members):
+            if level[m] == one:
+                order[at] = m
+                at += 1
+        first[one + 1] = at
+    return order, first
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _put(weights, first, theta, rows_at, constants_at, n, n_x):
+    """Put weights and constants of neurons or gates into blocks; where the next begin."""
+    for k in range(n):
+        own = first + k // LANES * LANES * (n_x + 1) + k % LANES
+        for i in range(n_x):
+            weights[own + LANES * i] = theta[rows_at + k * n_x + i]
+        weights[own + LANES * n_x] = theta[constants_at + k]
+    return first + padded(n) * (n_x + 1)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _in_blocks(p, theta, order):
+    """Weights and readouts of all members in the order in which they run, in blocks of neurons padded with zeros."""
+    members, size, read = len(p.neurons), 0, 0
+    for m in range(members):
+        n, n_x = padded(p.neurons[m]), p.regressor_first[m + 1] - p.regressor_first[m]
+        size += 2 * n * (n_x + 1)
+        read += n * (p.output_first[m + 1] - p.output_first[m])
+    weights, readout, readout_first = np.zeros(size), np.zeros(read), np.zeros(len(p.output_channel), dtype=np.int64)
+    hidden_first, gates_first, neuron_first = np.zeros((3, members), dtype=np.int64)
+    at, at_neuron, at_readout = 0, 0, 0
+    for m in order:
+        n_x, n_y = p.regressor_first[m + 1] - p.regressor_first[m], p.output_first[m + 1] - p.output_first[m]
+        n, own = p.neurons[m], p.theta_first[m]
+        gates, v = gates_at(p.theta_first, m, n, n_x, n_y), own + n * (n_x + 1)
+        hidden_first[m], gates_first[m], neuron_first[m] = at, -1, at_neuron
+        at = _put(weights, at, theta, own, own + n * n_x, n, n_x)
+        at_neuron += padded(n)
+        if gates >= 0:
+            gates_first[m] = at
+            at = _put(weights, at, theta, gates, v, n, n_x)
+        for j in range(n_y):
+            readout_first[p.output_first[m] + j] = at_readout
+            readout[at_readout : at_readout + n] = theta[v + j * n : v + (j + 1) * n]
+            at_readout += padded(n)
+    return weights, hidden_first, gates_first, neuron_first, readout, readout_first
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _by_output(p, order, level_first):
+    """Outputs level by level, where each level begins, and of each its member, its constant and its linear part."""
+    outputs = len(p.output_channel)
+    order_y, level_first_y = np.empty(outputs, dtype=np.int64), np.zeros(len(level_first), dtype=np.int64)
+    member, constant, linear_first = np.empty((3, outputs), dtype=np.int64)
+    at = 0
+    for level in range(len(level_first) - 1):
+        for m in order[level_first[level] : level_first[level + 1]]:
+            n, n_x = p.neurons[m], p.regressor_first[m + 1] - p.regressor_first[m]
+            n_y = p.output_first[m + 1] - p.output_first[m]
+            own = p.theta_first[m] + n * (n_x + 1 + n_y)
+            for j in range(n_y):
+                o = p.output_first[m] + j
+                order_y[at], member[o], constant[o] = o, m, own + j
+                linear_first[o] = own + n_y + j * n_x if p.theta_first[m + 1] > own + n_y else -1
+                at += 1
+        level_first_y[level + 1] = at
+    return order_y, level_first_y, member, constant, linear_first
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def laid_out(p):
+    """The layout of a program."""
+    theta, bounds = in_units(p)
+    order, level_first = _levels(p)
+    weights, hidden_first, gates_first, neuron_first, readout, readout_first = _in_blocks(p, theta, order)
+    order_y, level_first_y, member, constant, linear_first = _by_output(p, order, level_first)
+    return Layout(
+        theta,
+        bounds,
+        order,
+        level_first,
+        weights,
+        hidden_first,
+        gates_first,
+        padded(p.neurons) // LANES,
+        neuron_first,
+        readout,
+        readout_first,
+        order_y,
+        level_first_y,
+        member,
+        constant,
+        linear_first,
+    )

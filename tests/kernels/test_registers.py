@@ -1,0 +1,64 @@
+"""Sums in vector registers against the same in NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import njit
+from numba.core.errors import TypingError
+from numpy.testing import assert_allclose
+
+from sysid.kernels.registers import LANES, affine, dot
+
+
+@njit
+def _affine(weights, first, n_x, x, out):
+    """As many blocks as there is room for from ``first`` on."""
+    affine(weights, first, n_x, x, out, first, (len(out) - first) // LANES)
+
+
+@njit
+def _dot(left, left_first, right, right_first, blocks):
+    return dot(left, left_first, right, right_first, blocks)
+
+
+@given(n_x=st.integers(0, 30), blocks=st.integers(0, 6), first=st.integers(0, 5), seed=st.integers(0, 2**32 - 1))
+def test_affine_functions_of_blocks_of_neurons(n_x, blocks, first, seed):
+    rng = np.random.default_rng(seed)
+    weights, x = rng.normal(size=(blocks, n_x + 1, LANES)), rng.normal(size=n_x + 3)
+    out = np.full(first + LANES * blocks + 1, 7.0)
+
+    _affine(np.concatenate([np.full(first, np.nan), weights.ravel()]), first, n_x, x, out)
+
+    expected = weights[:, n_x] + np.einsum("bik,i->bk", weights[:, :n_x], x[:n_x])
+    assert_allclose(out[first:-1], expected.ravel(), rtol=1e-12, atol=1e-12)
+    assert np.all(out[:first] == 7.0), "nothing before the first neuron is written"
+    assert out[-1] == 7.0, "nor behind the last"
+
+
+@given(blocks=st.integers(0, 6), a=st.integers(0, 5), b=st.integers(0, 5), seed=st.integers(0, 2**32 - 1))
+def test_sums_of_products(blocks, a, b, seed):
+    rng = np.random.default_rng(seed)
+    n = LANES * blocks
+    left, right = rng.normal(size=a + n), rng.normal(size=b + n)
+
+    assert _dot(left, a, right, b, blocks) == pytest.approx(left[a:] @ right[b:], rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_not_a_number_stays_so(value):
+    x = np.array([1.0, value])
+    out = np.zeros(LANES)
+
+    _affine(np.ones(3 * LANES), 0, 2, x, out)
+
+    assert_allclose(out, np.full(LANES, value))
+
+
+def test_numbers_of_another_kind_are_refused():
+    with pytest.raises(TypingError, match=r"right: expected a contiguous array of float64, got array\(float32"):
+        _dot(np.ones(LANES), 0, np.ones(LANES, dtype=np.float32), 0, 1)
+    with pytest.raises(TypingError, match="x: expected a contiguous array of float64"):
+        _affine(np.ones(3 * LANES), 0, 2, np.ones(4)[::2], np.zeros(LANES))
