@@ -1,11 +1,11 @@
 """Run time of cascades against the compiled reference: one car and fifty, 3 and 101 vehicles, warm and cold.
 
 Run with ``python -m tests.benchmarks assembly``. Not collected by pytest. The cascades have random weights of the size
-of fitted ones (their run time does not depend on the values); ``--line=runs/whole-train`` measures a fitted line of
-that run folder at every place too. The same 2,000 s of command go into everything; each
-figure is the median of repeats after one run that warms up. Beside the wall time stands the processor time of all
-threads: on a machine that others use, ratios of processor times are the ones that hold. Divided among cores they are a
-projection, that of a machine which is otherwise idle.
+of fitted ones (their run time does not depend on the values); ``--whole=runs/combined-brake`` measures the fitted
+assembly of that run folder too, ``--line=runs/whole-train`` its fitted line at every place. The same 2,000 s of command
+go into everything; each figure is the median of repeats after one run that warms up. Beside the wall time stands the
+processor time of all threads: on a machine that others use, ratios of processor times are the ones that hold. Divided
+among cores they are a projection, that of a machine which is otherwise idle.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from sysid.models import (
     parameter_count,
     simulate_family,
 )
-from sysid.workbench.assembly.runner import read_line
+from sysid.workbench.assembly.runner import read_assembly, read_line
 
 DURATION, CARS, WORKERS = 2000.0, 50, 2
 ROWS = [[0, 90], [100, 84], [300, 90], [500, 70], [800, 90], [1100, 64.2], [1300, 90], [1700, 0], [1800, 90]]
@@ -149,6 +149,30 @@ def command() -> np.ndarray:
     return rows[np.searchsorted(rows[:, 0], times, side="right") - 1, 1][:, np.newaxis]
 
 
+def beside_targets(figures: dict[str, str]) -> None:
+    """A line for each figure."""
+    for what, figure in figures.items():
+        print(f"  {what:<48} {figure:<60} (target {TARGETS[what]})")
+
+
+def one_car(single: Taken, small: Taken, large: Taken) -> dict[str, str]:
+    """The figures of an assembly of one car."""
+    return {
+        "one car, 2,000 s, one core": f"{1e3 * single.wall:.1f} ms wall, {1e3 * single.processor:.1f} ms processor",
+        "against the reference of 3 vehicles": ratio(small, single),
+        "against the reference of 101 vehicles": ratio(large, single),
+    }
+
+
+def fitted_whole(folder: Path, u: np.ndarray, small: Taken, large: Taken) -> None:
+    """A fitted assembly beside the reference."""
+    whole = read_assembly(folder)
+    single = taken(lambda: whole.simulate(u), 15)
+    print(f"\n{folder.name}, fitted: {len(whole.models)} members, {whole.n_parameters} parameters")
+    show(f"{folder.name}, one car", single)
+    beside_targets(one_car(single, small, large))
+
+
 def fitted_line(folder: Path, u: np.ndarray, large: Taken) -> None:
     """A fitted line at every place, beside the reference of 101 vehicles; its handle never asks for an emergency."""
     line, places = read_line(folder).line, np.arange(1.0, CARS + 1.0)
@@ -160,8 +184,7 @@ def fitted_line(folder: Path, u: np.ndarray, large: Taken) -> None:
         "50 cars, 2,000 s, two cores": f"{batch.wall:.3f} s wall, {batch.processor:.3f} s processor over both",
         "50 cars against the reference of 101 vehicles": ratio(large, batch, cores=WORKERS),
     }
-    for what, figure in figures.items():
-        print(f"  {what:<48} {figure:<60} (target {TARGETS[what]})")
+    beside_targets(figures)
 
 
 def main() -> None:
@@ -197,15 +220,13 @@ def main() -> None:
             f"{name}, {CARS} cars, a model for each, {WORKERS} threads",
             lambda family=family, shared=shared: simulate_family(family, shared, workers=WORKERS), 5,
         )  # fmt: skip
-        figures = {
-            "one car, 2,000 s, one core": f"{1e3 * single.wall:.1f} ms wall, {1e3 * single.processor:.1f} ms processor",
-            "against the reference of 3 vehicles": ratio(small, single),
-            "against the reference of 101 vehicles": ratio(large, single),
+        figures = one_car(single, small, large) | {
             "50 cars, 2,000 s, two cores": f"{batch.wall:.3f} s wall, {batch.processor:.3f} s processor over both",
             "50 cars against the reference of 101 vehicles": ratio(large, batch, cores=WORKERS),
         }
-        for what, figure in figures.items():
-            print(f"  {what:<48} {figure:<60} (target {TARGETS[what]})")
+        beside_targets(figures)
+    for folder in (word.removeprefix("--whole=") for word in sys.argv[1:] if word.startswith("--whole=")):
+        fitted_whole(Path(folder), u, small, large)
     for folder in (word.removeprefix("--line=") for word in sys.argv[1:] if word.startswith("--line=")):
         fitted_line(Path(folder), u, large)
     print(f"\ncold, kernels compiled before: {cold(None)}")

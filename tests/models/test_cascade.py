@@ -226,27 +226,27 @@ def check_records(cascade, inputs, **options):
 
 @pytest.mark.parametrize("name", [name for name in CASCADES if name not in {"a linear member", "no neurons"}])
 def test_records_in_lockstep_are_the_records_one_by_one(name):
-    # 27 records: two groups, whose last lanes have no record of their own; several chunks of samples.
+    # 35 records: two groups, whose last lanes have no record of their own; several chunks of samples.
     cascade = CASCADES[name]
-    inputs = np.stack([command(300, len(cascade.inputs), seed) for seed in range(27)])
+    inputs = np.stack([command(300, len(cascade.inputs), seed) for seed in range(35)])
     batch = check_records(cascade, inputs)
     if cascade.limits:
         assert np.count_nonzero(batch.held) > 100
 
 
-@pytest.mark.parametrize("n", [1, 5, 12])
+@pytest.mark.parametrize("n", [1, 5, 16])
 def test_few_records_are_the_records_one_by_one(n):
     check_records(CASCADES["limits"], np.stack([command(seed=seed) for seed in range(n)]), workers=1)
 
 
 def test_many_records_of_a_model_with_a_state_of_its_own():
     cascade = Cascade(models=(lag("STP -> BP"), network("BP -> BC", seed=3)))
-    check_records(cascade, np.stack([command(seed=seed) for seed in range(30)]))
+    check_records(cascade, np.stack([command(seed=seed) for seed in range(34)]))
 
 
 def test_a_value_that_is_not_a_number_stays_in_its_record():
     cascade = service()
-    inputs = np.stack([command(seed=seed) for seed in range(30)])
+    inputs = np.stack([command(seed=seed) for seed in range(34)])
     inputs[3, 50:] = np.nan
     batch = cascade.simulate_batch(inputs)
     assert np.isnan(batch["BC"][3, 60:]).all()
