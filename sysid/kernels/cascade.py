@@ -18,8 +18,7 @@ import numpy as np
 from numba import njit
 
 from sysid.kernels.cascade_layout import laid_out
-from sysid.kernels.recursion import tanh_in_place
-from sysid.kernels.registers import LANES, affine, dot
+from sysid.kernels.registers import LANES, affine, dot, tanh
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -106,7 +105,7 @@ def _walk(p, layout, values, past, at_sample, kept, held):
                         total += theta[linear_first[o] + i] * x[i]
                     linear[o] = total
             if high_h > 0:
-                tanh_in_place(h[low_h:high_h])
+                tanh(h, low_h, high_h - low_h)
             for q in range(level_first_y[level], level_first_y[level + 1]):
                 o = order_y[q]
                 total = theta[constant[o]]

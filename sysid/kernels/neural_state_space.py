@@ -35,7 +35,7 @@ import math
 import numpy as np
 from numba import njit
 
-from sysid.kernels.recursion import tanh_in_place
+from sysid.kernels.registers import tanh
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -57,7 +57,7 @@ def _activate(weights_columns, z, cubic, h, slope):
         for j in range(k):
             h[j] = h[j] * slope[j] / 3.0
     else:
-        tanh_in_place(h)
+        tanh(h, 0, k)
         for j in range(k):
             slope[j] = 1.0 - h[j] * h[j]
 

@@ -43,54 +43,10 @@ import math
 import numpy as np
 from numba import njit
 
+from sysid.kernels.registers import tanh
+
 # Sums may be reordered, which is what lets the compiler vectorise them; NaN and infinity keep their meaning.
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
-
-
-_CENTRE = 0.3125
-_SHIFT = math.exp(-_CENTRE)
-_TAYLOR = tuple((-1.0) ** n / math.factorial(n) for n in range(13))
-
-
-# With Python's rule for division by zero the loop would have a way out, and would not be vectorised.
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def tanh_in_place(a):
-    r"""Replace each entry by its hyperbolic tangent, in a form that the compiler vectorises.
-
-    The library's tanh is a call per number and takes three quarters of a free run's time. Here
-    :math:`\tanh |x| = (1-t)/(1+t)` with :math:`t = e^{-2|x|}`, and :math:`t = (e^{-w})^{64}` by six squarings, with
-    :math:`w = 2|x|/64` at most 0.625 because :math:`2|x|` is cut at 40, beyond which tanh is 1 in double precision.
-    A Taylor polynomial of degree 12 around the middle has a truncation error of 4e-17; the squarings raise the
-    rounding of ``t`` to some 64 units, and the largest error found over the line is 1.4e-14 (tests).
-
-    Args:
-        a: Shape ``(n,)``; NaN stays NaN.
-    """
-    for k in range(len(a)):
-        x = a[k]
-        z = 2.0 * abs(x)
-        w = (z if not z > 40.0 else 40.0) / 64.0 - _CENTRE
-        e = _TAYLOR[12]
-        e = e * w + _TAYLOR[11]
-        e = e * w + _TAYLOR[10]
-        e = e * w + _TAYLOR[9]
-        e = e * w + _TAYLOR[8]
-        e = e * w + _TAYLOR[7]
-        e = e * w + _TAYLOR[6]
-        e = e * w + _TAYLOR[5]
-        e = e * w + _TAYLOR[4]
-        e = e * w + _TAYLOR[3]
-        e = e * w + _TAYLOR[2]
-        e = e * w + _TAYLOR[1]
-        e = e * w + _TAYLOR[0]
-        e *= _SHIFT
-        e *= e
-        e *= e
-        e *= e
-        e *= e
-        e *= e
-        e *= e
-        a[k] = math.copysign((1.0 - e) / (1.0 + e), x)
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
@@ -154,7 +110,7 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
             for i in range(n_x):
                 total += w[i] * x[i]
         _affine(W_columns, b, x, h)
-        tanh_in_place(h)
+        tanh(h, 0, n_neurons)
         if gated:
             _affine(V_columns, v, x, g)
         for k in range(n_neurons):
@@ -232,7 +188,7 @@ def activations(
                 total += w[i] * x[i]
         row = h[t]
         _affine(W_columns, b, x, row)
-        tanh_in_place(row)
+        tanh(row, 0, n_neurons)
         if gated:
             _affine(V_columns, v, x, g)
         # A loop that sums and writes is guarded by a check for overlapping memory, and takes another order of summation

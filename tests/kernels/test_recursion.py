@@ -1,16 +1,10 @@
 """The compiled recursion against finite differences, NumPy and its own formula."""
 
-import re
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from numba import njit
 from numpy.testing import assert_allclose
 
 from sysid.estimation.provider import BLOCK, Experiment, RecursionProvider
-from sysid.kernels.recursion import tanh_in_place
 from sysid.models import NARX, History, Recursion, Scaling, parameter_count
 from sysid.testing import finite_difference_jacobian, simulate
 
@@ -159,32 +153,3 @@ def test_a_clipped_output_has_no_sensitivity():
 def test_a_loss_that_is_not_a_number_is_infinite():
     provider = a_provider(NARX(input_delays=1, output_delays=1, neurons=2), closed=True)
     assert provider.loss(np.full(len(provider.template.theta), np.nan)) == np.inf
-
-
-@given(st.lists(st.floats(allow_nan=False), min_size=1, max_size=50))
-def test_tanh_is_right_to_fifteen_decimals(values):
-    x = np.array(values)
-    a = x.copy()
-    tanh_in_place(a)
-    assert_allclose(a, np.tanh(x), rtol=0.0, atol=1.5e-14)
-
-
-def test_tanh_over_the_line_and_of_what_is_not_a_number():
-    x = np.linspace(-25.0, 25.0, 200_001)
-    a = x.copy()
-    tanh_in_place(a)
-    assert np.abs(a - np.tanh(x)).max() < 1.5e-14
-    special = np.array([np.inf, -np.inf, np.nan, 0.0])
-    tanh_in_place(special)
-    assert special[:2].tolist() == [1.0, -1.0]
-    assert np.isnan(special[2])
-    assert special[3] == 0.0
-
-
-def test_tanh_is_vectorised():
-    # What decides it is easily lost without a trace: a rule for division by zero once kept the loop scalar.
-    options = {key: tanh_in_place.targetoptions[key] for key in ("nogil", "fastmath", "error_model")}
-    compiled = njit(**options)(tanh_in_place.py_func)
-    compiled(np.zeros(8))
-    (code,) = compiled.inspect_llvm().values()
-    assert re.search(r"fdiv[^\n]*<\d+ x double>", code)

@@ -10,13 +10,19 @@ from numba import njit
 from numba.core.errors import TypingError
 from numpy.testing import assert_allclose
 
-from sysid.kernels.registers import LANES, affine, dot
+from sysid.kernels.registers import LANES, affine, dot, tanh
 
 
 @njit
 def _affine(weights, first, n_x, x, out):
     """As many blocks as there is room for from ``first`` on."""
     affine(weights, first, n_x, x, out, first, (len(out) - first) // LANES)
+
+
+# As the kernels are compiled: a compiler that may reorder sums takes a rounding out that is written as two of them.
+@njit(fastmath={"reassoc", "contract", "arcp", "nsz"}, error_model="numpy")
+def _tanh(a, first, n):
+    tanh(a, first, n)
 
 
 @njit
@@ -62,3 +68,29 @@ def test_numbers_of_another_kind_are_refused():
         _dot(np.ones(LANES), 0, np.ones(LANES, dtype=np.float32), 0, 1)
     with pytest.raises(TypingError, match="x: expected a contiguous array of float64"):
         _affine(np.ones(3 * LANES), 0, 2, np.ones(4)[::2], np.zeros(LANES))
+
+
+@given(st.lists(st.floats(-50.0, 50.0), max_size=40), st.integers(0, 3))
+def test_tanh_is_right_to_the_last_digit_but_one(values, first):
+    x = np.array([3.0] * first + values + [3.0])
+    a = x.copy()
+
+    _tanh(a, first, len(values))
+
+    assert_allclose(a[first:-1], np.tanh(values), rtol=0.0, atol=2.3e-16)
+    assert a[-1] == 3.0
+    assert np.all(a[:first] == 3.0), "only the numbers that were named are replaced"
+
+
+def test_tanh_over_the_line_and_of_what_is_not_a_number():
+    x = np.linspace(-25.0, 25.0, 200_001)
+    a = x.copy()
+    _tanh(a, 0, len(a))
+    assert np.abs(a - np.tanh(x)).max() < 2.3e-16
+    assert np.all(np.diff(a) >= -2.3e-16)
+
+    special = np.array([np.inf, -np.inf, np.nan, 0.0, -0.0, 1e300, -1e-300])
+    _tanh(special, 0, len(special))
+    assert special[:2].tolist() == [1.0, -1.0]
+    assert np.isnan(special[2])
+    assert special[3:].tolist() == [0.0, 0.0, 1.0, 0.0]
