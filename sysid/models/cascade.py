@@ -60,7 +60,7 @@ class Cascade:
     kind = "Cascade"
 
     def __post_init__(self) -> None:
-        wiring = Wiring.of(tuple(self.models))
+        wiring = Wiring.of(tuple(self.models), {name: limit.channels for name, limit in self.limits.items()})
         object.__setattr__(self, "models", tuple(self.models[i] for i in wiring.order))
         _check_circles(self.models, wiring)
         object.__setattr__(self, "rest", dict(self.rest))

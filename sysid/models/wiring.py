@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -93,11 +94,12 @@ class Wiring:
     units: dict[str, str]
 
     @classmethod
-    def of(cls, models: Sequence[Member]) -> Wiring:
+    def of(cls, models: Sequence[Member], limits: Dict[str, Collection[str]] | None = None) -> Wiring:
         """Wire models.
 
         Args:
             models: In any order.
+            limits: Channels that limit an output at the same sample, by output: they are computed before it.
 
         Returns:
             The wiring.
@@ -113,7 +115,7 @@ class Wiring:
         faults += [] if models else ["there is no model"]
         if len({model.sample_time for model in models}) > 1:
             faults.append("the sample times differ")
-        order = () if faults else _order(ends, faults)
+        order = () if faults else _order(ends, limits or {}, faults)
         if faults:
             raise ConfigError(
                 "the models cannot be wired",
@@ -162,10 +164,11 @@ def _units(ends: Sequence[Ends]) -> tuple[dict[str, str], list[str]]:
     return units, faults
 
 
-def _order(ends: Sequence[Ends], faults: list[str]) -> tuple[int, ...]:
-    """First the first model, in the order given, whose inputs of now are all known; then again, until none is left."""
+def _order(ends: Sequence[Ends], limits: Dict[str, Collection[str]], faults: list[str]) -> tuple[int, ...]:
+    """First the first model, in the order given, whose inputs and limits of now are known; then again, to the last."""
     owner = {name: i for i, end in enumerate(ends) for name in end.outputs}
-    reads = [{owner[name] for name in end.direct if name in owner} for end in ends]
+    needs = [end.direct.union(*(limits.get(name, ()) for name in end.outputs)) for end in ends]
+    reads = [{owner[name] for name in some if name in owner} for some in needs]
     order: list[int] = []
     while len(order) < len(ends):
         ready = [i for i in range(len(ends)) if i not in order and reads[i] <= set(order)]

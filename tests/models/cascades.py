@@ -66,6 +66,20 @@ def linear(text: str) -> ARXModel:
     )
 
 
+def at_most(text: str, *, above: float) -> ARXModel:
+    """What a channel was a sample ago, and so much more: how fast it may rise."""
+    return ARXModel(
+        orders=ARX(na=0, nb=(1,), nk=(1,)),
+        coefficients=np.array([1.0]),
+        intercept=above,
+        mapping=Mapping.parse(text),
+        sample_time=0.1,
+        input_units=("psi",),
+        output_unit="psi",
+        rest_output=90.0,
+    )
+
+
 def block(
     text: str, *, seed: int = 0, neurons: int = 4, output_delays=(1, 2), feedthrough: bool = True
 ) -> VectorNARXModel:
@@ -108,6 +122,9 @@ CASCADES = {
     "limits": Cascade(
         models=service().models,
         limits={"BC": Limit(low=0.0, high="BP"), "AR": Limit(high="BP"), "BP": Limit(low=70.0, high=82.0)},
+    ),
+    "a limit made of what it limits, a sample ago": Cascade(
+        models=(*service().models, at_most("AR -> x", above=0.4)), limits={"AR": Limit(low=40.0, high="x")}
     ),
     "a linear member": Cascade(
         models=(network("STP -> BP", seed=1), linear("BP -> AR"), network("BP+AR -> BC", seed=5))

@@ -96,13 +96,28 @@ def test_a_circle_is_named_by_its_members():
         Cascade(models=models)
 
 
+def test_a_limit_is_computed_before_what_it_limits():
+    cascade = CASCADES["a limit made of what it limits, a sample ago"]
+    assert cascade.outputs == ("BP", "x", "AR", "BC")
+    run = cascade.simulate(command())
+    assert np.diff(run["AR"]).max() == pytest.approx(0.4), "AR rises no faster than declared"
+    assert run.activity["AR"].high > 5
+
+
+def test_a_limit_that_needs_what_it_limits_at_the_same_sample_is_refused():
+    with pytest.raises(ConfigError, match=r"a circle: (AR needs BP, BP needs AR|BP needs AR, AR needs BP)"):
+        replace(service(), limits={"BP": Limit(high="AR")})
+    with pytest.raises(ConfigError, match="a circle: BP needs BP"):
+        replace(service(), limits={"BP": Limit(high="BP")})
+
+
 @pytest.mark.parametrize(
     ("fields", "match"),
     [
         pytest.param({"rest": {"XX": 1.0}}, "missing channel XX", id="rest of a stranger"),
         pytest.param({"rest": {"AR": "BP"}}, "missing channel BP", id="rest at the level of an output"),
         pytest.param({"limits": {"STP": Limit(low=0.0)}}, "missing channel STP", id="limits of an input"),
-        pytest.param({"limits": {"BP": Limit(high="AR")}}, "missing channel AR", id="limit that is computed later"),
+        pytest.param({"limits": {"BP": Limit(high="XX")}}, "missing channel XX", id="limit that is a stranger"),
     ],
 )
 def test_levels_and_limits_must_name_channels_that_are_known(fields, match):
