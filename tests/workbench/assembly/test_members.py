@@ -12,6 +12,7 @@ from sysid.errors import ConfigError
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.known import known_model
 from sysid.workbench.assembly.members import assembled, in_place, own_traces, simulated_inputs, whole_score
 from sysid.workbench.assembly.stages import choose_together
 from sysid.workbench.assembly.stress import stress
@@ -70,6 +71,29 @@ def test_a_member_stands_in_all_its_places():
     assert (whole.limits["AR"].high, whole.limits["AR9"].high) == ("BP", "BP9")
     own = assembled(config(TWO_PLACES.replace("limits: {", "limits: {AR9: {low: 0, high: STP}, ")), models())
     assert (own.limits["AR9"].low, own.limits["AR9"].high) == (0, "STP")
+
+
+def test_a_limit_may_be_declared_from_what_it_limits_a_sample_ago():
+    text = (
+        TWO_PLACES.replace("AR: {high: BP}", "AR: {low: 0, high: AH}")
+        + """
+known:
+  - mapping: AR+BP -> AH
+    gains: {AR: {1: 1}, BP: 0}
+    constant: 0.4
+    low: 0
+    high: 91
+    rest: 91
+    unit: psi
+    places: ["", "9"]
+"""
+    )
+    declared = config(text)
+    whole = assembled(declared, models() | {"AH": known_model(declared.known[0], trace())})
+    assert (whole.limits["AR"].high, whole.limits["AR9"].high) == ("AH", "AH9")
+    run = whole.simulate_trace(trace())
+    for name in ("AR", "AR9"):
+        assert np.diff(run[name]).max() == pytest.approx(0.4), "it rises no faster than declared"
 
 
 def test_traces_of_a_member_go_through_its_places_in_turn():
