@@ -17,13 +17,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade_layout import laid_out
+from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOST, LOW, LOW_CHANNEL, laid_out
 from sysid.kernels.registers import LANES, affine, dot, tanh
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
-
-FREE, LOW, HIGH, LOW_CHANNEL, HIGH_CHANNEL, LOST = 0, 1, 2, 3, 4, 5
-"""What held an output at a sample: nothing; a constant limit; a limit that is a channel; the bound of the network."""
 
 # In the pass over samples no function takes the program or its layout itself: a call would copy the descriptions of
 # their arrays, which costs as much as the network (measured: 34 ms instead of 16 for four members over 20,000 samples).
@@ -75,7 +72,9 @@ def _keep(kept, h, neurons, neuron_first):
 def _walk(p, layout, values, past, at_sample, kept, held):
     """Run over the rows of ``values`` from ``past`` on, the first of which is sample ``at_sample``."""
     theta, bounds, constant, linear_first = layout.theta, layout.bounds, layout.constant, layout.linear_first
-    order, level_first, order_y, level_first_y = layout.order, layout.level_first, layout.order_y, layout.level_first_y
+    networks, network_first, tanh_first = layout.networks, layout.network_first, layout.tanh_first
+    order_y, level_first_y = layout.order_y, layout.level_first_y
+    fixed, fixed_limits, fixed_codes = layout.fixed, layout.fixed_limits, layout.fixed_codes
     weights, hidden_first, gates_first = layout.weights, layout.hidden_first, layout.gates_first
     blocks, neuron_first, g, readout_first = layout.blocks, layout.neuron_first, layout.readout, layout.readout_first
     n_x_of = np.diff(p.regressor_first)
@@ -86,16 +85,12 @@ def _walk(p, layout, values, past, at_sample, kept, held):
     back = p.regressor_lag * wide - p.regressor_channel
     for row in range(past, len(values)):
         here, t = row * wide, at_sample + row - past
-        for level in range(len(level_first) - 1):
-            low_h, high_h = len(h), 0
-            for q in range(level_first[level], level_first[level + 1]):
-                m = order[q]
-                if blocks[m] == 0:
-                    continue
+        for level in range(len(network_first) - 1):
+            for q in range(network_first[level], network_first[level + 1]):
+                m = networks[q]
                 first_x, n_x = p.regressor_first[m], n_x_of[m]
                 for i in range(n_x):
                     x[i] = flat[np.uintp(here - back[first_x + i])]
-                low_h, high_h = min(low_h, neuron_first[m]), neuron_first[m] + LANES * blocks[m]
                 affine(weights, hidden_first[m], n_x, x, h, neuron_first[m], blocks[m])
                 if gates_first[m] >= 0:
                     affine(weights, gates_first[m], n_x, x, g, readout_first[p.output_first[m]], blocks[m])
@@ -104,8 +99,8 @@ def _walk(p, layout, values, past, at_sample, kept, held):
                     for i in range(n_x if linear_first[o] >= 0 else 0):
                         total += theta[linear_first[o] + i] * x[i]
                     linear[o] = total
-            if high_h > 0:
-                tanh(h, low_h, high_h - low_h)
+            if tanh_first[level + 1] > tanh_first[level]:
+                tanh(h, tanh_first[level], tanh_first[level + 1] - tanh_first[level])
             for q in range(level_first_y[level], level_first_y[level + 1]):
                 o = order_y[q]
                 total = theta[constant[o]]
@@ -113,13 +108,17 @@ def _walk(p, layout, values, past, at_sample, kept, held):
                     total += dot(g, readout_first[o], h, neuron_y[o], blocks_y[o]) + linear[o]
                 else:
                     total += _linear(theta, linear_first[o], flat, back, first_x_y[o], here, n_x_y[o])
-                bounded, code = _bounded(total, bounds[o, 0], bounds[o, 1])
-                low, high, low_code, high_code = p.limits[o, 0], p.limits[o, 1], LOW, HIGH
-                if p.limit_channel[o, 0] >= 0:
-                    low, low_code = flat[here + p.limit_channel[o, 0]], LOW_CHANNEL
-                if p.limit_channel[o, 1] >= 0:
-                    high, high_code = flat[here + p.limit_channel[o, 1]], HIGH_CHANNEL
-                limited, held_by = _limited(bounded, code, low, high, low_code, high_code)
+                code = FREE
+                low, high = fixed_limits[o, 0], fixed_limits[o, 1]
+                low_code, high_code = fixed_codes[o, 0], fixed_codes[o, 1]
+                if not fixed[o]:
+                    total, code = _bounded(total, bounds[o, 0], bounds[o, 1])
+                    low, high, low_code, high_code = p.limits[o, 0], p.limits[o, 1], LOW, HIGH
+                    if p.limit_channel[o, 0] >= 0:
+                        low, low_code = flat[here + p.limit_channel[o, 0]], LOW_CHANNEL
+                    if p.limit_channel[o, 1] >= 0:
+                        high, high_code = flat[here + p.limit_channel[o, 1]], HIGH_CHANNEL
+                limited, held_by = _limited(total, code, low, high, low_code, high_code)
                 flat[np.uintp(here + p.output_channel[o])] = limited
                 held[t, o] = held_by
         if len(kept) > 0:

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, _bounded, _limited
-from sysid.kernels.cascade_layout import gates_at, in_units
+from sysid.kernels.cascade import _bounded, _limited
+from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, gates_at, in_units
 from sysid.kernels.registers import tanh
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}

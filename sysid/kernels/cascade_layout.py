@@ -65,9 +65,10 @@ class Layout(NamedTuple):
     Attributes:
         theta: Parameters as they act between channels in their units, in the program's order.
         bounds: Of each output in its unit, shape ``(n_outputs, 2)``.
-        order: Members level by level.
-        level_first: Where each level begins among them; one more entry than levels.
-        weights: Of neurons and gates in blocks (``sysid/kernels/registers.py``), members in the order of ``order``.
+        networks: Members that have neurons, level by level.
+        network_first: Where each level begins among them; one more entry than levels.
+        tanh_first: Where each level begins among all their neurons, with their padding; one more entry than levels.
+        weights: Of neurons and gates in blocks (``sysid/kernels/registers.py``), networks in that order.
         hidden_first: Where those of each member's neurons begin.
         gates_first: Where those of its gates begin; -1 for a member without.
         blocks: Blocks of neurons of each member.
@@ -79,12 +80,16 @@ class Layout(NamedTuple):
         member: The member of each output.
         constant: Where the constant of each output stands in ``theta``.
         linear_first: Where its linear part begins in ``theta``; -1 for none.
+        fixed: Whether no channel limits the output.
+        fixed_limits: Between what it is held then, by bounds and limits together, shape ``(n_outputs, 2)``.
+        fixed_codes: And which of them that is.
     """
 
     theta: NDArray[np.float64]
     bounds: NDArray[np.float64]
-    order: NDArray[np.int64]
-    level_first: NDArray[np.int64]
+    networks: NDArray[np.int64]
+    network_first: NDArray[np.int64]
+    tanh_first: NDArray[np.int64]
     weights: NDArray[np.float64]
     hidden_first: NDArray[np.int64]
     gates_first: NDArray[np.int64]
@@ -97,6 +102,13 @@ class Layout(NamedTuple):
     member: NDArray[np.int64]
     constant: NDArray[np.int64]
     linear_first: NDArray[np.int64]
+    fixed: NDArray[np.bool_]
+    fixed_limits: NDArray[np.float64]
+    fixed_codes: NDArray[np.int64]
+
+
+FREE, LOW, HIGH, LOW_CHANNEL, HIGH_CHANNEL, LOST = 0, 1, 2, 3, 4, 5
+"""What held an output at a sample: nothing; a constant limit; a limit that is a channel; the bound of the network."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -198,7 +210,7 @@ def _in_blocks(p, theta, order):
         size += 2 * n * (n_x + 1)
         read += n * (p.output_first[m + 1] - p.output_first[m])
     weights, readout, readout_first = np.zeros(size), np.zeros(read), np.zeros(len(p.output_channel), dtype=np.int64)
-    hidden_first, gates_first, neuron_first = np.zeros((3, members), dtype=np.int64)
+    hidden_first, gates_first, neuron_first = np.zeros_like(order), np.zeros_like(order), np.zeros_like(order)
     at, at_neuron, at_readout = 0, 0, 0
     for m in order:
         n_x, n_y = p.regressor_first[m + 1] - p.regressor_first[m], p.output_first[m + 1] - p.output_first[m]
@@ -220,9 +232,8 @@ def _in_blocks(p, theta, order):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _by_output(p, order, level_first):
     """Outputs level by level, where each level begins, and of each its member, its constant and its linear part."""
-    outputs = len(p.output_channel)
-    order_y, level_first_y = np.empty(outputs, dtype=np.int64), np.zeros(len(level_first), dtype=np.int64)
-    member, constant, linear_first = np.empty((3, outputs), dtype=np.int64)
+    order_y, level_first_y = np.empty_like(p.output_channel), np.zeros_like(level_first)
+    member, constant, linear_first = np.empty_like(order_y), np.empty_like(order_y), np.empty_like(order_y)
     at = 0
     for level in range(len(level_first) - 1):
         for m in order[level_first[level] : level_first[level + 1]]:
@@ -239,21 +250,47 @@ def _by_output(p, order, level_first):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _networks(blocks, order, level_first):
+    """Members that have neurons, level by level, and where each level begins among them and among their neurons."""
+    network_first, tanh_first = np.zeros_like(level_first), np.zeros_like(level_first)
+    for level in range(len(level_first) - 1):
+        some = blocks[order[level_first[level] : level_first[level + 1]]]
+        network_first[level + 1] = network_first[level] + np.sum(some > 0)
+        tanh_first[level + 1] = tanh_first[level] + LANES * np.sum(some)
+    return order[blocks[order] > 0], network_first, tanh_first
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fixed(p, bounds):
+    """Which outputs no channel limits, between what they are held, and what that is: bounds first, then limits."""
+    limits, codes = np.empty_like(bounds), np.empty(bounds.shape, dtype=np.int64)
+    for o in range(len(bounds)):
+        low, high = p.limits[o]
+        limits[o, 0], codes[o, 0] = (bounds[o, 0], LOST) if low <= bounds[o, 0] <= high else (low, LOW)
+        limits[o, 1], codes[o, 1] = (bounds[o, 1], LOST) if low <= bounds[o, 1] <= high else (high, HIGH)
+    return (p.limit_channel[:, 0] < 0) & (p.limit_channel[:, 1] < 0), limits, codes
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def laid_out(p):
     """The layout of a program."""
     theta, bounds = in_units(p)
     order, level_first = _levels(p)
+    blocks = padded(p.neurons) // LANES
+    networks, network_first, tanh_first = _networks(blocks, order, level_first)
+    fixed, fixed_limits, fixed_codes = _fixed(p, bounds)
     weights, hidden_first, gates_first, neuron_first, readout, readout_first = _in_blocks(p, theta, order)
     order_y, level_first_y, member, constant, linear_first = _by_output(p, order, level_first)
     return Layout(
         theta,
         bounds,
-        order,
-        level_first,
+        networks,
+        network_first,
+        tanh_first,
         weights,
         hidden_first,
         gates_first,
-        padded(p.neurons) // LANES,
+        blocks,
         neuron_first,
         readout,
         readout_first,
@@ -262,4 +299,7 @@ def laid_out(p):
         member,
         constant,
         linear_first,
+        fixed,
+        fixed_limits,
+        fixed_codes,
     )

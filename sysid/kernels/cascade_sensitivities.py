@@ -23,8 +23,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade import FREE, HIGH_CHANNEL, LOW_CHANNEL
-from sysid.kernels.cascade_layout import gates_at
+from sysid.kernels.cascade_layout import FREE, HIGH_CHANNEL, LOW_CHANNEL, gates_at
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
-from sysid.kernels.cascade import HIGH, HIGH_CHANNEL, LOST, LOW, LOW_CHANNEL
+from sysid.kernels.cascade_layout import HIGH, HIGH_CHANNEL, LOST, LOW, LOW_CHANNEL
 from sysid.traces import Channel, Trace
 
 
@@ -49,8 +49,8 @@ class CascadeRun:
         outputs: Names of the outputs, in the order in which they are computed.
         values: Inputs, then outputs, in their units: shape ``(n_samples, n_channels)``, or ``(n_records, n_samples,
             n_channels)`` for a batch.
-        held: What held each output at each sample, codes of ``sysid.kernels.cascade``; same leading shape, last axis
-            ``n_outputs``.
+        held: What held each output at each sample, codes of ``sysid.kernels.cascade_layout``; same leading shape, last
+            axis ``n_outputs``.
         units: Unit of every channel.
         sample_time: Seconds.
     """

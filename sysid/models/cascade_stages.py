@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels import cascade as kernel
-from sysid.kernels.cascade_layout import Program
+from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, Program
 from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit, Part, program_of
 from sysid.models.history import History
@@ -66,10 +66,10 @@ class ModelStage:
         column = self.channels.index(self.model.mapping.output)
         history = History.at_rest(inputs=levels[sources], output=float(levels[column]))
         output = self.model.simulate(values[:, sources], history)
-        held[:] = kernel.FREE
+        held[:] = FREE
         for side, constant, channel, sign in (
-            (self.limit.high, kernel.HIGH, kernel.HIGH_CHANNEL, 1.0),
-            (self.limit.low, kernel.LOW, kernel.LOW_CHANNEL, -1.0),
+            (self.limit.high, HIGH, HIGH_CHANNEL, 1.0),
+            (self.limit.low, LOW, LOW_CHANNEL, -1.0),
         ):
             if side is not None:
                 named = isinstance(side, str)

@@ -1,0 +1,55 @@
+"""How a cascade is laid out: levels of members, and bounds and limits as one."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+from sysid.kernels.cascade import _bounded, _limited
+from sysid.kernels.cascade_layout import FREE, HIGH, LOW, Program, laid_out
+from sysid.models.cascade_stages import CompiledStage
+from tests.models.cascades import CASCADES
+
+NUMBERS = st.integers(-3, 3).map(float)
+PAIRS = st.tuples(NUMBERS, NUMBERS).map(sorted)
+
+
+def program(name: str) -> Program:
+    (stage,) = CASCADES[name].stages
+    assert isinstance(stage, CompiledStage)
+    return stage.program
+
+
+def test_members_that_do_not_read_each_other_at_the_same_sample_are_of_one_level():
+    layout = laid_out(program("the emergency reservoir too"))  # STP -> BP, BP -> ER, BP+ER -> AR, BP+AR+ER -> BC
+    assert_array_equal(layout.level_first_y, [0, 2, 3, 4])  # ER reads the pipe of two samples ago
+    assert_array_equal(layout.tanh_first, [0, 8 + 16, 32, 40])
+
+    circle = laid_out(program("a circle through the past"))  # the pipe reads what is behind it a sample later
+    assert_array_equal(circle.level_first_y, [0, 1, 2, 3])
+
+
+def test_what_a_limit_is_made_of_comes_a_level_before_it():
+    layout = laid_out(program("a limit made of what it limits, a sample ago"))  # BP, x = AR a sample ago, AR, BC
+    assert_array_equal(layout.order_y, [0, 1, 2, 3])
+    assert_array_equal(layout.level_first_y, [0, 2, 3, 4])
+    assert_array_equal(layout.fixed, [True, True, False, True])
+
+
+@given(PAIRS, PAIRS, st.floats(-4.0, 4.0))
+def test_bounds_and_limits_at_once_are_first_the_one_and_then_the_other(bounds, limits, value):
+    one = program("three networks")
+    n = len(one.output_channel)
+    layout = laid_out(
+        one._replace(
+            bounds=np.tile(np.array(bounds), (n, 1)),
+            limits=np.tile(np.array(limits), (n, 1)),
+            output_offset=np.zeros(n),
+            output_scale=np.ones(n),
+        )
+    )
+    bounded, code = _bounded(value, *bounds)
+    expected = _limited(bounded, code, *limits, LOW, HIGH)
+    assert _limited(value, FREE, *layout.fixed_limits[0], *layout.fixed_codes[0]) == expected
