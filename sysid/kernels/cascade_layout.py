@@ -80,7 +80,7 @@ class Layout(NamedTuple):
         member: The member of each output.
         constant: Where the constant of each output stands in ``theta``.
         linear_first: Where its linear part begins in ``theta``; -1 for none.
-        fixed: Whether no channel limits the output.
+        fixed: Whether bounds and limits of an output are a pair of numbers: no channel is among them, and they overlap.
         fixed_limits: Between what it is held then, by bounds and limits together, shape ``(n_outputs, 2)``.
         fixed_codes: And which of them that is.
     """
@@ -262,13 +262,17 @@ def _networks(blocks, order, level_first):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fixed(p, bounds):
-    """Which outputs no channel limits, between what they are held, and what that is: bounds first, then limits."""
-    limits, codes = np.empty_like(bounds), np.empty(bounds.shape, dtype=np.int64)
+    """Which outputs are held between two numbers, which these are, and what each of them is."""
+    limits, codes = p.limits.copy(), np.empty(bounds.shape, dtype=np.int64)
+    codes[:, 0], codes[:, 1] = LOW, HIGH
+    fixed = (p.limit_channel[:, 0] < 0) & (p.limit_channel[:, 1] < 0)
     for o in range(len(bounds)):
-        low, high = p.limits[o]
-        limits[o, 0], codes[o, 0] = (bounds[o, 0], LOST) if low <= bounds[o, 0] <= high else (low, LOW)
-        limits[o, 1], codes[o, 1] = (bounds[o, 1], LOST) if low <= bounds[o, 1] <= high else (high, HIGH)
-    return (p.limit_channel[:, 0] < 0) & (p.limit_channel[:, 1] < 0), limits, codes
+        if bounds[o, 0] >= limits[o, 0]:
+            limits[o, 0], codes[o, 0] = bounds[o, 0], LOST
+        if bounds[o, 1] <= limits[o, 1]:
+            limits[o, 1], codes[o, 1] = bounds[o, 1], LOST
+        fixed[o] &= limits[o, 0] <= limits[o, 1]  # else one outside the other, which is a matter of order
+    return fixed, limits, codes
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
