@@ -26,6 +26,20 @@ def _deprecation_known() -> Iterator[None]:
         yield
 
 
+def _forget_scripted_classes() -> None:
+    """Have torch number classes from the beginning.
+
+    It numbers those that it has scripted before in the process (``___torch_mangle_5``), and the numbers are in the
+    file: a second export would have other bytes than the first. Torch's own tests do this before each test; modules
+    that are scripted already keep their classes.
+    """
+    import torch
+
+    torch._C._jit_clear_class_registry()
+    torch.jit._recursive.concrete_type_store = torch.jit._recursive.ConcreteTypeStore()
+    torch.jit._state._clear_class_state()
+
+
 @dataclass(frozen=True, kw_only=True)
 class TorchScriptExporter(AbstractExporter):
     """Writes ``step.torchscript.pt`` and ``sequence.torchscript.pt``, zip files of code and tensors."""
@@ -38,6 +52,7 @@ class TorchScriptExporter(AbstractExporter):
 
         from sysid.export.torch_module import SurrogateSequence, SurrogateStep
 
+        _forget_scripted_classes()
         files = []
         for kind, module in ((Kind.STEP, SurrogateStep(surrogate)), (Kind.SEQUENCE, SurrogateSequence(surrogate))):
             name = f"{kind.value}.torchscript.pt"

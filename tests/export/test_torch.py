@@ -21,6 +21,19 @@ def test_archive_tells_nothing_about_the_machine_that_wrote_it(narx, declared, t
             assert not [name for name in archive.namelist() if __file__.encode()[:10] in archive.read(name)]
 
 
+def test_what_was_exported_before_in_the_process_leaves_no_trace_in_the_archive(narx, declared, circle, tmp_path):
+    surrogate = declared(narx(NARX(input_delays=1, output_delays=1, neurons=1)))
+
+    def written(source, name):
+        folder = tmp_path / name
+        folder.mkdir()
+        return [(folder / file.name).read_bytes() for file in EXPORTERS["torchscript"].write(source, folder)]
+
+    first = written(surrogate, "first")
+    written(circle, "another")
+    assert written(surrogate, "again") == first
+
+
 def test_exported_program_tells_nothing_about_the_machine_that_wrote_it(narx, declared, tmp_path):
     surrogate = declared(narx(NARX(input_delays=1, output_delays=1, neurons=1)))
     (file,) = EXPORTERS["torch-export"].write(surrogate, tmp_path)
