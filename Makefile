@@ -19,7 +19,7 @@ run: setup  ## the main job: traces, fits, export, report
 	$(BIN)/sysid run service-brake
 
 test: setup lint types  ## everything that CI runs
-	$(BIN)/python -m pytest --numprocesses=2 --dist=loadfile
+	$(BIN)/python -m pytest
 
 lint: setup
 	$(BIN)/ruff format --check .
