@@ -167,8 +167,9 @@ def _units(ends: Sequence[Ends]) -> tuple[dict[str, str], list[str]]:
 def _order(ends: Sequence[Ends], limits: Dict[str, Collection[str]], faults: list[str]) -> tuple[int, ...]:
     """First the first model, in the order given, whose inputs and limits of now are known; then again, to the last."""
     owner = {name: i for i, end in enumerate(ends) for name in end.outputs}
-    needs = [end.direct.union(*(limits.get(name, ()) for name in end.outputs)) for end in ends]
-    reads = [{owner[name] for name in some if name in owner} for some in needs]
+    # Outputs of one model come in their own order, and one may limit the next.
+    held_by = [{one for name in end.outputs for one in limits.get(name, ())} - {*end.outputs} for end in ends]
+    reads = [{owner[name] for name in end.direct | held_by[i] if name in owner} for i, end in enumerate(ends)]
     order: list[int] = []
     while len(order) < len(ends):
         ready = [i for i in range(len(ends)) if i not in order and reads[i] <= set(order)]

@@ -23,6 +23,7 @@ from sysid.models import (
     cascade_from_dict,
     simulate_family,
 )
+from sysid.models.cascade_batch import MIN_LANES
 from sysid.models.ladder import numerators, rungs
 from sysid.testing import simulate_cascade
 from sysid.traces import Channel, Trace
@@ -107,8 +108,17 @@ def test_a_limit_is_computed_before_what_it_limits():
 def test_a_limit_that_needs_what_it_limits_at_the_same_sample_is_refused():
     with pytest.raises(ConfigError, match=r"a circle: (AR needs BP, BP needs AR|BP needs AR, AR needs BP)"):
         replace(service(), limits={"BP": Limit(high="AR")})
-    with pytest.raises(ConfigError, match="a circle: BP needs BP"):
+    with pytest.raises(ChannelError, match="missing channel BP"):
         replace(service(), limits={"BP": Limit(high="BP")})
+
+
+def test_an_output_may_limit_the_next_one_of_its_model_and_not_the_one_before():
+    cascade = CASCADES["a network of several outputs"]
+    run = replace(cascade, limits={"ER": Limit(high="AR")}).simulate(command())
+    assert np.all(run["ER"] <= run["AR"])
+    assert run.activity["ER"].high > 5
+    with pytest.raises(ChannelError, match="missing channel ER"):
+        replace(cascade, limits={"AR": Limit(high="ER")})
 
 
 @pytest.mark.parametrize(
@@ -229,6 +239,10 @@ def test_a_model_with_a_state_of_its_own_is_wired_like_any_other():
     assert np.ptp(run["AR"]) > 1.0
 
 
+MANY = 2 * MIN_LANES + 3
+"""Records enough for two threads to run them in lockstep, and no multiple of the lanes."""
+
+
 def check_records(cascade, inputs, **options):
     batch = cascade.simulate_batch(inputs, **options)
     assert batch["BC"].shape == inputs.shape[:2]
@@ -241,27 +255,27 @@ def check_records(cascade, inputs, **options):
 
 @pytest.mark.parametrize("name", [name for name in CASCADES if name not in {"a linear member", "no neurons"}])
 def test_records_in_lockstep_are_the_records_one_by_one(name):
-    # 35 records: two groups, whose last lanes have no record of their own; several chunks of samples.
+    # Two groups, whose last lanes have no record of their own; several chunks of samples.
     cascade = CASCADES[name]
-    inputs = np.stack([command(300, len(cascade.inputs), seed) for seed in range(35)])
+    inputs = np.stack([command(300, len(cascade.inputs), seed) for seed in range(MANY)])
     batch = check_records(cascade, inputs)
     if cascade.limits:
         assert np.count_nonzero(batch.held) > 100
 
 
-@pytest.mark.parametrize("n", [1, 5, 16])
+@pytest.mark.parametrize("n", [1, 5, MIN_LANES])
 def test_few_records_are_the_records_one_by_one(n):
     check_records(CASCADES["limits"], np.stack([command(seed=seed) for seed in range(n)]), workers=1)
 
 
 def test_many_records_of_a_model_with_a_state_of_its_own():
     cascade = Cascade(models=(lag("STP -> BP"), network("BP -> BC", seed=3)))
-    check_records(cascade, np.stack([command(seed=seed) for seed in range(34)]))
+    check_records(cascade, np.stack([command(seed=seed) for seed in range(MANY)]))
 
 
 def test_a_value_that_is_not_a_number_stays_in_its_record():
     cascade = service()
-    inputs = np.stack([command(seed=seed) for seed in range(34)])
+    inputs = np.stack([command(seed=seed) for seed in range(MANY)])
     inputs[3, 50:] = np.nan
     batch = cascade.simulate_batch(inputs)
     assert np.isnan(batch["BC"][3, 60:]).all()
