@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -18,17 +18,16 @@ from sysid.workbench import events
 from sysid.workbench.assembly.config import MemberConfig
 from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
+from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.known import known_model, with_known
 from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
 from sysid.workbench.assembly.rehearsal import rehearse
 from sysid.workbench.assembly.stages import (
-    Report,
     choose_together,
     fit_member,
     model_of,
     reading_more,
     retrain,
-    train_together,
 )
 from sysid.workbench.record import is_final
 from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
@@ -76,15 +75,17 @@ class Course:
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
         models, key, added = self._grown(models, key, estimation, selection)
-        self._together(models, key, (*estimation, *added), selection)
+        self._together(models, (*estimation, *added), selection)
         return tuple(selection)
 
     def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
         """Every member's candidates; the best of each alone, and those that are best together."""
         candidates, alone, keys = {}, {}, []
-        data = [trace.digest for trace in (*estimation, *selection)]
         for member in self.context.config.members:
             fits = []
+            # Not all of the traces: what is declared beside a member leaves its fit as it was.
+            own = (*own_traces(member, estimation[: member.traces]), *own_traces(member, selection))
+            data = [trace.digest for trace in own]
             for number in range(member.candidates):
                 seed = self.context.config.seed + 1000 * number
                 fit, key = self.context.fit(
@@ -218,36 +219,30 @@ class Course:
         self.stages[GROWN] = assembled(self.context.config, grown.models)
         return grown.models, grown.key, tuple(trace for trace in sources if trace.name in grown.added)
 
-    def _together(self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
+    def _together(self, models: Members, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
         """Every round of training end to end, each from where the one before ended."""
         asked, whole = self.context.config.together, assembled(self.context.config, models)
         rounds = asked.rounds if asked else ()
         for number, one in enumerate(rounds, start=1):
             suffix = "" if number == 1 else f", round {number}"
             whole = reading_more(whole, one.reads)
-            terms = {
-                "code": code_digest(*CODE),
-                "before": key,
-                "together": one.model_dump(mode="json", exclude={"again"}),
-                "start": whole.to_dict(),
-            }
-            key = digest(strict(terms))
-            train = partial(train_together, self.context.config, one, whole, estimation=estimation, selection=selection)
+            ready = JointRound.of(self.context.config, one, whole, estimation=estimation, selection=selection)
+            asked_for = one.model_dump(mode="json", exclude={"again"})
+            key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
             name = "together" if number == 1 else f"together-{number}"
-            fit = self._round(name, f"Training end to end{suffix}", key, train)
+            fit = self._round(name, f"Training end to end{suffix}", key, ready)
             said = (*fit.notes, fit.status.value) if fit.status is Status.UNSTABLE else fit.notes
             self.notes.extend(said if len(rounds) == 1 else [f"Round {number}: {note}" for note in said])
             self.stages[f"{TOGETHER}{suffix}"] = whole = fit.model
 
-    def _round(self, name: str, step: str, key: str, train: Callable[[Report], CascadeFit]) -> CascadeFit:
+    def _round(self, name: str, step: str, key: str, ready: JointRound) -> CascadeFit:
         """One round, stored under what it depends on."""
         file = self.context.store.path / f"{name}.json"
         self.context.tell(events.StepStarted(step=step))
         stored = not self.context.fresh and self.context.store.is_done(name, key)
-        if stored:
-            fit = CascadeFit.from_dict(read_json(file))
-        else:
-            fit = train(self.context.reporter(step))
+        before = CascadeFit.from_dict(read_json(file)) if stored else None
+        fit = ready.fit(self.context.reporter(step)) if before is None else ready.put(before)
+        if before is None or before.model.to_dict() != fit.model.to_dict():
             write_json(file, fit.to_dict())
             if is_final(fit):
                 self.context.store.mark_done(name, key, [file])

@@ -180,13 +180,11 @@ def seen_from(place: str, trace: Trace, names: Dict[str, str]) -> Trace:
     Returns:
         A trace of these channels alone.
     """
-    return Trace(
+    return replace(
+        trace,
         name=f"{trace.name} {place}".strip(),
-        sample_time=trace.sample_time,
         channels=tuple(replace(trace.channel(old), name=new) for new, old in names.items()),
         values=trace.columns(list(names.values())),
-        usable=trace.usable,
-        provenance=trace.provenance,
     )
 
 

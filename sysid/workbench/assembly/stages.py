@@ -11,22 +11,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sysid.errors import ConfigError
-from sysid.estimation import CascadeFit, FitProgress, FitResult, fit_cascade, fit_narx
+from sysid.estimation import FitProgress, FitResult, fit_narx
 from sysid.estimation.growing import widened
 from sysid.estimation.result import Status
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
-from sysid.workbench.assembly.everywhere import Everywhere
 from sysid.workbench.assembly.members import (
     Members,
     assembled,
     own_traces,
-    placed_outputs,
     simulated_inputs,
     whole_score,
 )
-from sysid.workbench.assembly.stage_config import TogetherConfig
 
 Report = Callable[[FitProgress], None]
 SWEEPS = 3
@@ -202,54 +199,3 @@ def reading_more(cascade: Cascade, reads: Mapping[str, Mapping[str, tuple[int, .
             )
         cascade = cascade.with_member(widened(networks[output], dict(more), networks))
     return cascade
-
-
-def train_together(
-    config: AssemblyConfig,
-    asked: TogetherConfig,
-    cascade: Cascade,
-    report: Report,
-    *,
-    estimation: Sequence[Trace],
-    selection: Sequence[Trace],
-) -> CascadeFit:
-    """Train end to end, for the free run of the whole.
-
-    Args:
-        config: The pipeline.
-        asked: The round.
-        cascade: Where it starts.
-        report: Told after every iteration.
-        estimation: Traces to fit.
-        selection: Traces that choose among the states on the way.
-
-    Returns:
-        The fit. A member that stood in several places may now differ between them, unless it was trained everywhere.
-
-    Raises:
-        ConfigError: If the round is to be trained everywhere and cannot.
-    """
-    used, stand = estimation[: asked.traces], Everywhere.of(config, asked, cascade) if asked.everywhere else None
-    if stand is not None:
-        part, trained = stand.part, [member.mapping.output for member in stand.members]
-        used, selection = stand.traces(used), stand.traces(selection)
-    else:
-        # What no target depends on would be run, and its sensitivities with it, for nothing.
-        part = cascade.upstream_of(asked.targets, given=asked.measured)
-        asked_for = [one for one in config.members if not asked.members or one.mapping.output in asked.members]
-        trained = [name for member in asked_for for name in placed_outputs(member) if name in part.outputs]
-    fit = fit_cascade(
-        part,
-        used,
-        targets=asked.targets,
-        trained=trained,
-        training=asked.training_options(config.seed),
-        selection=selection,
-        on_progress=report,
-    )
-    if stand is not None:
-        return replace(fit, model=stand.put(fit.model))
-    whole = cascade
-    for model in fit.model.models:
-        whole = whole.with_member(model)
-    return replace(fit, model=whole)

@@ -13,9 +13,10 @@ from sysid.models import Cascade, Mapping
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.everywhere import Everywhere
+from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.known import known_model, with_known
 from sysid.workbench.assembly.members import assembled
-from sysid.workbench.assembly.stages import reading_more, train_together
+from sysid.workbench.assembly.stages import reading_more
 from sysid.yaml_files import check, parse_yaml
 from tests.models.cascades import network
 
@@ -125,9 +126,9 @@ def test_what_is_named_as_measured_is_as_measured_at_its_place():
 def test_after_the_round_every_place_has_the_same_new_weights():
     asked, before = config(), whole()
     assert asked.together is not None
-    fit = train_together(
-        asked, asked.together, before, lambda _: None, estimation=[trace(s) for s in range(4)], selection=[trace(5)]
-    )
+    estimation, selection = [trace(s) for s in range(4)], [trace(5)]
+    ready = JointRound.of(asked, asked.together, before, estimation=estimation, selection=selection)
+    fit = ready.fit(lambda _: None)
     for name in ("AR", "BC"):
         assert not np.array_equal(fit.model.member(name).theta, before.member(name).theta)
         assert_array_equal(fit.model.member(f"{name}9").theta, fit.model.member(name).theta)

@@ -105,6 +105,8 @@ def test_traces_of_a_member_go_through_its_places_in_turn():
     assert_array_equal(second["STP"], trace(seed=1)["STP"])
     assert_array_equal(third["AR"], trace(seed=2)["AR"])
     assert_array_equal(in_place(member, trace(), "9")["AR"], trace()["AR9"])
+    weights = np.linspace(0.0, 1.0, len(first))
+    assert_array_equal(in_place(member, replace(trace(), weights=weights), "9").weights, weights)
 
 
 def test_who_reads_a_member_that_is_left_out_reads_what_was_measured():

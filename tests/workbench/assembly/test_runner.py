@@ -15,9 +15,8 @@ from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, Status
 from sysid.reporting import publish_run
 from sysid.reporting.judgement_report import read_judgement_results
-from sysid.workbench.assembly import course
+from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
-from sysid.workbench.assembly.stages import train_together
 from sysid.workbench.kinds import RunRequest, kind_of
 from sysid.workbench.record import read_fit
 from sysid.workbench.tracking import connect, store_uri
@@ -141,10 +140,12 @@ def test_rounds_end_to_end_go_on_from_one_another_and_are_found_again(workspace:
 
 
 def test_a_whole_that_is_lost_says_so_in_its_report(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def lost(*args, **kwargs) -> CascadeFit:
-        return replace(train_together(*args, **kwargs), status=Status.UNSTABLE)
+    trained = JointRound.fit
 
-    monkeypatch.setattr(course, "train_together", lost)
+    def lost(*args) -> CascadeFit:
+        return replace(trained(*args), status=Status.UNSTABLE)
+
+    monkeypatch.setattr(JointRound, "fit", lost)
     assert run(workspace) == 0
     results = json.loads((workspace / "runs" / "tanks" / "results.json").read_text(encoding="utf-8"))
     assert Status.UNSTABLE.value in results["judgement"]["sentences"]
@@ -153,11 +154,13 @@ def test_a_whole_that_is_lost_says_so_in_its_report(workspace: Path, monkeypatch
 def test_a_round_that_was_interrupted_is_used_now_and_trained_again_next_time(
     workspace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(*args, **kwargs) -> CascadeFit:
-        return replace(train_together(*args, **kwargs), status=Status.INTERRUPTED)
+    trained = JointRound.fit
+
+    def interrupted(*args) -> CascadeFit:
+        return replace(trained(*args), status=Status.INTERRUPTED)
 
     with monkeypatch.context() as patch:
-        patch.setattr(course, "train_together", interrupted)
+        patch.setattr(JointRound, "fit", interrupted)
         assert run(workspace) == 0
     file = workspace / "runs" / "tanks" / "together.json"
     assert json.loads(file.read_text(encoding="utf-8"))["status"] == "INTERRUPTED"
@@ -251,3 +254,27 @@ def test_several_training_data_sets_are_dealt_in_turn(workspace: Path) -> None:
 def test_a_run_that_has_not_come_so_far_has_no_assembly(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="has no assembly"):
         read_assembly(tmp_path)
+
+
+def test_what_is_declared_beside_a_member_leaves_its_fit_as_it_was(workspace: Path) -> None:
+    """One more known member, which holds the lower tank: fits that do not depend on it are found again."""
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8").replace("retrain: {members: [lower], max_iterations: 5}\n", "")
+    text = text.replace("targets: {upper: 0.1, lower: 0.1}", "measured: [lower]\n  targets: {upper: 0.1}")
+    text = text.replace("candidates: 2", "candidates: 1")
+    text = text.replace("looks: 2}\n", "looks: 2}\n  again: [{measured: [], targets: {upper: 0.1, lower: 0.1}}]\n")
+    pipeline.write_text(text, encoding="utf-8")
+    assert run(workspace) == 0
+    folder = workspace / "runs" / "tanks"
+    files = [*folder.rglob("fit.json"), folder / "together-2.json"]
+    stamps = [file.stat().st_mtime_ns for file in files]
+    whole = CascadeFit.from_dict(json.loads((folder / "together.json").read_text(encoding="utf-8")))
+    held = text.replace("  lower: {low: 0}", "  lower: {low: LL}")
+    known = "known: [{mapping: upper -> LL, gains: {upper: -100}, low: 0, high: 100, rest: 0}]\n"
+    pipeline.write_text(held + known, encoding="utf-8")
+    assert run(workspace) == 0
+    changed = [file.stat().st_mtime_ns != stamp for file, stamp in zip(files, stamps, strict=True)]
+    assert changed == [False] * (len(files) - 1) + [True]
+    now = CascadeFit.from_dict(json.loads((folder / "together.json").read_text(encoding="utf-8")))
+    assert now.train_time_s == whole.train_time_s, "not trained again"
+    assert "LL" in now.model.outputs, "but in the whole as it now is"

@@ -9,10 +9,10 @@ from numpy.testing import assert_array_equal
 from sysid.estimation import fit_cascade
 from sysid.models import Cascade
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly import stages
+from sysid.workbench.assembly import joint_round
 from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.stage_config import TogetherConfig
-from sysid.workbench.assembly.stages import train_together
 from tests.models.cascades import command, service
 
 
@@ -47,12 +47,12 @@ def trained(monkeypatch: pytest.MonkeyPatch, **asked) -> tuple[Cascade, Cascade,
     given: list[tuple[Cascade, list[str]]] = []
 
     def fit(cascade, *args, **kwargs):
-        given.append((cascade, kwargs["trained"]))
+        given.append((cascade, list(kwargs["trained"])))
         return fit_cascade(cascade, *args, **kwargs)
 
-    monkeypatch.setattr(stages, "fit_cascade", fit)
+    monkeypatch.setattr(joint_round, "fit_cascade", fit)
     asked = TogetherConfig.model_validate({"training": {"max_iterations": 2, "looks": 1, "workers": 1}, **asked})
-    found = train_together(CONFIG, asked, service(), lambda _: None, estimation=[record()], selection=[])
+    found = JointRound.of(CONFIG, asked, service(), estimation=[record()], selection=[]).fit(lambda _: None)
     ((part, names),) = given
     return found.model, part, names
 
