@@ -20,6 +20,7 @@ from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
 from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.known import known_model, with_known
+from sysid.workbench.assembly.limit_check import limit_note
 from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
 from sysid.workbench.assembly.rehearsal import rehearse
 from sysid.workbench.assembly.stages import (
@@ -72,6 +73,8 @@ class Course:
             raise _lacks_a_role("the training data lack a role", *training)
         estimation, selection = with_known(config.known, estimation), with_known(config.known, selection)
         rehearse(config, estimation[0])
+        if said := limit_note(config, estimation):
+            self.notes.append(said)
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
         models, key, added = self._grown(models, key, estimation, selection)
