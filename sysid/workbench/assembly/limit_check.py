@@ -11,10 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.members import limits_of
+
+ROUNDING = 1e-9
+"""Share of the largest value of a channel below which it is as large as its limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,14 +56,14 @@ def limits_passed(config: AssemblyConfig, traces: Sequence[Trace]) -> list[Passe
         traces: Measured traces, with what the known members say; at least one.
 
     Returns:
-        For each such limit by how much it is passed; the first sample of a trace, before which nothing is known, apart.
+        For each such limit by how much it is passed, rounding and the first sample apart (nothing is known before it).
     """
     found = []
     for output, limit in limits_of(config).items():
         for sign, channel in ((-1.0, limit.low), (1.0, limit.high)):
             if not isinstance(channel, str) or not all({output, channel} <= set(t.channel_names) for t in traces):
                 continue
-            excess = [np.maximum(sign * (t[output] - t[channel]), 0.0)[1:][t.usable_samples[1:]] for t in traces]
+            excess = [_excess(trace, sign * (trace[output] - trace[channel]), output) for trace in traces]
             sums = [float(one.sum()) for one in excess]
             worst = int(np.argmax(sums))
             found.append(
@@ -73,6 +77,12 @@ def limits_passed(config: AssemblyConfig, traces: Sequence[Trace]) -> list[Passe
                 )
             )
     return found
+
+
+def _excess(trace: Trace, over: NDArray[np.float64], output: str) -> NDArray[np.float64]:
+    """How far a trace is over a limit, sample by sample."""
+    rounding = ROUNDING * float(np.max(np.abs(trace[output]), initial=0.0))
+    return np.where(over > rounding, over, 0.0)[1:][trace.usable_samples[1:]]
 
 
 def limit_note(config: AssemblyConfig, traces: Sequence[Trace]) -> str | None:
