@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -72,13 +73,14 @@ class Course:
         if not estimation or not selection:
             raise _lacks_a_role("the training data lack a role", *training)
         estimation, selection = with_known(config.known, estimation), with_known(config.known, selection)
+        also = {name: self._also(name) for name in (config.together.data if config.together else ())}
         rehearse(config, estimation[0])
-        if said := limit_note(config, estimation):
+        if said := limit_note(config, [*estimation, *chain.from_iterable(also.values())]):
             self.notes.append(said)
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
         models, key, added = self._grown(models, key, estimation, selection)
-        self._together(models, (*estimation, *added), selection)
+        self._together(models, (*estimation, *added), selection, also)
         return tuple(selection)
 
     def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
@@ -222,15 +224,30 @@ class Course:
         self.stages[GROWN] = assembled(self.context.config, grown.models)
         return grown.models, grown.key, tuple(trace for trace in sources if trace.name in grown.added)
 
-    def _together(self, models: Members, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
+    def _also(self, name: str) -> list[Trace]:
+        """The estimation traces of a data set that some rounds have beside the others."""
+        found = self.context.load(name)
+        traces = found.with_role(Role.ESTIMATION)
+        if not traces:
+            raise _lacks_a_role("the data of a round lack a role", found)
+        return with_known(self.context.config.known, traces)
+
+    def _together(
+        self,
+        models: Members,
+        estimation: Sequence[Trace],
+        selection: Sequence[Trace],
+        also: Mapping[str, Sequence[Trace]],
+    ) -> None:
         """Every round of training end to end, each from where the one before ended."""
         asked, whole = self.context.config.together, assembled(self.context.config, models)
         rounds = asked.rounds if asked else ()
         for number, one in enumerate(rounds, start=1):
             suffix = "" if number == 1 else f", round {number}"
             whole = reading_more(whole, one.reads)
-            ready = JointRound.of(self.context.config, one, whole, estimation=estimation, selection=selection)
-            asked_for = one.model_dump(mode="json", exclude={"again"})
+            traces = dealt([estimation, *(also[name] for name in one.also)])
+            ready = JointRound.of(self.context.config, one, whole, estimation=traces, selection=selection)
+            asked_for = one.model_dump(mode="json", exclude={"again", "also"})  # their traces are among the round's
             key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
             name = "together" if number == 1 else f"together-{number}"
             fit = self._round(name, f"Training end to end{suffix}", key, ready)

@@ -45,6 +45,7 @@ class AgainConfig(BaseModel):
         everywhere: As under ``together``.
         targets: The error of each output that counts as one, in its unit.
         traces: Estimation traces used, the first so many.
+        also: Data sets as under ``together``.
         max_iterations: Of its training.
         moves: Of its training.
         leverage: Of its training.
@@ -59,6 +60,7 @@ class AgainConfig(BaseModel):
     everywhere: bool | None = None
     targets: dict[str, float] | None = Field(default=None, min_length=1)
     traces: int | None = Field(default=None, ge=1)
+    also: tuple[str, ...] | None = None
     max_iterations: int | None = Field(default=None, ge=1)
     moves: float | None = Field(default=None, gt=0)
     leverage: float | None = Field(default=None, gt=0)
@@ -81,6 +83,8 @@ class TogetherConfig(BaseModel):
             run away at once.
         training: How.
         traces: Estimation traces used, the first so many; all by default.
+        also: Data sets whose estimation traces are dealt in from here on, one in turn with one of those that all stages
+            have: what is rare among these, and would keep members that know little yet from finding their way.
         again: Further rounds, for what is too slow from the beginning, such as more traces.
     """
 
@@ -93,6 +97,7 @@ class TogetherConfig(BaseModel):
     reads: Reads = {}
     training: JointConfig = Field(default_factory=JointConfig)
     traces: int | None = Field(default=None, ge=1)
+    also: tuple[str, ...] = ()
     again: tuple[AgainConfig, ...] = ()
 
     @model_validator(mode="after")
@@ -129,6 +134,11 @@ class TogetherConfig(BaseModel):
     def spared(self) -> tuple[str, ...]:
         """Outputs that are as measured in some round."""
         return tuple(dict.fromkeys(name for one in self.rounds for name in one.measured))
+
+    @property
+    def data(self) -> tuple[str, ...]:
+        """Every data set that some round's ``also`` names."""
+        return tuple(dict.fromkeys(name for one in self.rounds for name in one.also))
 
     @property
     def circles(self) -> tuple[str, ...]:

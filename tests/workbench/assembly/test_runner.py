@@ -251,6 +251,40 @@ def test_several_training_data_sets_are_dealt_in_turn(workspace: Path) -> None:
     assert both_ways[0] != both_ways[1]  # twice the traces: another weight of the prior
 
 
+def test_a_round_may_have_traces_that_no_stage_before_it_has(workspace: Path) -> None:
+    more = workspace / "datasets" / "more"
+    shutil.copytree(workspace / "datasets" / "tanks", more)
+    file = more / "dataset.yaml"
+    file.write_text(file.read_text(encoding="utf-8").replace("name: tanks", "name: more"), encoding="utf-8")
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8").replace("looks: 2}\n", "looks: 2}\n  again: [{traces: 4}]\n")
+    pipeline.write_text(text, encoding="utf-8")
+    assert run(workspace) == 0
+    folder = workspace / "runs" / "tanks"
+    files = [*folder.rglob("fit.json"), folder / "together.json", folder / "together-2.json"]
+    stamps = [one.stat().st_mtime_ns for one in files]
+    # A is dealt in twice now: as many copies of the others' share as there are traces
+    pipeline.write_text(text.replace("{traces: 4}", "{traces: 4, also: [more]}"), encoding="utf-8")
+    assert run(workspace) == 0
+    changed = [one.stat().st_mtime_ns != stamp for one, stamp in zip(files, stamps, strict=True)]
+    assert changed == [False] * (len(files) - 1) + [True]
+    results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    assert set(results["data"]["others"]) == {"more"}
+
+
+def test_data_of_a_round_without_estimation_traces_are_refused(workspace: Path) -> None:
+    more = workspace / "datasets" / "more"
+    shutil.copytree(workspace / "datasets" / "tanks", more)
+    file = more / "dataset.yaml"
+    text = file.read_text(encoding="utf-8").replace("name: tanks", "name: more")
+    file.write_text(text.replace("role: estimation", "role: validation"), encoding="utf-8")
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    asked = pipeline.read_text(encoding="utf-8").replace("looks: 2}\n", "looks: 2}\n  also: [more]\n")
+    pipeline.write_text(asked, encoding="utf-8")
+    with pytest.raises(ConfigError, match="the data of a round lack a role"):
+        run(workspace)
+
+
 def test_a_run_that_has_not_come_so_far_has_no_assembly(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="has no assembly"):
         read_assembly(tmp_path)

@@ -40,6 +40,12 @@ def test_a_channel_that_was_measured_in_one_round_may_be_trained_in_the_next():
     assert (one.spared, one.judged) == (("BP",), ("BC", "BP"))
 
 
+def test_data_sets_that_a_round_has_beside_the_others_stay_for_the_next():
+    one = together(again=[{"also": ["hard"]}, {"traces": 3}, {"also": []}])
+    assert [each.also for each in one.rounds] == [(), ("hard",), ("hard",), ()]
+    assert one.data == ("hard",)
+
+
 def test_a_round_may_train_other_members():
     one = together(members=["BP"], again=[{"traces": 3}, {"members": ["BC"]}])
     assert [one.members for one in one.rounds] == [("BP",), ("BP",), ("BC",)]
