@@ -156,7 +156,12 @@ class Course:
                 fit, key = self.context.fit(
                     f"{member.slug}-retrained-{number}",
                     f"Retraining {member.mapping} on what the others put out, round {number + 1}",
-                    {"before": key, "member": name, "iterations": asked.max_iterations},
+                    {
+                        "before": key,
+                        "member": name,
+                        "iterations": asked.max_iterations,
+                        "whole": assembled(self.context.config, models).to_dict(),
+                    },
                     partial(
                         retrain,
                         self.context.config,
@@ -200,6 +205,7 @@ class Course:
                 f"Training {member.mapping} on {len(traces)} traces, round {number}",
                 {
                     "before": before, "member": member.mapping.output, "iterations": asked.max_iterations,
+                    "whole": assembled(self.context.config, now).to_dict(),
                     "data": [trace.digest for trace in traces],
                 },
                 partial(

@@ -312,3 +312,17 @@ def test_what_is_declared_beside_a_member_leaves_its_fit_as_it_was(workspace: Pa
     now = CascadeFit.from_dict(json.loads((folder / "together.json").read_text(encoding="utf-8")))
     assert now.train_time_s == whole.train_time_s, "not trained again"
     assert "LL" in now.model.outputs, "but in the whole as it now is"
+
+
+def test_a_limit_that_changes_leaves_the_fits_and_not_what_runs_on_the_others(workspace: Path) -> None:
+    """Retraining runs on what the whole puts out, which its limits hold."""
+    assert run(workspace) == 0
+    folder = workspace / "runs" / "tanks"
+    files = sorted((folder / "fits").rglob("fit.json"))
+    stamps = [file.stat().st_mtime_ns for file in files]
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8").replace("  lower: {low: 0}", "  lower: {low: 0, high: 50}")
+    pipeline.write_text(text, encoding="utf-8")
+    assert run(workspace) == 0
+    changed = {file.parent.name for file, stamp in zip(files, stamps, strict=True) if file.stat().st_mtime_ns != stamp}
+    assert changed == {"upper-lower-retrained-0"}
