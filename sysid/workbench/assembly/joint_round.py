@@ -78,6 +78,7 @@ class JointRound:
             part = whole.upstream_of(asked.targets, given=asked.measured)
             asked_for = [one for one in config.members if not asked.members or one.mapping.output in asked.members]
             trained = [name for member in asked_for for name in placed_outputs(member) if name in part.outputs]
+        part = _in_own_order(part)
         return cls(
             whole=whole,
             part=part,
@@ -135,6 +136,11 @@ class JointRound:
         for model in self.part.models:
             whole = whole.with_member(fit.model.member(Ends.of(model).outputs[0]))
         return replace(fit, model=whole)
+
+
+def _in_own_order(part: Cascade) -> Cascade:
+    """The part with its members by name, as far as the wiring lets them: not as the whole happens to have them."""
+    return replace(part, models=tuple(sorted(part.models, key=lambda model: Ends.of(model).outputs)))
 
 
 def _of_part(part: Cascade, trace: Trace) -> Trace:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -13,7 +15,7 @@ from sysid.workbench.assembly import joint_round
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.stage_config import TogetherConfig
-from tests.models.cascades import command, service
+from tests.models.cascades import command, network, service
 
 
 def member(mapping: str) -> dict[str, object]:
@@ -75,6 +77,21 @@ def test_what_is_measured_is_an_input_and_comes_back_as_it_was(monkeypatch: pyte
     assert (set(part.inputs), set(part.outputs), names) == ({"BP"}, {"AR", "BC"}, ["AR", "BC"])
     assert changed(whole) == {"AR", "BC"}
     assert_array_equal(whole.member("BP").theta, service().member("BP").theta)
+
+
+def test_what_it_depends_on_is_the_same_in_whichever_order_the_whole_has_its_members() -> None:
+    members = (network("STP -> BP", seed=1), network("STP -> AR", seed=2), network("BP+AR -> BC", seed=3))
+    terms = [
+        JointRound.of(
+            CONFIG,
+            TogetherConfig.model_validate({"targets": {"BC": 1.0}}),
+            Cascade(models=order),
+            estimation=[record()],
+            selection=[],
+        ).terms
+        for order in permutations(members)
+    ]
+    assert all(one == terms[0] for one in terms)
 
 
 def test_members_that_are_named_are_the_ones_trained(monkeypatch: pytest.MonkeyPatch) -> None:
