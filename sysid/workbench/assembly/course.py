@@ -37,6 +37,9 @@ from sysid.workbench.store import code_digest, digest, read_json, strict, write_
 ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
 GROWN, TOGETHER = "grown", "trained end to end"
 
+_Also = tuple[list[Trace], list[Trace]]
+"""Traces to fit and traces that choose, of a data set that rounds have beside the others."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
@@ -75,13 +78,13 @@ class Course:
         estimation, selection = with_known(config.known, estimation), with_known(config.known, selection)
         also = {name: self._also(name) for name in (config.together.data if config.together else ())}
         rehearse(config, estimation[0])
-        if said := limit_note(config, [*estimation, *chain.from_iterable(also.values())]):
+        if said := limit_note(config, [*estimation, *chain.from_iterable(one for one, _ in also.values())]):
             self.notes.append(said)
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
         models, key, added = self._grown(models, key, estimation, selection)
         self._together(models, (*estimation, *added), selection, also)
-        return tuple(selection)
+        return (*selection, *chain.from_iterable(chosen_by for _, chosen_by in also.values()))
 
     def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
         """Every member's candidates; the best of each alone, and those that are best together."""
@@ -230,20 +233,20 @@ class Course:
         self.stages[GROWN] = assembled(self.context.config, grown.models)
         return grown.models, grown.key, tuple(trace for trace in sources if trace.name in grown.added)
 
-    def _also(self, name: str) -> list[Trace]:
-        """The estimation traces of a data set that some rounds have beside the others."""
+    def _also(self, name: str) -> _Also:
+        """The traces of a data set that some rounds have beside the others: to fit, and to choose by if it has such."""
         found = self.context.load(name)
-        traces = found.with_role(Role.ESTIMATION)
-        if not traces:
+        if not (traces := found.with_role(Role.ESTIMATION)):
             raise _lacks_a_role("the data of a round lack a role", found)
-        return with_known(self.context.config.known, traces)
+        known = self.context.config.known
+        return with_known(known, traces), with_known(known, found.with_role(Role.SELECTION))
 
     def _together(
         self,
         models: Members,
         estimation: Sequence[Trace],
         selection: Sequence[Trace],
-        also: Mapping[str, Sequence[Trace]],
+        also: Mapping[str, _Also],
     ) -> None:
         """Every round of training end to end, each from where the one before ended."""
         asked, whole = self.context.config.together, assembled(self.context.config, models)
@@ -251,8 +254,9 @@ class Course:
         for number, one in enumerate(rounds, start=1):
             suffix = "" if number == 1 else f", round {number}"
             whole = reading_more(whole, one.reads)
-            traces = dealt([estimation, *(also[name] for name in one.also)])
-            ready = JointRound.of(self.context.config, one, whole, estimation=traces, selection=selection)
+            traces = dealt([estimation, *(also[name][0] for name in one.also)])
+            chosen_by = [*selection, *chain.from_iterable(also[name][1] for name in one.also)]
+            ready = JointRound.of(self.context.config, one, whole, estimation=traces, selection=chosen_by)
             asked_for = one.model_dump(mode="json", exclude={"again", "also"})  # their traces are among the round's
             key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
             name = "together" if number == 1 else f"together-{number}"

@@ -84,7 +84,8 @@ class TogetherConfig(BaseModel):
         training: How.
         traces: Estimation traces used, the first so many; all by default.
         also: Data sets whose estimation traces are dealt in from here on, one in turn with one of those that all stages
-            have: what is rare among these, and would keep members that know little yet from finding their way.
+            have: what is rare among these, and would keep members that know little yet from finding their way. Their
+            selection traces choose with the others.
         again: Further rounds, for what is too slow from the beginning, such as more traces.
     """
 

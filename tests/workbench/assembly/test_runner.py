@@ -272,6 +272,23 @@ def test_a_round_may_have_traces_that_no_stage_before_it_has(workspace: Path) ->
     assert set(results["data"]["others"]) == {"more"}
 
 
+def test_data_of_a_round_choose_as_well(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen_by = []
+
+    def of(config, asked, whole, *, estimation, selection):
+        chosen_by.append(len(selection))
+        return make(config, asked, whole, estimation=estimation, selection=selection)
+
+    make = JointRound.of
+    monkeypatch.setattr(JointRound, "of", of)
+    shutil.copytree(workspace / "datasets" / "tanks", workspace / "datasets" / "more")
+    pipeline = workspace / "pipelines" / "tanks.yaml"
+    text = pipeline.read_text(encoding="utf-8")
+    pipeline.write_text(text.replace("looks: 2}\n", "looks: 2}\n  again: [{also: [more]}]\n"), encoding="utf-8")
+    assert run(workspace) == 0
+    assert chosen_by[1] == 2 * chosen_by[0] > 0
+
+
 def test_data_of_a_round_without_estimation_traces_are_refused(workspace: Path) -> None:
     more = workspace / "datasets" / "more"
     shutil.copytree(workspace / "datasets" / "tanks", more)
