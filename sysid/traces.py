@@ -169,6 +169,9 @@ class Trace:
     def __getitem__(self, channel: str) -> NDArray[np.float64]:
         return self.values[:, self.index(channel)]
 
+    def __contains__(self, channel: object) -> bool:
+        return channel in self.channel_names
+
     @property
     def channel_names(self) -> tuple[str, ...]:
         """Names of the channels, in column order."""
@@ -315,6 +318,9 @@ class TraceSet:
 
     def __iter__(self) -> Iterator[Trace]:
         return iter(self.traces)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
 
     def __getitem__(self, name: str) -> Trace:
         for trace in self.traces:

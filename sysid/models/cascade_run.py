@@ -69,6 +69,9 @@ class CascadeRun:
             raise ChannelError([channel], names, where="run of the cascade")
         return self.values[..., names.index(channel)]
 
+    def __contains__(self, channel: object) -> bool:
+        return channel in (*self.inputs, *self.outputs)
+
     @property
     def activity(self) -> dict[str, Activity]:
         """How often each output was held, over all records."""

@@ -308,6 +308,12 @@ def test_what_is_no_cascade_is_refused(fields):
         cascade_from_dict(fields)
 
 
+def test_a_run_says_which_channels_it_has():
+    run = service().simulate(command())
+    assert "BC" in run and "STP" in run
+    assert "XX" not in run
+
+
 def test_members_are_found_and_replaced_by_their_outputs():
     cascade = service()
     other = network("BP -> AR", seed=9)
