@@ -20,7 +20,7 @@ from sysid.estimation.soft_margin import counted
 from sysid.estimation.trained_members import TrainedMembers
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import Program
-from sysid.kernels.cascade_sensitivities import sensitivities
+from sysid.kernels.cascade_sensitivities import rows_for, sensitivities
 from sysid.models import Cascade, Member
 from sysid.traces import Trace
 
@@ -253,8 +253,10 @@ class CascadeProvider(AbstractProvider):
         for rows, blocks in self._blocks(program, record, passed, n):
             for j, (held, block) in enumerate(zip(waiting, blocks, strict=True)):
                 weighted = block if record.root_weights is None else block * record.root_weights[rows, None]
+                moving = weighted.any(axis=1)  # a target that is held adds nothing
+                weighted = weighted[moving]
                 roots = leverage_roots(weighted, self._longest)
-                held.append((weighted * roots[:, None], residual[rows, j] * roots))
+                held.append((weighted * roots[:, None], residual[rows, j][moving] * roots))
             gathered += rows.stop - rows.start
             if gathered < GATHERED and rows.stop < len(record.rows):
                 continue
@@ -284,25 +286,27 @@ class CascadeProvider(AbstractProvider):
     ) -> Iterator[tuple[slice, list[NDArray[np.float64]]]]:
         """Block by block the counted rows of every target's Jacobian over its error, up to where they are zero."""
         trained, samples = self._trained, len(record.values)
-        carry = trained.carry
-        J = np.empty((len(program.output_channel), carry + BLOCK, n))
+        kept = 1 + trained.carry
+        kept[[output for output in self._outputs if output >= 0]] += BLOCK - 1
+        room = rows_for(kept, n)
         at = 0
         for first in range(0, samples, BLOCK):
             rows = min(BLOCK, samples - first)
-            if first:
-                J[:, :carry] = J[:, BLOCK : BLOCK + carry]
             sensitivities(
                 program, record.levels, first, rows, passed.values, passed.kept, passed.held,
-                trained.own_first, trained.extent, trained.source, carry, J,
+                trained.own_first, trained.extent, trained.source, room,
             )  # fmt: skip
-            picked = record.rows[slice(*np.searchsorted(record.rows, (first, first + rows)))] - first + carry
+            picked = record.rows[slice(*np.searchsorted(record.rows, (first, first + rows)))]
             blocks = []
             for output, error in zip(self._outputs, self.errors.values(), strict=True):
                 if output < 0:
                     blocks.append(np.zeros((len(picked), 0)))
                     continue
-                scale = program.output_scale[output] / error
-                blocks.append(J[output, picked, : trained.extent[output]] * scale)
+                places = room.first[output] + (picked & room.mask[output])
+                block = room.J[places, : trained.extent[output]]
+                block[~room.moves[places]] = 0.0
+                block *= program.output_scale[output] / error
+                blocks.append(block)
             yield slice(at, at + len(picked)), blocks
             at += len(picked)
 

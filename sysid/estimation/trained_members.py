@@ -31,7 +31,7 @@ class TrainedMembers:
         own_first: For each member that is run the first of its trained parameters; -1 where it has none.
         extent: For each output the parameters up to which its sensitivities are not zero.
         source: For each regressor the output that it holds; -1 for an input.
-        carry: Rows of sensitivities that a block needs of the one before.
+        carry: For each output the longest lag with which it is read.
     """
 
     members: tuple[Member, ...]
@@ -41,7 +41,7 @@ class TrainedMembers:
     own_first: NDArray[np.int64]
     extent: NDArray[np.int64]
     source: NDArray[np.int64]
-    carry: int
+    carry: NDArray[np.int64]
 
     @classmethod
     def of(cls, cascade: Cascade, trained: Sequence[str] | None) -> TrainedMembers:
@@ -73,7 +73,7 @@ class TrainedMembers:
             own_first=own_first,
             extent=_extent(program, source, flags, [own for _, own in places]),
             source=source,
-            carry=int(program.regressor_lag[source >= 0].max(initial=0)),
+            carry=_carry(program, source),
         )
 
     @property
@@ -160,6 +160,12 @@ def _places(parts: Sequence[Part], trained: Sequence[bool]) -> tuple[tuple[slice
             own += n
         first += n
     return tuple(places)
+
+
+def _carry(program: Program, source: NDArray[np.int64]) -> NDArray[np.int64]:
+    longest = np.zeros(len(program.output_channel), dtype=np.int64)
+    np.maximum.at(longest, source[source >= 0], program.regressor_lag[source >= 0])
+    return longest
 
 
 def _extent(

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOST, LOW, LOW_CHANNEL, laid_out
+from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOST, LOW, LOW_CHANNEL, SUM_HEAD, laid_out
 from sysid.kernels.registers import LANES, affine, dot, tanh
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -59,6 +59,18 @@ def _linear(theta, first, flat, back, first_x, here, n_x):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _placed(indices, back):
+    """The indices of sums with how far back each term stands in place of its regressor."""
+    placed, at = indices.copy(), 0
+    while at < len(placed):
+        n = int(placed[at])
+        for i in range(at + SUM_HEAD, at + SUM_HEAD + n):
+            placed[i] = back[indices[i]]
+        at += SUM_HEAD + n
+    return placed
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _keep(kept, h, neurons, neuron_first):
     """Write the activations of one sample side by side, without their padding."""
     at = 0
@@ -77,14 +89,17 @@ def _walk(p, layout, values, past, at_sample, kept, held):
     fixed, fixed_limits, fixed_codes = layout.fixed, layout.fixed_limits, layout.fixed_codes
     weights, hidden_first, gates_first = layout.weights, layout.hidden_first, layout.gates_first
     blocks, neuron_first, g, readout_first = layout.blocks, layout.neuron_first, layout.readout, layout.readout_first
+    sum_first, numbers, codes = layout.sums.first, layout.sums.numbers, layout.sums.codes
     n_x_of = np.diff(p.regressor_first)
     blocks_y, neuron_y = blocks[layout.member], neuron_first[layout.member]
     first_x_y, n_x_y = p.regressor_first[layout.member], n_x_of[layout.member]
-    x, h, linear = np.empty(n_x_of.max()), np.zeros(LANES * blocks.sum()), np.zeros(len(order_y))
+    x, h, linear = np.empty(n_x_of.max()), np.zeros(LANES * blocks.sum()), np.zeros(len(p.output_channel))
     flat, wide = values.reshape(-1), values.shape[1]
     back = p.regressor_lag * wide - p.regressor_channel
+    indices = _placed(layout.sums.indices, back)
     for row in range(past, len(values)):
         here, t = row * wide, at_sample + row - past
+        at, here_u, t_u = np.uintp(0), np.uintp(here), np.uintp(t)  # numba looks at the sign of other indices
         for level in range(len(network_first) - 1):
             for q in range(network_first[level], network_first[level + 1]):
                 m = networks[q]
@@ -121,6 +136,21 @@ def _walk(p, layout, values, past, at_sample, kept, held):
                 limited, held_by = _limited(total, code, low, high, low_code, high_code)
                 flat[np.uintp(here + p.output_channel[o])] = limited
                 held[t, o] = held_by
+            for q in range(sum_first[level], sum_first[level + 1]):
+                total, low, high = numbers[at], numbers[at + np.uintp(1)], numbers[at + np.uintp(2)]
+                channel, o = indices[at + np.uintp(1)], indices[at + np.uintp(2)]
+                end = at + np.uintp(SUM_HEAD) + indices[at]
+                at += np.uintp(SUM_HEAD)
+                while at < end:
+                    total += numbers[at] * flat[here_u - indices[at]]
+                    at += np.uintp(1)
+                held_by = FREE
+                if total > high:
+                    total, held_by = high, codes[q, 1]
+                if total < low:
+                    total, held_by = low, codes[q, 0]
+                flat[here_u + channel] = total
+                held[t_u, o] = held_by
         if len(kept) > 0:
             _keep(kept[t], h, p.neurons, neuron_first)
 

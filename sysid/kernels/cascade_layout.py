@@ -59,6 +59,27 @@ class Program(NamedTuple):
     limit_channel: NDArray[np.int64]
 
 
+class Sums(NamedTuple):
+    """Outputs of members without neurons that are held between two numbers, in the order in which they run.
+
+    What the pass needs of one stands side by side, numbers in one array and indices at the same places of another:
+    constant, low, high, then a weight for each term; and number of terms, channel that is written, position among the
+    outputs, then a regressor for each term. There may be five of them for each network, and what they compute is so
+    little that to look it up in the program takes four times as long.
+
+    Attributes:
+        first: Where each level begins among them; one more entry than levels.
+        numbers: Between units.
+        indices: Not negative.
+        codes: What their bounds are called where they hold, shape ``(n_sums, 2)``.
+    """
+
+    first: NDArray[np.int64]
+    numbers: NDArray[np.float64]
+    indices: NDArray[np.uint64]
+    codes: NDArray[np.int64]
+
+
 class Layout(NamedTuple):
     """A program as the pass over the samples reads it.
 
@@ -75,7 +96,8 @@ class Layout(NamedTuple):
         neuron_first: Where each member's neurons stand among all, with their padding.
         readout: Readouts of all outputs; gates write theirs anew at every sample.
         readout_first: Where each output's begin.
-        order_y: Outputs level by level.
+        sums: What is no more than a sum between two numbers.
+        order_y: The other outputs level by level.
         level_first_y: Where each level begins among them; one more entry than levels.
         member: The member of each output.
         constant: Where the constant of each output stands in ``theta``.
@@ -97,6 +119,7 @@ class Layout(NamedTuple):
     neuron_first: NDArray[np.int64]
     readout: NDArray[np.float64]
     readout_first: NDArray[np.int64]
+    sums: Sums
     order_y: NDArray[np.int64]
     level_first_y: NDArray[np.int64]
     member: NDArray[np.int64]
@@ -106,6 +129,9 @@ class Layout(NamedTuple):
     fixed_limits: NDArray[np.float64]
     fixed_codes: NDArray[np.int64]
 
+
+SUM_HEAD = 3
+"""Numbers of a sum before its terms."""
 
 FREE, LOW, HIGH, LOW_CHANNEL, HIGH_CHANNEL, LOST = 0, 1, 2, 3, 4, 5
 """What held an output at a sample: nothing; a constant limit; a limit that is a channel; the bound of the network."""
@@ -276,6 +302,34 @@ def _fixed(p, bounds):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _part(order_y, level_first_y, chosen):
+    """Some of the outputs in their order, and where each level begins among them."""
+    first = np.zeros_like(level_first_y)
+    for level in range(len(first) - 1):
+        first[level + 1] = first[level] + np.sum(chosen[order_y[level_first_y[level] : level_first_y[level + 1]]])
+    return order_y[chosen[order_y]], first
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sums(p, theta, order_y, first, member, constant, linear_first, limits, codes):
+    """The outputs that are sums, with what the pass needs of each side by side."""
+    size = 0
+    for o in order_y:
+        size += SUM_HEAD + p.regressor_first[member[o] + 1] - p.regressor_first[member[o]]
+    numbers, indices, at = np.zeros(size), np.zeros(size, dtype=np.uint64), 0
+    for o in order_y:
+        first_x = p.regressor_first[member[o]]
+        n_x = p.regressor_first[member[o] + 1] - first_x if linear_first[o] >= 0 else 0
+        numbers[at], numbers[at + 1], numbers[at + 2] = theta[constant[o]], limits[o, 0], limits[o, 1]
+        indices[at], indices[at + 1], indices[at + 2] = n_x, p.output_channel[o], o
+        for i in range(n_x):
+            numbers[at + SUM_HEAD + i] = theta[linear_first[o] + i]
+            indices[at + SUM_HEAD + i] = first_x + i
+        at += SUM_HEAD + n_x
+    return Sums(first, numbers, indices, codes[order_y])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def laid_out(p):
     """The layout of a program."""
     theta, bounds = in_units(p)
@@ -285,6 +339,10 @@ def laid_out(p):
     fixed, fixed_limits, fixed_codes = _fixed(p, bounds)
     weights, hidden_first, gates_first, neuron_first, readout, readout_first = _in_blocks(p, theta, order)
     order_y, level_first_y, member, constant, linear_first = _by_output(p, order, level_first)
+    is_sum = fixed & (blocks[member] == 0)
+    sum_y, first = _part(order_y, level_first_y, is_sum)
+    sums = _sums(p, theta, sum_y, first, member, constant, linear_first, fixed_limits, fixed_codes)
+    order_y, level_first_y = _part(order_y, level_first_y, ~is_sum)
     return Layout(
         theta,
         bounds,
@@ -298,6 +356,7 @@ def laid_out(p):
         neuron_first,
         readout,
         readout_first,
+        sums,
         order_y,
         level_first_y,
         member,

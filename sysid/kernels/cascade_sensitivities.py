@@ -16,16 +16,55 @@ other's. Inputs of the whole contribute nothing. An output held by a constant ha
 that channel's row.
 
 Rows end after the parameters of the member itself: no output depends on members that run later.
+
+Of each output only so many rows are kept as somebody reads again: those of a switch that is read at the same sample,
+or one sample later, stay in the cache, where a record's worth of rows of every output would go through main memory
+(in a whole of 58 members: 3 MB a sample). Rows of zeros, such as those of a switch at its stop, are marked
+and neither written nor added.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import FREE, HIGH_CHANNEL, LOW_CHANNEL, gates_at
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+
+class Rows(NamedTuple):
+    """The newest rows of the Jacobians of all outputs; that of sample ``t`` stands at ``first + (t & mask)``.
+
+    Attributes:
+        J: Shape ``(n_rows, n_parameters)``.
+        moves: Whether a row is more than zeros; where it is not, ``J`` holds anything. Shape ``(n_rows,)``.
+        first: Where each output's rows begin.
+        mask: One less than how many rows each output has, which is a power of two.
+    """
+
+    J: NDArray[np.float64]
+    moves: NDArray[np.bool_]
+    first: NDArray[np.int64]
+    mask: NDArray[np.int64]
+
+
+def rows_for(kept: NDArray[np.int64], n_parameters: int) -> Rows:
+    """Room for some rows of each output.
+
+    Args:
+        kept: How many rows of each output are read again, its newest among them.
+        n_parameters: Length of a row.
+
+    Returns:
+        The rows, all of them zeros.
+    """
+    size = np.array([1 << int(n - 1).bit_length() for n in kept], dtype=np.int64)
+    total = int(size.sum())
+    return Rows(np.empty((total, n_parameters)), np.zeros(total, dtype=np.bool_), np.cumsum(size) - size, size - 1)
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
@@ -86,39 +125,52 @@ def _factors(c, theta, first, gates, j, n, n_x, n_y, linear, h, g):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _through_the_past(row, c, p, m, t, here, extent, source, J):
-    """Add what earlier samples and upstream outputs pass on; regressors of one channel stand side by side."""
-    first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
-    i = 0
-    while i < n_x:
-        s, end = source[first_x + i], i + 1
-        while end < n_x and p.regressor_channel[first_x + end] == p.regressor_channel[first_x + i]:
-            end += 1
-        stop = end
+def _through_the_past(row, c, p, m, t, extent, source, rows, factors, others, reach):
+    """Add what earlier samples and upstream outputs pass on, four rows at a time; whether there was anything."""
+    found = 0
+    for i in range(p.regressor_first[m], p.regressor_first[m + 1]):
+        s, lag = source[i], p.regressor_lag[i]
         # Samples before the first do not depend on the parameters.
-        while end > i and t < p.regressor_lag[first_x + end - 1]:
-            end -= 1
-        if s >= 0 and extent[s] > 0:
-            ratio = p.output_scale[s] / p.regressor_scale[first_x + i]
-            while end - i >= 4:
-                lag = p.regressor_lag[first_x + i : first_x + i + 4]
-                _add_four(
-                    row, ratio * c[i], ratio * c[i + 1], ratio * c[i + 2], ratio * c[i + 3],
-                    J[s, here - lag[0]], J[s, here - lag[1]], J[s, here - lag[2]], J[s, here - lag[3]],
-                    extent[s],
-                )  # fmt: skip
-                i += 4
-            while i < end:
-                _add(row, ratio * c[i], J[s, here - p.regressor_lag[first_x + i]], extent[s])
-                i += 1
-        i = stop
+        if s < 0 or lag > t or extent[s] == 0:
+            continue
+        other = rows.first[s] + ((t - lag) & rows.mask[s])
+        if rows.moves[other]:
+            factors[found] = c[i - p.regressor_first[m]] * (p.output_scale[s] / p.regressor_scale[i])
+            others[found], reach[found] = other, extent[s]
+            found += 1
+    i = 0
+    while i < found:
+        if i + 4 <= found and reach[i] == reach[i + 1] == reach[i + 2] == reach[i + 3]:
+            _add_four(
+                row, factors[i], factors[i + 1], factors[i + 2], factors[i + 3],
+                rows.J[others[i]], rows.J[others[i + 1]], rows.J[others[i + 2]], rows.J[others[i + 3]], reach[i],
+            )  # fmt: skip
+            i += 4
+        else:
+            _add(row, factors[i], rows.J[others[i]], reach[i])
+            i += 1
+    return found > 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent, source, carry, J):
-    """Rows ``first`` to ``first + n_rows`` of the Jacobians of all outputs, in their scaled numbers.
+def _limit(p, o, code, t, rows, extent, row):
+    """Write the row of the channel that holds an output; whether it is more than zeros."""
+    channel = p.limit_channel[o, 0 if code == LOW_CHANNEL else 1]
+    for s in range(o):
+        if p.output_channel[s] == channel:
+            other = rows.first[s] + (t & rows.mask[s])
+            if rows.moves[other]:
+                row[: extent[o]] = 0.0
+                _add(row, p.output_scale[s] / p.output_scale[o], rows.J[other], extent[s])
+                return True
+    return False
 
-    The record is walked in blocks; ``J`` holds ``carry`` rows of the block before, which the caller moves to its head.
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent, source, rows):
+    """The Jacobians of all outputs at samples ``first`` to ``first + n_rows``, in their scaled numbers.
+
+    A record is walked in blocks; what a block needs of the one before stands in ``rows``.
 
     Args:
         p: The members.
@@ -131,15 +183,14 @@ def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent,
         own_first: Where each member's parameters stand in a row; -1 for a member that is not trained.
         extent: Length of each output's row: after it there are zeros, which are not written.
         source: Output that each regressor reads; -1 for an input of the whole.
-        carry: Rows kept from the block before: the longest lag of a regressor with a source.
-        J: Shape ``(n_outputs, carry + n_rows, n_parameters)``; rows from ``carry`` on are written.
+        rows: Of each output the rows that are read again; written.
     """
     members, width = len(p.neurons), 0
     for m in range(members):
         width = max(width, p.regressor_first[m + 1] - p.regressor_first[m])
-    x, c, g = np.empty(width), np.empty(width), np.empty(p.neurons.max())
-    for r in range(n_rows):
-        t = first + r
+    x, c, g = np.empty(width), np.empty(width), np.empty(max(1, p.neurons.max()))
+    factors, others, reach = np.empty(width), np.empty(width, dtype=np.int64), np.empty(width, dtype=np.int64)
+    for t in range(first, first + n_rows):
         at_neuron = 0
         for m in range(members):
             n = p.neurons[m]
@@ -155,21 +206,20 @@ def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent,
             gates = gates_at(p.theta_first, m, n, n_x, n_y)
             for j in range(n_y):
                 o = first_y + j
-                row = J[o, carry + r]
-                row[: extent[o]] = 0.0
-                code = held[t, o]
+                at = rows.first[o] + (t & rows.mask[o])
+                row, code = rows.J[at], held[t, o]
+                rows.moves[at] = False
                 if code != FREE:
                     if code in (LOW_CHANNEL, HIGH_CHANNEL):
-                        channel = p.limit_channel[o, 0 if code == LOW_CHANNEL else 1]
-                        for s in range(o):
-                            if p.output_channel[s] == channel:
-                                _add(row, p.output_scale[s] / p.output_scale[o], J[s, carry + r], extent[s])
+                        rows.moves[at] = _limit(p, o, code, t, rows, extent, row)
                     continue
                 if extent[o] == 0:
                     continue
+                row[: extent[o]] = 0.0
                 _gains(g, p.theta, p.theta_first[m] + n * (n_x + 1) + j * n, gates, n, n_x, x)
                 if own_first[m] >= 0:
                     own_gates = own_first[m] + gates - p.theta_first[m] if gates >= 0 else -1
                     _own(row, own_first[m], own_gates, j, n, n_x, n_y, linear, x, h, g)
                 _factors(c, p.theta, p.theta_first[m], gates, j, n, n_x, n_y, linear, h, g)
-                _through_the_past(row, c, p, m, t, carry + r, extent, source, J)
+                passed = _through_the_past(row, c, p, m, t, extent, source, rows, factors, others, reach)
+                rows.moves[at] = own_first[m] >= 0 or passed

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from sysid.kernels.cascade import _bounded, _limited
-from sysid.kernels.cascade_layout import FREE, HIGH, LOW, Program, laid_out
+from sysid.kernels.cascade_layout import FREE, HIGH, LOW, SUM_HEAD, Program, laid_out
 from sysid.models.cascade_stages import CompiledStage
 from tests.models.cascades import CASCADES
 
@@ -33,9 +33,24 @@ def test_members_that_do_not_read_each_other_at_the_same_sample_are_of_one_level
 
 def test_what_a_limit_is_made_of_comes_a_level_before_it():
     layout = laid_out(program("a limit made of what it limits, a sample ago"))  # BP, x = AR a sample ago, AR, BC
-    assert_array_equal(layout.order_y, [0, 1, 2, 3])
-    assert_array_equal(layout.level_first_y, [0, 2, 3, 4])
+    assert_array_equal(layout.order_y, [0, 2, 3])
+    assert_array_equal(layout.level_first_y, [0, 1, 2, 3])
+    assert_array_equal(layout.sums.first, [0, 1, 1, 1])
     assert_array_equal(layout.fixed, [True, True, False, True])
+
+
+def test_a_sum_between_two_numbers_stands_with_its_terms_side_by_side():
+    one = program("a limit made of what it limits, a sample ago")
+    layout = laid_out(one)
+
+    terms = int(layout.sums.indices[0])
+    member, (constant, low, high) = layout.member[1], layout.sums.numbers[:SUM_HEAD]
+    first = one.regressor_first[member]
+    assert_array_equal(layout.sums.indices[1:], [one.output_channel[1], 1, *range(first, first + terms)])
+    assert constant == layout.theta[layout.constant[1]]
+    assert [low, high] == layout.fixed_limits[1].tolist()
+    assert_array_equal(layout.sums.numbers[SUM_HEAD:], layout.theta[layout.linear_first[1] :][:terms])
+    assert_array_equal(layout.sums.codes, layout.fixed_codes[[1]])
 
 
 @given(PAIRS, PAIRS, st.floats(-4.0, 4.0))
