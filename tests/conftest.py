@@ -1,11 +1,17 @@
 """Settings that all tests share."""
 
+import signal
+
 import pytest
 from hypothesis import settings
 
 # Seeds are fixed, so that a failure is the same everywhere; machines that are busy are not slow code.
 settings.register_profile("sysid", derandomize=True, deadline=None)
 settings.load_profile("sysid")
+
+# A shell that starts the tests in the background has them, and what they start, ignore Ctrl-C, which some tests press.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True)
