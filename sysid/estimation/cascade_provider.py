@@ -27,7 +27,7 @@ from sysid.traces import Trace
 _Found = TypeVar("_Found")
 
 BLOCK = 256
-"""Rows of each output's Jacobian that are alive at a time: 256 rows of 1,500 parameters for four outputs are 12 MB."""
+"""Rows of each target's Jacobian that are alive at a time: 256 rows of 1,500 parameters for four outputs are 12 MB."""
 
 
 GATHERED = 1024

@@ -144,13 +144,7 @@ def _walk(p, layout, values, past, at_sample, kept, held):
                 while at < end:
                     total += numbers[at] * flat[here_u - indices[at]]
                     at += np.uintp(1)
-                held_by = FREE
-                if total > high:
-                    total, held_by = high, codes[q, 1]
-                if total < low:
-                    total, held_by = low, codes[q, 0]
-                flat[here_u + channel] = total
-                held[t_u, o] = held_by
+                flat[here_u + channel], held[t_u, o] = _limited(total, FREE, low, high, codes[q, 0], codes[q, 1])
         if len(kept) > 0:
             _keep(kept[t], h, p.neurons, neuron_first)
 

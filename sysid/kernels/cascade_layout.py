@@ -65,7 +65,7 @@ class Sums(NamedTuple):
     What the pass needs of one stands side by side, numbers in one array and indices at the same places of another:
     constant, low, high, then a weight for each term; and number of terms, channel that is written, position among the
     outputs, then a regressor for each term. There may be five of them for each network, and what they compute is so
-    little that to look it up in the program takes four times as long.
+    little that looking it up in the program would take longer.
 
     Attributes:
         first: Where each level begins among them; one more entry than levels.

@@ -17,10 +17,9 @@ that channel's row.
 
 Rows end after the parameters of the member itself: no output depends on members that run later.
 
-Of each output only so many rows are kept as somebody reads again: those of a switch that is read at the same sample,
-or one sample later, stay in the cache, where a record's worth of rows of every output would go through main memory
-(in a whole of 58 members: 3 MB a sample). Rows of zeros, such as those of a switch at its stop, are marked
-and neither written nor added.
+Of each output only so many rows are kept as somebody reads again: those of a switch that is read at the same sample, or
+one sample later, stay in the cache, where as many rows of every output as the longest lag needs would go through main
+memory. Rows of zeros, such as those of a switch at its stop, are marked and neither written nor added.
 """
 
 from __future__ import annotations
