@@ -148,15 +148,16 @@ class CascadeProvider(AbstractProvider):
         n = len(theta)
         gradient, matrix, loss, correlated, rows = np.zeros(n), np.zeros((n, n)), 0.0, 0.0, 0
 
-        def one(record: _Record) -> tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-            return self._normal_equations(program, record, n)
+        def one(record: _Record) -> tuple[float, NDArray[np.float64], NDArray[np.float64], int, float]:
+            own, part, square, residual = self._normal_equations(program, record, n)
+            return own, part, square, len(residual), float(np.mean([correlation_time(column) for column in residual.T]))
 
-        for own, part, square, residual in self._each(one):
+        for own, part, square, length, correlation in self._each(one):
             loss += own
             gradient += part
             matrix += square
-            correlated += len(residual) * float(np.mean([correlation_time(column) for column in residual.T]))
-            rows += len(residual)
+            correlated += length * correlation
+            rows += length
         return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / rows)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -219,11 +220,16 @@ class CascadeProvider(AbstractProvider):
         )
 
     def _each(self, work: Callable[[_Record], _Found]) -> Iterator[_Found]:
+        def quietly(record: _Record) -> _Found:
+            # A start that runs away has sensitivities beyond the largest number; its step is then not taken.
+            with np.errstate(over="ignore", invalid="ignore"):
+                return work(record)
+
         if self.workers <= 1 or len(self._records) <= 1:
-            yield from map(work, self._records)
+            yield from map(quietly, self._records)
             return
         with ThreadPoolExecutor(self.workers) as pool:  # results come in the order of the records: sums do not depend
-            yield from pool.map(work, self._records)  # on which thread was first
+            yield from pool.map(quietly, self._records)  # on which thread was first
 
     def _pass(self, program: Program, record: _Record, *, keep: bool) -> _Passed:
         n = len(record.values)

@@ -156,3 +156,10 @@ def test_names_that_are_no_outputs_are_refused(fields):
 def test_a_loss_that_is_not_a_number_is_infinite():
     one = provider(service())
     assert one.loss(np.full(len(one.theta), np.nan)) == np.inf
+
+
+def test_a_start_that_runs_away_overflows_without_a_warning():
+    one = provider(Cascade(models=(linear("STP -> BP"),)), n=1200)
+    with np.errstate(all="raise"):  # what one has asked for elsewhere does not matter either
+        found = one.linearise(2.0 * one.theta)
+    assert not np.isfinite(found.gauss_newton).any()
