@@ -106,3 +106,15 @@ def test_a_case_is_made_again_bit_for_bit(name: str, traces: TraceSet) -> None:
     again = load_dataset(FOLDER / name, cases=[case], cache=False)[case]
     np.testing.assert_array_equal(again.values, traces[case].values)
     assert again.digest == traces[case].digest
+
+
+@pytest.mark.parametrize(("name", "case"), [("abdx-service", "VAL04"), ("abdx-selection", "SEL02")])
+def test_two_valves_are_those_of_the_same_run(name: str, case: str) -> None:
+    one = load_dataset(FOLDER / name, cases=[case], cache=False)[case]
+    two = load_dataset(FOLDER / f"{name}-two-valves", cases=[case], cache=False)[case]
+    for channel in ("STP", "BP", "AR"):
+        np.testing.assert_array_equal(two[channel], one[channel])
+    assert two["BP10"].min() > two["BP"].min()  # farther from the handle it falls later, and less deep
+    cases = read_description(FOLDER / f"{name}-two-valves" / "dataset.yaml").cases
+    for shared, told in read_description(FOLDER / name / "dataset.yaml").cases.items():
+        assert (cases[shared].recipe, cases[shared].role) == (told.recipe, told.role)
