@@ -152,12 +152,13 @@ class CascadeProvider(AbstractProvider):
             own, part, square, residual = self._normal_equations(program, record, n)
             return own, part, square, len(residual), float(np.mean([correlation_time(column) for column in residual.T]))
 
-        for own, part, square, length, correlation in self._each(one):
-            loss += own
-            gradient += part
-            matrix += square
-            correlated += length * correlation
-            rows += length
+        with np.errstate(invalid="ignore"):  # infinities of two records may cancel
+            for own, part, square, length, correlation in self._each(one):
+                loss += own
+                gradient += part
+                matrix += square
+                correlated += length * correlation
+                rows += length
         return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / rows)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:

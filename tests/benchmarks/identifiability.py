@@ -1,4 +1,4 @@
-"""What EST01 holds of the brake pipe: networks that fit it equally well, where they agree, and where all are wrong.
+"""What EST01 tells networks of the handle alone: those that fit it equally well, where they agree, where all are wrong.
 
 Run with ``python -m tests.benchmarks identifiability``; some five minutes on two cores. STP -> BP is fitted on EST01
 alone from 24 random starts, each to the end, with the structure of ``pipelines/mapping-stp-bp.yaml``. Of the eight
