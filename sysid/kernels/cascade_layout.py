@@ -6,8 +6,9 @@ the weights :math:`W / s` act on :math:`u` itself, and the constants lose :math:
 as :math:`s y + o`, its readouts, gates and linear part are :math:`s` times as large. So nothing is scaled sample by
 sample, and what several members read stands there for all of them as soon as it is known.
 
-Members that do not read each other at the same sample make a level, and run side by side: what they wait for, such as
-the hyperbolic tangents of their neurons, they wait for once.
+Members run level by level. A level begins with networks that do not read each other at the same sample: they run side
+by side, and what they wait for, such as the hyperbolic tangents of their neurons, they wait for once. The sums that can
+follow them do, one after the other. So there are no more levels than the longest chain has networks.
 """
 
 from __future__ import annotations
@@ -90,9 +91,9 @@ class Layout(NamedTuple):
         network_first: Where each level begins among them; one more entry than levels.
         tanh_first: Where each level begins among all their neurons, with their padding; one more entry than levels.
         weights: Of neurons and gates in blocks (``sysid/kernels/registers.py``), networks in that order.
-        hidden_first: Where those of each member's neurons begin.
-        gates_first: Where those of its gates begin; -1 for a member without.
+        weights_first: Where those of each member begin.
         blocks: Blocks of neurons of each member.
+        gate_blocks: Blocks of its gates: as many, or none.
         neuron_first: Where each member's neurons stand among all, with their padding.
         readout: Readouts of all outputs; gates write theirs anew at every sample.
         readout_first: Where each output's begin.
@@ -113,9 +114,9 @@ class Layout(NamedTuple):
     network_first: NDArray[np.int64]
     tanh_first: NDArray[np.int64]
     weights: NDArray[np.float64]
-    hidden_first: NDArray[np.int64]
-    gates_first: NDArray[np.int64]
+    weights_first: NDArray[np.int64]
     blocks: NDArray[np.int64]
+    gate_blocks: NDArray[np.int64]
     neuron_first: NDArray[np.int64]
     readout: NDArray[np.float64]
     readout_first: NDArray[np.int64]
@@ -197,21 +198,23 @@ def _reads(p, m, other):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _levels(p):
-    """Members level by level, those of one level independent of each other, and where each level begins."""
+def _levels(p, is_sum):
+    """Members level by level, each with its sums at the end, and where each level begins."""
     members = len(p.neurons)
-    level = np.zeros(members, dtype=np.int64)
+    level, last = np.zeros(members, dtype=np.int64), np.empty(members, dtype=np.bool_)
     for m in range(members):
+        last[m] = np.all(is_sum[p.output_first[m] : p.output_first[m + 1]])
         for other in range(m):
             if _reads(p, m, other):
-                level[m] = max(level[m], level[other] + 1)
+                level[m] = max(level[m], level[other] + (0 if last[m] else 1))
     order, first = np.empty(members, dtype=np.int64), np.zeros(level.max() + 2, dtype=np.int64)
     at = 0
     for one in range(len(first) - 1):
-        for m in range(members):
-            if level[m] == one:
-                order[at] = m
-                at += 1
+        for sums in (False, True):
+            for m in range(members):
+                if level[m] == one and last[m] == sums:
+                    order[at] = m
+                    at += 1
         first[one + 1] = at
     return order, first
 
@@ -236,23 +239,23 @@ def _in_blocks(p, theta, order):
         size += 2 * n * (n_x + 1)
         read += n * (p.output_first[m + 1] - p.output_first[m])
     weights, readout, readout_first = np.zeros(size), np.zeros(read), np.zeros(len(p.output_channel), dtype=np.int64)
-    hidden_first, gates_first, neuron_first = np.zeros_like(order), np.zeros_like(order), np.zeros_like(order)
+    weights_first, gate_blocks, neuron_first = np.zeros_like(order), np.zeros_like(order), np.zeros_like(order)
     at, at_neuron, at_readout = 0, 0, 0
     for m in order:
         n_x, n_y = p.regressor_first[m + 1] - p.regressor_first[m], p.output_first[m + 1] - p.output_first[m]
         n, own = p.neurons[m], p.theta_first[m]
         gates, v = gates_at(p.theta_first, m, n, n_x, n_y), own + n * (n_x + 1)
-        hidden_first[m], gates_first[m], neuron_first[m] = at, -1, at_neuron
+        weights_first[m], neuron_first[m] = at, at_neuron
         at = _put(weights, at, theta, own, own + n * n_x, n, n_x)
         at_neuron += padded(n)
         if gates >= 0:
-            gates_first[m] = at
+            gate_blocks[m] = padded(n) // LANES
             at = _put(weights, at, theta, gates, v, n, n_x)
         for j in range(n_y):
             readout_first[p.output_first[m] + j] = at_readout
             readout[at_readout : at_readout + n] = theta[v + j * n : v + (j + 1) * n]
             at_readout += padded(n)
-    return weights, hidden_first, gates_first, neuron_first, readout, readout_first
+    return weights, weights_first, gate_blocks, neuron_first, readout, readout_first
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -333,13 +336,13 @@ def _sums(p, theta, order_y, first, member, constant, linear_first, limits, code
 def laid_out(p):
     """The layout of a program."""
     theta, bounds = in_units(p)
-    order, level_first = _levels(p)
-    blocks = padded(p.neurons) // LANES
-    networks, network_first, tanh_first = _networks(blocks, order, level_first)
     fixed, fixed_limits, fixed_codes = _fixed(p, bounds)
-    weights, hidden_first, gates_first, neuron_first, readout, readout_first = _in_blocks(p, theta, order)
+    blocks = padded(p.neurons) // LANES
+    is_sum = fixed & (np.repeat(blocks, np.diff(p.output_first)) == 0)
+    order, level_first = _levels(p, is_sum)
+    networks, network_first, tanh_first = _networks(blocks, order, level_first)
+    weights, weights_first, gate_blocks, neuron_first, readout, readout_first = _in_blocks(p, theta, order)
     order_y, level_first_y, member, constant, linear_first = _by_output(p, order, level_first)
-    is_sum = fixed & (blocks[member] == 0)
     sum_y, first = _part(order_y, level_first_y, is_sum)
     sums = _sums(p, theta, sum_y, first, member, constant, linear_first, fixed_limits, fixed_codes)
     order_y, level_first_y = _part(order_y, level_first_y, ~is_sum)
@@ -350,9 +353,9 @@ def laid_out(p):
         network_first,
         tanh_first,
         weights,
-        hidden_first,
-        gates_first,
+        weights_first,
         blocks,
+        gate_blocks,
         neuron_first,
         readout,
         readout_first,

@@ -19,6 +19,7 @@ of it holds where a caller lets sums be reordered.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -159,43 +160,85 @@ def tanh(_context: Any, a: Any, first: Any, n: Any) -> Any:
     return types.void(a, first, n), generate
 
 
+_AT_ONCE = (4, 2, 1)
+"""Blocks whose sums are formed side by side: a sum waits four cycles for each of its products."""
+
+
 @intrinsic
-def affine(_context: Any, weights: Any, first: Any, n_x: Any, x: Any, out: Any, to: Any, blocks: Any) -> Any:
-    """Write the affine functions of ``x`` of some blocks of neurons; indices are not checked.
+def affine(
+    _context: Any, weights: Any, first: Any, n_x: Any, x: Any, x_first: Any,
+    h: Any, h_first: Any, h_blocks: Any, g: Any, g_first: Any, g_blocks: Any,
+) -> Any:  # fmt: skip
+    """Write the affine functions of ``x`` of some blocks of neurons and of some of gates; indices are not checked.
 
     Args:
         _context: Numba's.
-        weights: Flat, laid out as the head of the module says.
+        weights: Flat, laid out as the head of the module says, neurons before gates.
         first: Where the first block begins.
         n_x: Number of regressors.
-        x: Regressors, shape ``(n_x,)`` or longer.
-        out: Written from ``to`` on.
-        to: Where the first neuron stands.
-        blocks: Blocks of eight neurons.
+        x: Flat.
+        x_first: Where the regressors begin.
+        h: The neurons' are written from ``h_first`` on.
+        h_first: Where the first neuron stands.
+        h_blocks: Blocks of eight neurons.
+        g: The gates' are written from ``g_first`` on.
+        g_first: Where the first gate stands.
+        g_blocks: Blocks of eight gates.
     """
-    _check(weights=weights, x=x, out=out)
+    _check(weights=weights, x=x, h=h, g=g)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        w = _data(context, builder, signature.args[0], arguments[0])
-        regressors = _data(context, builder, signature.args[3], arguments[3])
-        result = _data(context, builder, signature.args[4], arguments[4])
-        start, rows, to_first, count = arguments[1], arguments[2], arguments[5], arguments[6]
-        lanes, none = ir.Constant(_INDEX, LANES), ir.Constant(_VECTOR, ir.Undefined)
+        kinds = signature.args
+        w, regressors, neurons, gates = (_data(context, builder, kinds[i], arguments[i]) for i in (0, 3, 5, 8))
+        start, rows, x_at, h_at, h_count, g_at, g_count = (arguments[i] for i in (1, 2, 4, 6, 7, 9, 10))
+        lanes = ir.Constant(_INDEX, LANES)
         constants = builder.mul(rows, lanes)
-        total = cgutils.alloca_once(builder, _VECTOR)
-        with cgutils.for_range(builder, count) as block:
-            own = builder.add(start, builder.mul(block.index, builder.add(constants, lanes)))
-            builder.store(_load(builder, w, builder.add(own, constants)), total)
+        length = builder.add(constants, lanes)
+
+        def place(block: Any) -> Any:
+            """Where the sums of a block are written."""
+            to_h = builder.gep(neurons, [builder.add(h_at, builder.mul(block, lanes))])
+            beyond = builder.mul(builder.sub(block, h_count), lanes)
+            to_g = builder.gep(gates, [builder.add(g_at, beyond)])
+            return builder.select(builder.icmp_unsigned("<", block, h_count), to_h, to_g)
+
+        def sum_up(block: Any, some: int) -> None:
+            """Write the sums of so many blocks from ``block`` on."""
+            blocks = [builder.add(block, ir.Constant(_INDEX, i)) for i in range(some)]
+            owns = [builder.add(start, builder.mul(one, length)) for one in blocks]
+            totals = [cgutils.alloca_once(builder, _VECTOR) for _ in blocks]
+            for own, total in zip(owns, totals, strict=True):
+                builder.store(_load(builder, w, builder.add(own, constants)), total)
             with cgutils.for_range(builder, rows) as row:
-                one = builder.load(builder.gep(regressors, [row.index]))
-                one = builder.insert_element(none, one, ir.Constant(ir.IntType(32), 0))
-                everywhere = builder.shuffle_vector(one, none, _lanes(*[0] * LANES))
-                column = _load(builder, w, builder.add(own, builder.mul(row.index, lanes)))
-                _add_product(builder, total, column, everywhere)
-            _store(builder, builder.load(total), result, builder.add(to_first, builder.mul(block.index, lanes)))
+                everywhere = _spread(builder, builder.load(builder.gep(regressors, [builder.add(x_at, row.index)])))
+                along = builder.mul(row.index, lanes)
+                for own, total in zip(owns, totals, strict=True):
+                    _add_product(builder, total, _load(builder, w, builder.add(own, along)), everywhere)
+            for one, total in zip(blocks, totals, strict=True):
+                _store(builder, builder.load(total), place(one), ir.Constant(_INDEX, 0))
+
+        _by_numbers(builder, builder.add(h_count, g_count), sum_up)
         return context.get_dummy_value()
 
-    return types.void(weights, first, n_x, x, out, to, blocks), generate
+    return types.void(weights, first, n_x, x, x_first, h, h_first, h_blocks, g, g_first, g_blocks), generate
+
+
+def _spread(builder: Any, one: Any) -> Any:
+    """A number in all lanes."""
+    none = ir.Constant(_VECTOR, ir.Undefined)
+    lane = builder.insert_element(none, one, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(lane, none, _lanes(*[0] * LANES))
+
+
+def _by_numbers(builder: Any, count: Any, work: Callable[[Any, int], None]) -> None:
+    """Go through some blocks, as many of them at once as there are left."""
+    done = ir.Constant(_INDEX, 0)
+    for some in _AT_ONCE:
+        size = ir.Constant(_INDEX, some)
+        turns = builder.udiv(builder.sub(count, done), size)
+        with cgutils.for_range(builder, turns) as turn:
+            work(builder.add(done, builder.mul(turn.index, size)), some)
+        done = builder.add(done, builder.mul(turns, size))
 
 
 @intrinsic

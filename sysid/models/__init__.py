@@ -4,6 +4,7 @@ from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_batch import simulate_family
+from sysid.models.cascade_mean import mean_of
 from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.form import AbstractForm
@@ -58,6 +59,7 @@ __all__ = [
     "VectorScaling",
     "Wiring",
     "cascade_from_dict",
+    "mean_of",
     "model_from_dict",
     "parameter_count",
     "simulate_family",

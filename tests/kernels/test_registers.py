@@ -14,9 +14,9 @@ from sysid.kernels.registers import LANES, affine, dot, tanh
 
 
 @njit
-def _affine(weights, first, n_x, x, out):
-    """As many blocks as there is room for from ``first`` on."""
-    affine(weights, first, n_x, x, out, first, (len(out) - first) // LANES)
+def _affine(weights, first, n_x, x, x_first, h, h_blocks, g, g_blocks):  # noqa: PLR0917
+    """Neurons and gates from ``first`` on, each in an array of their own."""
+    affine(weights, first, n_x, x, x_first, h, first, h_blocks, g, first, g_blocks)
 
 
 # As the kernels are compiled: a compiler that may reorder sums takes a rounding out that is written as two of them.
@@ -30,18 +30,26 @@ def _dot(left, left_first, right, right_first, blocks):
     return dot(left, left_first, right, right_first, blocks)
 
 
-@given(n_x=st.integers(0, 30), blocks=st.integers(0, 6), first=st.integers(0, 5), seed=st.integers(0, 2**32 - 1))
-def test_affine_functions_of_blocks_of_neurons(n_x, blocks, first, seed):
+@given(
+    n_x=st.integers(0, 30),
+    blocks=st.tuples(st.integers(0, 6), st.integers(0, 6)),
+    first=st.integers(0, 5),
+    x_first=st.integers(0, 3),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_affine_functions_of_blocks_of_neurons_and_gates(n_x, blocks, first, x_first, seed):
     rng = np.random.default_rng(seed)
-    weights, x = rng.normal(size=(blocks, n_x + 1, LANES)), rng.normal(size=n_x + 3)
-    out = np.full(first + LANES * blocks + 1, 7.0)
+    weights, x = rng.normal(size=(sum(blocks), n_x + 1, LANES)), rng.normal(size=x_first + n_x + 3)
+    h, g = (np.full(first + LANES * some + 1, 7.0) for some in blocks)
 
-    _affine(np.concatenate([np.full(first, np.nan), weights.ravel()]), first, n_x, x, out)
+    padded = np.concatenate([np.full(first, np.nan), weights.ravel()])
+    _affine(padded, first, n_x, x, x_first, h, blocks[0], g, blocks[1])
 
-    expected = weights[:, n_x] + np.einsum("bik,i->bk", weights[:, :n_x], x[:n_x])
-    assert_allclose(out[first:-1], expected.ravel(), rtol=1e-12, atol=1e-12)
-    assert np.all(out[:first] == 7.0), "nothing before the first neuron is written"
-    assert out[-1] == 7.0, "nor behind the last"
+    expected = weights[:, n_x] + np.einsum("bik,i->bk", weights[:, :n_x], x[x_first : x_first + n_x])
+    for out, own in ((h, expected[: blocks[0]]), (g, expected[blocks[0] :])):
+        assert_allclose(out[first:-1], own.ravel(), rtol=1e-12, atol=1e-12)
+        assert np.all(out[:first] == 7.0), "nothing before the first neuron is written"
+        assert out[-1] == 7.0, "nor behind the last"
 
 
 @given(blocks=st.integers(0, 6), a=st.integers(0, 5), b=st.integers(0, 5), seed=st.integers(0, 2**32 - 1))
@@ -55,19 +63,18 @@ def test_sums_of_products(blocks, a, b, seed):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_what_is_not_a_number_stays_so(value):
-    x = np.array([1.0, value])
-    out = np.zeros(LANES)
+    h, g = np.zeros(LANES), np.zeros(LANES)
 
-    _affine(np.ones(3 * LANES), 0, 2, x, out)
+    _affine(np.ones(6 * LANES), 0, 2, np.array([1.0, value]), 0, h, 1, g, 1)
 
-    assert_allclose(out, np.full(LANES, value))
+    assert_allclose([h, g], np.full((2, LANES), value))
 
 
 def test_numbers_of_another_kind_are_refused():
     with pytest.raises(TypingError, match=r"right: expected a contiguous array of float64, got array\(float32"):
         _dot(np.ones(LANES), 0, np.ones(LANES, dtype=np.float32), 0, 1)
     with pytest.raises(TypingError, match="x: expected a contiguous array of float64"):
-        _affine(np.ones(3 * LANES), 0, 2, np.ones(4)[::2], np.zeros(LANES))
+        _affine(np.ones(3 * LANES), 0, 2, np.ones(4)[::2], 0, np.zeros(LANES), 1, np.zeros(0), 0)
 
 
 @given(st.lists(st.floats(-50.0, 50.0), max_size=40), st.integers(0, 3))

@@ -13,7 +13,9 @@
 ``stress``        the whole on many random sequences, against the reference
 ``document``      what came of it, as tables and charts
 ``context``       where a run stores, whom it tells, what it loads and fits
-``course``        the stages in a run, every fit on disk before it is announced
+``material``      what a run is trained on
+``course``        the stages of one start, every fit on disk before it is announced
+``starts``        all starts, and which of them the surrogate is, or the mean of which
 ``finish``        scored, proven, exported, reported and tracked
 ``runner``        the run, and what it leaves
 ================  ===================================================================================

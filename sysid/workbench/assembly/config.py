@@ -258,6 +258,9 @@ class AssemblyConfig(BaseModel):
         stress: Random sequences on which the whole has to hold.
         published: Published figures by output.
         seed: Seed of everything random.
+        starts: How often all of it is trained, each time from other seeds; the best on the selection traces is taken.
+        committee: Of how many starts the surrogate may be the mean: the best one, and others as long as the mean does
+            better on the selection traces.
         export: What leaves the workbench; ``null`` for nothing.
     """
 
@@ -283,12 +286,39 @@ class AssemblyConfig(BaseModel):
     stress: StressConfig | None = None
     published: dict[str, PublishedConfig] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
+    starts: int = Field(default=1, ge=1)
+    committee: int = Field(default=1, ge=1)
     export: ExportConfig | None = ExportConfig(formats=("onnx", "c"))
 
     @property
     def standing(self) -> tuple[StandingConfig, ...]:
         """All members, the fitted ones first."""
         return (*self.members, *self.known)
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """Outputs that are asked of the whole; what none of them depends on only the training looked at."""
+        stressed = (self.stress.output,) if self.stress else ()
+        line = (self.line.channel, *self.line.knots, *self.line.outputs) if self.line else ()
+        return tuple(dict.fromkeys((*self.outputs, *self.choose_on, *stressed, *line)))
+
+    @model_validator(mode="after")
+    def _check_starts(self) -> AssemblyConfig:
+        if self.committee > self.starts:
+            raise FieldError(
+                f"a committee of {self.committee} of {self.starts} starts",
+                expected="at most as many as there are starts",
+                got=f"starts: {self.starts}, committee: {self.committee}",
+                remedy="ask for more starts, or for a smaller committee",
+            )
+        if self.committee > 1 and self.line is not None:
+            raise FieldError(
+                "the places of a line are taken out of one whole, and a committee is several",
+                expected="line, or committee",
+                got=f"line, and committee: {self.committee}",
+                remedy="leave committee out: the best start is taken",
+            )
+        return self
 
     @model_validator(mode="after")
     def _check_outputs(self) -> AssemblyConfig:

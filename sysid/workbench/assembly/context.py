@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from sysid.workbench.store import RunFolder, code_digest, digest, strict
 
 CODE = ("estimation", "models", "kernels")
 """Rooms whose code a fit depends on."""
+SEEDS_OF_A_START = 10_000
+"""How far the seeds of one start are from the next one's: its candidates' are a thousand apart."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,6 +34,7 @@ class Context:
         fresh: Whether everything is done again, whatever is stored.
         watchers: Told of every event.
         digests: SHA-256 of every data set that was read, by name.
+        start: Which of the pipeline's starts this is, from 1 on.
     """
 
     config: AssemblyConfig
@@ -42,6 +45,27 @@ class Context:
     fresh: bool
     watchers: Sequence[events.Watcher]
     digests: dict[str, str] = field(default_factory=dict)
+    start: int = 1
+
+    def of_start(self, number: int) -> Context:
+        """The same run with the seeds of one of its starts.
+
+        Args:
+            number: From 1 on; the first has the pipeline's own seed.
+
+        Returns:
+            The context.
+        """
+        seed = self.config.seed + SEEDS_OF_A_START * (number - 1)
+        return replace(self, config=self.config.model_copy(update={"seed": seed}), start=number)
+
+    def named(self, name: str) -> str:
+        """What a step of this start is called on disk."""
+        return name if self.start == 1 else f"start-{self.start}-{name}"
+
+    def titled(self, step: str) -> str:
+        """What a step of this start is called on the screen."""
+        return step if self.config.starts == 1 else f"Start {self.start} of {self.config.starts}: {step}"
 
     def tell(self, event: events.Event) -> None:
         """Tell the watchers.
@@ -95,6 +119,7 @@ class Context:
             The fit, and the digest of what it depends on.
         """
         key = digest(strict({"code": code_digest(*CODE), "terms": dict(terms)}))
+        name, title = self.named(name), self.titled(title)
         folder = self.store.fit(name)
         self.tell(events.StepStarted(step=title))
         stored = not self.fresh and self.store.is_done(f"fit-{name}", key)

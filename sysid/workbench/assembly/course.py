@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -10,20 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit
 from sysid.estimation.result import Status
 from sysid.models import Cascade, NARXModel
-from sysid.traces import Role, Trace, TraceSet
+from sysid.traces import Role, Trace
 from sysid.workbench import events
 from sysid.workbench.assembly.config import MemberConfig
 from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
 from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.known import known_model, with_known
-from sysid.workbench.assembly.limit_check import limit_note
+from sysid.workbench.assembly.material import Material, lacks_a_role
 from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
-from sysid.workbench.assembly.rehearsal import rehearse
 from sysid.workbench.assembly.stages import (
     choose_together,
     fit_member,
@@ -37,54 +35,32 @@ from sysid.workbench.store import code_digest, digest, read_json, strict, write_
 ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
 GROWN, TOGETHER = "grown", "trained end to end"
 
-_Also = tuple[list[Trace], list[Trace]]
-"""Traces to fit and traces that choose, of a data set that rounds have beside the others."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
-    """The training of one run.
+    """The training of one start.
 
     Args:
         context: The run.
+        material: What it is trained on.
         notes: Sentences on how it came about.
         stages: The whole after each stage.
         growth: What growing the training data brought, where it was asked for.
     """
 
     context: Context
+    material: Material
     notes: list[str] = field(default_factory=list)
     stages: dict[str, Cascade] = field(default_factory=dict)
     growth: list[Growth] = field(default_factory=list)
 
-    def run(self) -> tuple[Trace, ...]:
-        """Go through all stages.
-
-        Returns:
-            The selection traces, which choose between them.
-
-        Raises:
-            ConfigError: If the data lack a role.
-        """
-        config = self.context.config
-        names = (config.training,) if isinstance(config.training, str) else config.training
-        training = [self.context.load(name) for name in names]
-        estimation = dealt([one.with_role(Role.ESTIMATION) for one in training])
-        selection = [trace for one in training for trace in one.with_role(Role.SELECTION)]
-        if config.selection is not None:
-            selection += self.context.load(config.selection).with_role(Role.SELECTION)
-        if not estimation or not selection:
-            raise _lacks_a_role("the training data lack a role", *training)
-        estimation, selection = with_known(config.known, estimation), with_known(config.known, selection)
-        also = {name: self._also(name) for name in (config.together.data if config.together else ())}
-        rehearse(config, estimation[0])
-        if said := limit_note(config, [*estimation, *chain.from_iterable(one for one, _ in also.values())]):
-            self.notes.append(said)
+    def run(self) -> None:
+        """Go through all stages."""
+        estimation, selection = self.material.estimation, self.material.selection
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
         models, key, added = self._grown(models, key, estimation, selection)
-        self._together(models, (*estimation, *added), selection, also)
-        return (*selection, *chain.from_iterable(chosen_by for _, chosen_by in also.values()))
+        self._together(models, (*estimation, *added), selection)
 
     def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
         """Every member's candidates; the best of each alone, and those that are best together."""
@@ -113,7 +89,7 @@ class Course:
             self.context.config, {name: models[alone[name]] for name, models in candidates.items()}
         )
         if max(map(len, candidates.values())) > 1:
-            step = "Choosing the members by the error of the whole"
+            step = self.context.titled("Choosing the members by the error of the whole")
             self.context.tell(events.StepStarted(step=step))
             choice = choose_together(
                 self.context.config,
@@ -198,7 +174,7 @@ class Course:
         known = self.context.config.known
         sources, held_out = (with_known(known, pool.with_role(role)) for role in (Role.ESTIMATION, Role.SELECTION))
         if not sources or not held_out:
-            raise _lacks_a_role("the pool lacks a role", pool)
+            raise lacks_a_role("the pool lacks a role", pool)
 
         def fit(
             member: MemberConfig, now: Members, traces: Sequence[Trace], number: int, before: str
@@ -219,7 +195,9 @@ class Course:
             return model_of(found), own
 
         def report(done: Round) -> None:
-            step = f"Looking for the sequences that the whole is worst at, after round {done.number}"
+            step = self.context.titled(
+                f"Looking for the sequences that the whole is worst at, after round {done.number}"
+            )
             detail = f"{100.0 * done.look.within:.3g} % within, 99 % under {done.look.rare:.3g}, {done.samples} samples"
             self.context.tell(events.StepStarted(step=step))
             self.context.tell(events.StepDone(step=step, stored=False, detail=detail))
@@ -233,22 +211,9 @@ class Course:
         self.stages[GROWN] = assembled(self.context.config, grown.models)
         return grown.models, grown.key, tuple(trace for trace in sources if trace.name in grown.added)
 
-    def _also(self, name: str) -> _Also:
-        """The traces of a data set that some rounds have beside the others: to fit, and to choose by if it has such."""
-        found = self.context.load(name)
-        if not (traces := found.with_role(Role.ESTIMATION)):
-            raise _lacks_a_role("the data of a round lack a role", found)
-        known = self.context.config.known
-        return with_known(known, traces), with_known(known, found.with_role(Role.SELECTION))
-
-    def _together(
-        self,
-        models: Members,
-        estimation: Sequence[Trace],
-        selection: Sequence[Trace],
-        also: Mapping[str, _Also],
-    ) -> None:
+    def _together(self, models: Members, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
         """Every round of training end to end, each from where the one before ended."""
+        also = self.material.also
         asked, whole = self.context.config.together, assembled(self.context.config, models)
         rounds = asked.rounds if asked else ()
         for number, one in enumerate(rounds, start=1):
@@ -259,8 +224,8 @@ class Course:
             ready = JointRound.of(self.context.config, one, whole, estimation=traces, selection=chosen_by)
             asked_for = one.model_dump(mode="json", exclude={"again", "also"})  # their traces are among the round's
             key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
-            name = "together" if number == 1 else f"together-{number}"
-            fit = self._round(name, f"Training end to end{suffix}", key, ready)
+            name = self.context.named("together" if number == 1 else f"together-{number}")
+            fit = self._round(name, self.context.titled(f"Training end to end{suffix}"), key, ready)
             said = (*fit.notes, fit.status.value) if fit.status is Status.UNSTABLE else fit.notes
             self.notes.extend(said if len(rounds) == 1 else [f"Round {number}: {note}" for note in said])
             self.stages[f"{TOGETHER}{suffix}"] = whole = fit.model
@@ -280,13 +245,3 @@ class Course:
             events.StepDone(step=step, stored=stored, detail=f"{fit.train_time_s:.1f} s, {fit.status.value}")
         )
         return fit
-
-
-def _lacks_a_role(what: str, *found: TraceSet) -> ConfigError:
-    return ConfigError(
-        what,
-        where=f"data set {', '.join(one.name for one in found)}",
-        expected="cases with role: estimation, and cases with role: selection",
-        got=", ".join(f"{name}: {role.value}" for one in found for name, role in one.roles.items()),
-        remedy="give some cases that role in the data set's dataset.yaml",
-    )

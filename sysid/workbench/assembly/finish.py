@@ -21,10 +21,10 @@ from sysid.validation import evaluate_cascade
 from sysid.workbench import events
 from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
-from sysid.workbench.assembly.course import Course
 from sysid.workbench.assembly.document import SELECTION, Outcome, document
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.members import whole_score, written
+from sysid.workbench.assembly.starts import Trained
 from sysid.workbench.assembly.stress import Stress, stress
 from sysid.workbench.environment import environment
 from sysid.workbench.store import digest, strict, write_json
@@ -39,11 +39,11 @@ class Finish:
 
     Args:
         context: The run.
-        course: Its training, done.
+        trained: What it has trained.
     """
 
     context: Context
-    course: Course
+    trained: Trained
 
     def results(self, cases: TraceSet, selection: Sequence[Trace]) -> JudgementResults:
         """Score every stage, choose one, and prove and export it.
@@ -58,14 +58,14 @@ class Finish:
         config = self.context.config
         outputs = config.choose_on or config.outputs
         scores, timing, chosen_by = {}, {}, {}
-        for stage, cascade in self.course.stages.items():
+        for stage, cascade in self.trained.stages.items():
             # What only the training looked at is no part of the surrogate, nor of its run time.
-            evaluation = evaluate_cascade(cascade.upstream_of(self._wanted), cases, outputs=config.outputs)
+            evaluation = evaluate_cascade(cascade.upstream_of(config.wanted), cases, outputs=config.outputs)
             scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
             timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
             chosen_by[stage] = whole_score(cascade, selection, outputs)
         chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
-        whole = self.course.stages[chosen].upstream_of(self._wanted)
+        whole = self.trained.stages[chosen].upstream_of(config.wanted)
         write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
         stressed, worst = self._stressed(whole)
         line = self._line(whole)
@@ -73,9 +73,9 @@ class Finish:
         said = document(
             config,
             Outcome(
-                whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.course.notes,
+                whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.trained.notes,
                 timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst, line=line,
-                growth=tuple(self.course.growth),
+                growth=self.trained.growth,
             ),
         )  # fmt: skip
         results = JudgementResults(
@@ -92,20 +92,12 @@ class Finish:
                 others={name: found for name, found in self.context.digests.items() if name != cases.name},
             ),
             subjects=[
-                SubjectRecord(name=stage, parts=written(cascade)) for stage, cascade in self.course.stages.items()
+                SubjectRecord(name=stage, parts=written(cascade)) for stage, cascade in self.trained.stages.items()
             ],
             judgement=parse_judgement(strict(said), where="assembly"),
         )
         write_judgement_results(self.context.store.path, results)
         return results
-
-    @property
-    def _wanted(self) -> set[str]:
-        """Outputs that the pipeline asks of the whole."""
-        config = self.context.config
-        stressed = {config.stress.output} if config.stress else set[str]()
-        line = {config.line.channel, *config.line.knots, *config.line.outputs} if config.line else set[str]()
-        return {*config.outputs, *config.choose_on, *stressed, *line}
 
     def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...]]:
         """What came of the random sequences, and those that the whole did worst on."""

@@ -10,6 +10,7 @@ from itertools import zip_longest
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.models import Cascade, Ends, Limit, Mapping, NARXModel
 from sysid.traces import Trace
@@ -213,6 +214,44 @@ def simulated_inputs(cascade: Cascade, traces: Sequence[Trace], only: Collection
         return list(pool.map(one, traces))
 
 
+def free_runs(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str]) -> list[NDArray[np.float64]]:
+    """What the whole puts out on some traces.
+
+    Args:
+        cascade: The whole.
+        traces: The traces.
+        outputs: The outputs.
+
+    Returns:
+        Of each trace an array of shape ``(n_samples, n_outputs)``.
+    """
+
+    def one(trace: Trace) -> NDArray[np.float64]:
+        run = cascade.simulate_trace(trace)
+        return np.column_stack([run[name] for name in outputs])
+
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(one, traces))
+
+
+def score_of(runs: Sequence[NDArray[np.float64]], traces: Sequence[Trace], outputs: Sequence[str]) -> float:
+    """How good some free runs are.
+
+    Args:
+        runs: Of each trace an array of shape ``(n_samples, n_outputs)``.
+        traces: The traces.
+        outputs: The outputs.
+
+    Returns:
+        Geometric mean over traces and outputs of the mean squared error.
+    """
+    errors = [
+        np.mean((run - trace.columns(outputs))[trace.usable_samples] ** 2, axis=0)
+        for run, trace in zip(runs, traces, strict=True)
+    ]
+    return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+
+
 def whole_score(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str]) -> float:
     """How well the whole does on some traces.
 
@@ -224,14 +263,7 @@ def whole_score(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str
     Returns:
         Geometric mean over traces and outputs of the mean squared error of the free run.
     """
-
-    def one(trace: Trace) -> list[float]:
-        run, counted = cascade.simulate_trace(trace), trace.usable_samples
-        return [float(np.mean((run[name] - trace[name])[counted] ** 2)) for name in outputs]
-
-    with ThreadPoolExecutor(2) as pool:
-        errors = np.array(list(pool.map(one, traces)))
-    return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+    return score_of(free_runs(cascade, traces, outputs), traces, outputs)
 
 
 def written(cascade: Cascade) -> list[str]:

@@ -12,9 +12,10 @@ from sysid.reporting.judgement_report import JudgementResults
 from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
-from sysid.workbench.assembly.course import Course
 from sysid.workbench.assembly.finish import ASSEMBLY, LINE, Finish
 from sysid.workbench.assembly.line import StoredLine
+from sysid.workbench.assembly.material import Material
+from sysid.workbench.assembly.starts import train
 from sysid.workbench.environment import environment
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.store import RunFolder, read_json, write_bytes, write_json
@@ -78,9 +79,9 @@ def _run(context: Context) -> tuple[JudgementResults, Path]:
     """Every step, in order; the results and the page."""
     write_bytes(context.store.path / "pipeline.yaml", context.text)
     write_json(context.store.path / "environment.json", environment())
-    cases, course = context.load(context.config.data), Course(context=context)
-    finish = Finish(context=context, course=course)
-    results = finish.results(cases, course.run())
+    cases, material = context.load(context.config.data), Material.of(context)
+    finish = Finish(context=context, trained=train(context, material))
+    results = finish.results(cases, material.choosing)
     page = finish.report()
     finish.track(results, page)
     return results, page
