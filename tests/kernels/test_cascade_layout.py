@@ -31,7 +31,14 @@ def test_members_that_do_not_read_each_other_at_the_same_sample_are_of_one_level
     assert_array_equal(circle.level_first_y, [0, 1, 2, 3])
 
 
-def test_what_a_limit_is_made_of_comes_a_level_before_it():
+def test_a_sum_runs_behind_what_it_reads_and_begins_no_level():
+    layout = laid_out(program("a linear member"))  # STP -> BP, BP -> AR without neurons, BP+AR -> BC
+    assert_array_equal(layout.network_first, [0, 1, 2])
+    assert_array_equal(layout.sums.first, [0, 1, 1])
+    assert_array_equal(layout.level_first_y, [0, 1, 2])
+
+
+def test_what_a_limit_is_made_of_comes_before_it():
     layout = laid_out(program("a limit made of what it limits, a sample ago"))  # BP, x = AR a sample ago, AR, BC
     assert_array_equal(layout.order_y, [0, 2, 3])
     assert_array_equal(layout.level_first_y, [0, 1, 2, 3])
