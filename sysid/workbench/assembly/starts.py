@@ -83,6 +83,8 @@ def _the_best_of(courses: Sequence[Course], context: Context, material: Material
     if len(chosen) > 1:
         called = f"mean of starts {', '.join(str(index + 1) for index in chosen)}"
         stages[called] = mean_of([wholes[index] for index in chosen], config.wanted)
+    elif config.committee > 1:
+        notes.append(f"No mean of {called} and another one does better on the selection traces than {called} alone.")
     context.tell(events.StepDone(step=step, stored=False, detail=called))
     notes += [
         f"Start {index + 1}, {note[:1].lower()}{note[1:]}" for index in sorted(chosen) for note in courses[index].notes

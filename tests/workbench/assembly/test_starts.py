@@ -91,6 +91,8 @@ def test_every_start_is_trained_stored_and_shown_and_the_best_mean_is_taken(work
     assert f"{chosen} (chosen)" in [row[0] for row in results.judgement.tables[0].rows]
     for number, seed in ((1, 3), (2, 10_003), (3, 20_003)):
         assert any(f"Start {number} (seed {seed}) does best" in one for one in results.judgement.sentences)
+    alone = any("alone" in one and "No mean of" in one for one in results.judgement.sentences)
+    assert alone == all("mean" not in stage for stage in stages)
     # What the table says is what the stored assembly does.
     pump = np.repeat(np.random.default_rng(3).uniform(0.0, 2.0, 15), 20)
     pump[:5] = 0.0
