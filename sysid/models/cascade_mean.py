@@ -38,7 +38,7 @@ def mean_of(cascades: Sequence[Cascade], outputs: Collection[str]) -> Cascade:
     Example:
         >>> from sysid.models import ARX, ARXModel
         >>> def gain(value: float) -> Cascade:
-        ...     return Cascade(models=(ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.0, value]),
+        ...     return Cascade(models=(ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([value, 0.0]),
         ...         intercept=0.0, mapping=Mapping.parse("u -> y"), sample_time=0.1, input_units=("V",),
         ...         output_unit="V", rest_output=0.0),))
         >>> mean = mean_of([gain(1.0), gain(3.0)], ["y"])
