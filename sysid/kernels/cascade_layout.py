@@ -8,7 +8,8 @@ sample, and what several members read stands there for all of them as soon as it
 
 Members run level by level. A level begins with networks that do not read each other at the same sample: they run side
 by side, and what they wait for, such as the hyperbolic tangents of their neurons, they wait for once. The sums that can
-follow them do, one after the other. So there are no more levels than the longest chain has networks.
+follow them do, one after the other; those that wait for nobody are the first level's. So what lies between two levels
+is always a network, or an output that a channel limits, and never a sum.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sysid.errors import ChannelError, ConfigError
-from sysid.models import Cascade, Limit, Mapping, cascade_from_dict, mean_of
+from sysid.models import Cascade, Limit, cascade_from_dict, mean_of
 from tests.models.cascades import CASCADES, command, network
 
 
@@ -53,21 +53,17 @@ def test_one_alone_is_itself() -> None:
 
 
 def test_no_two_channels_get_one_name() -> None:
-    model = network("BP_1 -> BP", seed=1)
-    mean = mean_of([Cascade(models=(model,)), Cascade(models=(_scaled_network(model),))], ["BP"])
+    one = Cascade(models=(network("BP_1 -> BP", seed=1),))
+    mean = mean_of([one, other(one)], ["BP"])
     assert mean.inputs == ("BP_1",)
     assert mean.outputs == ("BP__1", "BP__2", "BP")
-
-
-def _scaled_network(model):
-    return replace(model, theta=0.9 * model.theta)
 
 
 def test_what_cannot_be_averaged_is_refused() -> None:
     three = CASCADES["three networks"]
     with pytest.raises(ChannelError, match="ER"):
         mean_of([three, three], ["ER"])
-    bars = network("STP -> BP")
-    bars = replace(bars, output_unit="bar", mapping=Mapping.parse("STP -> BP"))
+    psi = network("STP -> BP")
+    bars = replace(psi, output_unit="bar")
     with pytest.raises(ConfigError, match="unit"):
-        mean_of([Cascade(models=(network("STP -> BP"),)), Cascade(models=(bars,))], ["BP"])
+        mean_of([Cascade(models=(psi,)), Cascade(models=(bars,))], ["BP"])
