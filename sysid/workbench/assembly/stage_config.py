@@ -40,7 +40,7 @@ class AgainConfig(BaseModel):
 
     Args:
         members: Outputs of the members that are trained.
-        reads: Channels of others that members read from this round on, as under ``together``.
+        reads: Channels, or further lags, that members read from this round on, as under ``together``.
         measured: As under ``together``; ``[]`` for none any more.
         everywhere: As under ``together``.
         targets: The error of each output that counts as one, in its unit.
@@ -78,9 +78,9 @@ class TogetherConfig(BaseModel):
             their first place, on traces of every place in turn; what they read from elsewhere is as measured, or as the
             whole puts it out.
         targets: The error of each output that counts as one, in its unit.
-        reads: Channels of other members that members read from here on, beside those of their mappings, with the lags:
-            ``{AR: {ER: 1}}``. Their weights begin at zero, so that a circle closes from a chain that runs and cannot
-            run away at once.
+        reads: Channels of members that members read from here on, beside those of their mappings, with the lags:
+            ``{AR: {ER: 1}}``; more lags of one that a member reads already, or of its own output, as well. Their
+            weights begin at zero, so that a circle closes from a chain that runs and cannot run away at once.
         training: How.
         traces: Estimation traces used, the first so many; all by default.
         also: Data sets whose estimation traces are dealt in from here on, one in turn with one of those that all stages

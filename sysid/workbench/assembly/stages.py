@@ -10,9 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, fit_narx
-from sysid.estimation.growing import widened
+from sysid.estimation.growing import grown, widened
+from sysid.estimation.initialise import Layout
 from sysid.estimation.result import Status
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
@@ -178,13 +181,14 @@ def reading_more(cascade: Cascade, reads: Mapping[str, Mapping[str, tuple[int, .
 
     Args:
         cascade: The whole.
-        reads: By the output of a member, lags of each channel that it reads more.
+        reads: By the output of a member, lags of each channel that it reads more: of another, of one that it reads
+            already, or of its own output.
 
     Returns:
         The cascade.
 
     Raises:
-        ConfigError: If a member is no network of one output, or reads one of the channels already.
+        ConfigError: If a member is no network of one output, or reads one of the lags already.
     """
     for output, more in reads.items():
         models = {name: cascade.member(name) for name in (output, *more)}
@@ -197,5 +201,35 @@ def reading_more(cascade: Cascade, reads: Mapping[str, Mapping[str, tuple[int, .
                 got=f"{output}: {', '.join(more)}",
                 remedy="name such outputs",
             )
-        cascade = cascade.with_member(widened(networks[output], dict(more), networks))
+        model = networks[output]
+        longer = {name: lags for name, lags in more.items() if name in (output, *model.mapping.inputs)}
+        model = _reading_further_back(model, longer) if longer else model
+        new = {name: lags for name, lags in more.items() if name not in longer}
+        cascade = cascade.with_member(widened(model, new, networks) if new else model)
     return cascade
+
+
+def _reading_further_back(model: NARXModel, more: Mapping[str, tuple[int, ...]]) -> NARXModel:
+    """A network with more lags of channels that it reads, its own output among them, with weights of zero for them."""
+    lags, output = model.recursion.lags, model.mapping.output
+    delays = {**dict(zip(model.mapping.inputs, lags.inputs, strict=True)), output: lags.output}
+    known = [f"{name} {lag}" for name, some in more.items() for lag in some if lag in delays[name]]
+    if known:
+        raise ConfigError(
+            f"{model.mapping} reads some of these lags already",
+            where="reads",
+            expected="lags that it does not read",
+            got=", ".join(known),
+            remedy="leave them out",
+        )
+    delays |= {name: tuple(sorted({*delays[name], *some})) for name, some in more.items()}
+    network = NARX(
+        input_delays=[delays[name] for name in model.mapping.inputs],
+        output_delays=delays[output],
+        neurons=model.network.neurons,
+        feedthrough=model.network.feedthrough,
+        gated=model.network.gated,
+    )
+    count = Layout.of(network, len(lags.inputs)).n_parameters
+    longer = replace(model, network=network, theta=np.zeros(count))
+    return replace(longer, theta=grown(model.recursion, longer.recursion, longer.theta))

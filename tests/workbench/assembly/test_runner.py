@@ -191,7 +191,7 @@ def test_a_circle_may_be_closed_in_a_later_round(workspace: Path) -> None:
     [
         ("{upper: {level: 1}}", "together, reads names level"),
         ("{upper: {lower: 0}}", "not a set of lags"),
-        ("{lower: {upper: 2}}", "reads upper already"),
+        ("{upper: {lower: 1}}", "reads some of these lags already"),
     ],
 )
 def test_a_circle_of_what_is_not_there_is_refused(workspace: Path, reads: str, complaint: str) -> None:
