@@ -16,6 +16,9 @@ from sysid.export.space import SpaceCell
 from sysid.export.surrogate import Level, Side, Stage, Surrogate
 from sysid.export.templating import c_real, render
 
+SHORT = 16
+"""Terms up to which a sum is written out term by term: tables and a loop take longer."""
+
 
 def c_files(surrogate: Surrogate) -> dict[str, str]:
     """The header and the source.
@@ -35,6 +38,8 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "meaning": MEANING,
         "stages": stages,
         "any_neurons": any(stage["neurons"] for stage in stages),
+        "any_layers": any(stage["neurons"] for stage in stages if stage["kind"] == "lagged"),
+        "any_dots": not all(stage["short"] for stage in stages),
         "any_sums": any(stage["adds"] for stage in stages),
         "rest_lines": _rest_lines(surrogate),
         "rest_spaces": _rest_spaces(surrogate),
@@ -109,6 +114,7 @@ def _lagged(stage: Stage) -> dict[str, Any]:
         "kind": "lagged",
         "n": len(terms),
         "neurons": cell.neurons,
+        "short": not cell.neurons and len(terms) <= SHORT,
         "adds": cell.adds,
         "weights": form.hidden_weights.T,
         "gates": form.gates.T if cell.gated else [],
@@ -133,6 +139,7 @@ def _space(stage: Stage) -> dict[str, Any]:
     cell = stage.space
     return {
         "kind": "space",
+        "short": False,
         "n": cell.n_state,
         "neurons": 0 if cell.cubic else len(cell.state_neurons) + len(cell.output_neurons),
         "adds": cell.n_state > 0,

@@ -8,6 +8,7 @@ whatever can be written as stages runs in every format. How models are wired is 
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
@@ -29,6 +30,8 @@ Range = tuple[float, float]
 """Least and greatest value, in the channel's unit."""
 Level = float | str
 """A value at rest, or the input whose first sample it is."""
+LONGEST_IDENTIFIER = 60
+"""Characters. A file's name may have 255, with its folders 260 on Windows, and a cascade may have eighty outputs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,9 +255,16 @@ class Surrogate:
 
     @property
     def identifier(self) -> str:
-        """A C identifier that tells what it computes, such as ``bp_ar_to_bc``: prefix of names, name of files."""
+        """A C identifier that tells what it computes, such as ``bp_ar_to_bc``: prefix of names, name of files.
+
+        Where that would be too long, what it begins with, and a digest of all of it.
+        """
         sides = ("_".join(port.identifier for port in ports) for ports in (self.inputs, self.outputs))
-        return "_to_".join(sides)
+        whole = "_to_".join(sides)
+        if len(whole) <= LONGEST_IDENTIFIER:
+            return whole
+        digest = hashlib.sha256(whole.encode()).hexdigest()[:8]
+        return f"{whole[:LONGEST_IDENTIFIER].rpartition('_')[0] or whole[:LONGEST_IDENTIFIER]}_{digest}"
 
     @property
     def mapping(self) -> str:

@@ -151,6 +151,41 @@ def test_tanh_is_libms_within_a_few_units_in_the_last_place(sources, tmp_path):
     assert (one, lost) == ("1", "1")
 
 
+def test_four_neurons_at_once_are_what_each_is_alone(sources, tmp_path):
+    surrogate, folder = sources["NARX 4/4/20"]
+    (tmp_path / "main.c").write_text(
+        f"""
+        #include "{folder}/{surrogate.identifier}.c"
+        #include <stdio.h>
+        #ifndef TANH_FOUR
+        #error "GCC has vectors"
+        #endif
+        int main(void)
+        {{
+            double layer[7];
+            long i, different = 0;
+            int k;
+            for (i = 0; i < 100000; i++) {{
+                for (k = 0; k < 7; k++) layer[k] = (k - 3.3) * 1e-4 * (double)i;
+                layer[i % 7] = i % 3 ? 1e-300 : NAN;
+                activate(layer, 7);
+                for (k = 0; k < 7; k++) {{
+                    double x = k == i % 7 ? (i % 3 ? 1e-300 : NAN) : (k - 3.3) * 1e-4 * (double)i;
+                    x = x > 20.0 ? 20.0 : x < -20.0 ? -20.0 : x;
+                    x = tanh_near(x);
+                    different += x == x ? layer[k] != x : layer[k] == layer[k];
+                }}
+            }}
+            printf("%ld %g\\n", different, layer[6]);
+            return 0;
+        }}
+        """
+    )
+    subprocess.run(["gcc", "-std=c99", "-O2", "main.c", "-o", "run", "-lm"], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["0", "1"]
+
+
 def test_parameters_are_written_to_the_last_bit(sources):
     surrogate, folder = sources["NARX 4/4/20"]
     text = (folder / f"{surrogate.identifier}.c").read_text()

@@ -113,6 +113,18 @@ def test_identifiers_are_c_names_and_all_different(mapping, identifier):
     assert all(name.isascii() and name.isidentifier() for name in names)
 
 
+def test_the_identifier_of_many_outputs_is_short_enough_to_name_a_file_and_differs_with_the_last_of_them():
+    def identifier(last):
+        names = [f"CH{i:03}" for i in range(99)] + [last]
+        return Surrogate.of(Cascade(models=tuple(linear(f"STP -> {name}") for name in names))).identifier
+
+    one, other = identifier("A"), identifier("B")
+    assert len(one) < 80
+    assert one.startswith("stp_to_ch000_ch001_")
+    assert one.isidentifier()
+    assert one != other
+
+
 def test_state_of_a_single_model_is_the_models_own(narx, declared):
     surrogate = declared(narx(NARX(input_delays=2, output_delays=3, neurons=1)))
     assert surrogate.state_text() == {**surrogate.stages[0].state.to_dict(), "remainders_float32": 1}
