@@ -26,6 +26,7 @@ from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import Probe
 from sysid.airbrake.simulate import simulate
+from sysid.export import Surrogate, exporter
 from sysid.models import (
     NARX,
     Cascade,
@@ -164,12 +165,22 @@ def one_car(single: Taken, small: Taken, large: Taken) -> dict[str, str]:
     }
 
 
+def exported(whole: Cascade, u: np.ndarray, folder: Path) -> Callable[[], object]:
+    """What a train simulator embeds: the exported source, built by the compiler that is here."""
+    writer, surrogate = exporter("c"), Surrogate.of(whole)
+    (file,) = writer.write(surrogate, folder)
+    run, state = writer.load(file, folder), surrogate.at_rest(u[0])[np.newaxis]
+    return lambda: run(u[:, np.newaxis], state)
+
+
 def fitted_whole(folder: Path, u: np.ndarray, small: Taken, large: Taken) -> None:
     """A fitted assembly beside the reference."""
     whole = read_assembly(folder)
     single = taken(lambda: whole.simulate(u), 15)
     print(f"\n{folder.name}, fitted: {len(whole.models)} members, {whole.n_parameters} parameters")
     show(f"{folder.name}, one car", single)
+    with tempfile.TemporaryDirectory() as place:
+        show(f"{folder.name}, one car, exported as C", taken(exported(whole, u, Path(place)), 15))
     beside_targets(one_car(single, small, large))
 
 

@@ -151,13 +151,13 @@ def test_tanh_is_libms_within_a_few_units_in_the_last_place(sources, tmp_path):
     assert (one, lost) == ("1", "1")
 
 
-def test_four_neurons_at_once_are_what_each_is_alone(sources, tmp_path):
+def test_neurons_side_by_side_are_what_each_is_alone(sources, tmp_path):
     surrogate, folder = sources["NARX 4/4/20"]
     (tmp_path / "main.c").write_text(
         f"""
         #include "{folder}/{surrogate.identifier}.c"
         #include <stdio.h>
-        #ifndef TANH_FOUR
+        #ifndef TANH_LANES
         #error "GCC has vectors"
         #endif
         int main(void)
