@@ -12,7 +12,8 @@ from sysid.export.layout import DelayLine, StateLayout
 from sysid.export.parity import Parity, ParityCase, check_parity, parity_cases, random_cases
 from sysid.export.reading import read_bundle
 from sysid.export.simulation import Simulation, simulate_bundle
-from sysid.export.surrogate import Port, Stage, Surrogate
+from sysid.export.stage import Port, Stage
+from sysid.export.surrogate import Surrogate
 
 __all__ = [
     "EXPORTERS",

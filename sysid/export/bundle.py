@@ -102,6 +102,7 @@ def export_bundle(
     folder: Path,
     *,
     start: Start | None = None,
+    outputs: Sequence[str] | None = None,
     formats: Sequence[str] = ("onnx", "torchscript"),
     tolerance: float = 1e-9,
     tolerance_float32: float = 1e-3,
@@ -123,6 +124,8 @@ def export_bundle(
             cascade's cases need its inputs alone.
         folder: Where the bundle goes. What lies there is replaced if it is a bundle, or empty.
         start: How the free run over each case begins; at rest by default, and always for a cascade.
+        outputs: Which outputs of a cascade leave it, in this order; all by default. What lies between them is
+            computed, and nobody is told that it is at a limit.
         formats: Names of exporters.
         tolerance: Largest difference from the model allowed, in the outputs' unit.
         tolerance_float32: The same for files that compute in float32.
@@ -134,8 +137,8 @@ def export_bundle(
         The bundle.
 
     Raises:
-        ConfigError: If a format is unknown, a parameter is not finite, or the folder holds something that is not a
-            bundle.
+        ConfigError: If a format or an output is unknown, a parameter is not finite, or the folder holds something that
+            is not a bundle.
         ChannelError: If a trace lacks a channel of the mapping.
         ParityError: If a file differs from the model by more than the tolerance; nothing is published then.
     """
@@ -143,7 +146,7 @@ def export_bundle(
     source = fit if isinstance(fit, Cascade) else fit.model
     known = dict(fits or {}) if isinstance(fit, Cascade) else {str(fit.model.mapping): fit}
     start = Start() if start is None or isinstance(fit, Cascade) else start
-    surrogate = _surrogate(source, traces)
+    surrogate = _surrogate(source, traces, outputs)
     cases, sequences = parity_cases(surrogate, traces, start), random_cases(surrogate)
     stability = None if isinstance(source, Cascade) else check_free_run(source, traces)
     unit = ", ".join(dict.fromkeys(port.unit for port in surrogate.outputs))
@@ -218,12 +221,12 @@ def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
     )
 
 
-def _surrogate(source: AbstractModel | Cascade, traces: TraceSet) -> Surrogate:
+def _surrogate(source: AbstractModel | Cascade, traces: TraceSet, outputs: Sequence[str] | None) -> Surrogate:
     models = source.models if isinstance(source, Cascade) else (source,)
     for model in models:
         _check_finite(model)
     inputs = Wiring.of(models).inputs
-    return Surrogate.of(source, declared_ranges(inputs, traces), first_inputs(inputs, traces))
+    return Surrogate.of(source, declared_ranges(inputs, traces), first_inputs(inputs, traces), outputs)
 
 
 def _check_finite(model: Member) -> None:

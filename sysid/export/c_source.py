@@ -13,7 +13,8 @@ from sysid.export.flags import MEANING
 from sysid.export.layout import SpaceState
 from sysid.export.rates import RateForm
 from sysid.export.space import SpaceCell
-from sysid.export.surrogate import Level, Side, Stage, Surrogate
+from sysid.export.stage import Level, Side, Stage
+from sysid.export.surrogate import Surrogate
 from sysid.export.templating import c_real, render
 
 SHORT = 16
@@ -45,7 +46,8 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "rest_spaces": _rest_spaces(surrogate),
         "late": [{**asdict(late), "name": surrogate.channels[late.column].name} for late in surrogate.late],
         "levels": [level_text(surrogate, port.level) for port in surrogate.channels],
-        "levels_in_words": [_words(port.level) for port in surrogate.channels],
+        "levels_in_words": [_words(port.level) for port in surrogate.outputs],
+        "places": {port.name: place for place, port in enumerate(surrogate.outputs)},
     }
     return {f"{surrogate.identifier}.{end}": render(f"surrogate.{end}.j2", **values) for end in ("h", "c")}
 
@@ -73,9 +75,17 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
             "offset": offset,
             "scale": scale,
             "sides": [_side(surrogate, side) for side in sides],
+            "told": told,
         }
-        for name, unit, target, offset, scale, sides in zip(
-            ends.outputs, ends.output_units, stage.targets, cell.offset[n:], cell.scale[n:], stage.limits, strict=True
+        for name, unit, target, offset, scale, sides, told in zip(
+            ends.outputs,
+            ends.output_units,
+            stage.targets,
+            cell.offset[n:],
+            cell.scale[n:],
+            stage.limits,
+            stage.told,
+            strict=True,
         )
     ]
     common = {
@@ -87,6 +97,8 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
         "outputs": outputs,
         "limited": stage.limited,
     }
+    for output in outputs:  # the others are at no bound, and at a limit that nobody is told of
+        output["raises"] = bool(output["sides"] and output["told"]) or stage.bounded
     return common | (_space(stage) if isinstance(cell, SpaceCell) else _lagged(stage))
 
 

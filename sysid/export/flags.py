@@ -20,7 +20,7 @@ class Flag(enum.IntFlag):
     OUTSIDE_RANGE = 1
     """An input is outside the range that it is declared for: nothing is known about the accuracy."""
     AT_BOUND = 2
-    """An output is held at one of its bounds: it is wrong."""
+    """An output, or what it is computed from, is held at one of its bounds: it is wrong."""
     NOT_A_NUMBER = 4
     """An input or an output is not a number: set the state anew before relying on what follows."""
     AT_LIMIT = 8
@@ -37,34 +37,34 @@ MEANING = {
 
 
 def expected_flags(
-    surrogate: Surrogate, inputs: NDArray[np.float64], outputs: NDArray[np.float64]
+    surrogate: Surrogate, inputs: NDArray[np.float64], computed: NDArray[np.float64]
 ) -> NDArray[np.int32]:
-    """The flags that a free run has to raise, from its inputs and outputs alone.
+    """The flags that a free run has to raise, from its inputs and what it computes alone.
 
     Args:
         surrogate: What is run.
         inputs: Shape ``(n_samples, n_inputs)``, in their units.
-        outputs: Shape ``(n_samples, n_outputs)``, in their units.
+        computed: Shape ``(n_samples, n_computed)``, in their units, as :meth:`Surrogate.compute` gives them.
 
     Returns:
         Shape ``(n_samples,)``.
     """
     low, high = (np.array([getattr(port, side) for port in surrogate.inputs]) for side in ("low", "high"))
     outside = ((inputs < low) | (inputs > high)).any(axis=1)
-    lost = np.isnan(inputs).any(axis=1) | np.isnan(outputs).any(axis=1)
-    known, n_inputs = np.column_stack([inputs, outputs]), inputs.shape[1]
+    lost = np.isnan(inputs).any(axis=1) | np.isnan(computed).any(axis=1)
+    known, n_inputs = np.column_stack([inputs, computed]), inputs.shape[1]
     bound, limited = (np.zeros(len(inputs), dtype=bool) for _ in range(2))
     for stage in surrogate.stages:
         cell, n = stage.cell, len(stage.sources)
-        for j, (target, sides) in enumerate(zip(stage.targets, stage.limits, strict=True)):
-            output, offset, scale = outputs[:, target - n_inputs], cell.offset[n + j], cell.scale[n + j]
+        for j, (target, sides, told) in enumerate(zip(stage.targets, stage.limits, stage.told, strict=True)):
+            output, offset, scale = computed[:, target - n_inputs], cell.offset[n + j], cell.scale[n + j]
             reached = np.zeros(len(inputs), dtype=bool)
             for side in sides:
                 reached |= output == (side.value if side.column is None else known[:, side.column])
             for value in (cell.low, cell.high):
                 if np.isfinite(value):
                     bound |= ~reached & (output == value * scale + offset)
-            limited |= reached
+            limited |= reached & told
     flags = (
         outside * int(Flag.OUTSIDE_RANGE)
         + bound * int(Flag.AT_BOUND)

@@ -17,12 +17,13 @@ from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
 from sysid.export.layout import SpaceState
 from sysid.export.parity import Parity, ParityCase
-from sysid.export.surrogate import Port, Range, Stage, Surrogate
+from sysid.export.stage import Port, Range, Stage
+from sysid.export.surrogate import Surrogate
 from sysid.models import Cascade, Start
 from sysid.traces import Role, Trace, TraceSet
 from sysid.units import Reference
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 """Raised when a reader of an earlier version cannot read the file, or would misread it. Every version from 1 on can be
 read: 2 added what lies beside the exported files (``attachments``), and parity over random sequences; 3 has several
 outputs and models in place of one (``outputs``, ``stages``), and float32 files whose state is longer by the remainders;

@@ -14,7 +14,7 @@ from sysid.export.onnx_nodes import Nodes
 from sysid.export.onnx_space import space_step, within_bound
 from sysid.export.onnx_step import added
 from sysid.export.rates import RateForm
-from sysid.export.surrogate import Side, Stage
+from sysid.export.stage import Side, Stage
 
 
 @dataclass(frozen=True, kw_only=True)

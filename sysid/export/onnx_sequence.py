@@ -37,7 +37,8 @@ from sysid.export.onnx_step import (
 )
 from sysid.export.rates import RateForm, Term
 from sysid.export.space import SpaceCell
-from sysid.export.surrogate import Stage, Surrogate
+from sysid.export.stage import Stage
+from sysid.export.surrogate import Surrogate
 
 
 def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
@@ -66,7 +67,7 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         sequence = _Sequence(part, stage, known, state, remainder)
         made.append(sequence.made())
         known += sequence.outputs
-    _columns(nodes, known[len(inputs) :], "y")
+    _columns(nodes, [known[column] for column in surrogate.columns], "y")
     join_states(nodes, made)
     _flags(nodes, surrogate, inputs, made)
     return in_blocks(surrogate, nodes)
@@ -232,7 +233,8 @@ class _Sequence:
                 limit = part.numbers("value", side.value) if side.column is None else self._channel(side.column)
                 beyond = part.add("Greater" if side.upper else "Less", [value, limit], "beyond_in_units")
                 value = part.add("Where", [beyond, limit, value], "in_units")
-                limited.append(part.add("Equal", [value, limit], "reached"))
+                if self.stage.told[j]:
+                    limited.append(part.add("Equal", [value, limit], "reached"))
             self.outputs.append(value)
         return limited
 

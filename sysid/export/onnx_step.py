@@ -16,7 +16,8 @@ from sysid.export.onnx_nodes import Nodes
 from sysid.export.onnx_space import space_step, within_bound
 from sysid.export.rates import RateForm
 from sysid.export.space import SpaceCell
-from sysid.export.surrogate import Port, Side, Stage, Surrogate
+from sysid.export.stage import Port, Side, Stage
+from sysid.export.surrogate import Surrogate
 
 STATE_TEXT = "past samples, scaled; the layout stands in model.json under state"
 FLAGS_TEXT = "the sum of: " + "; ".join(f"{int(flag)}: {text}" for flag, text in MEANING.items())
@@ -83,18 +84,23 @@ def step_nodes(surrogate: Surrogate, dtype: DTypeLike) -> Nodes:
         made.append(_within_limits(part, stage, one, known))
         if k + 1 < len(surrogate.stages):
             known = part.add("Concat", [known, made[-1].outputs], "known", axis=-1)
-    nodes.add("Concat", [one.outputs for one in made], "y", axis=-1)
-    _late(nodes, surrogate, join_states(nodes, made, "state_out" if not surrogate.late else "state_before_late"))
-    _flags(nodes, surrogate, made)
+    computed = nodes.add("Concat", [one.outputs for one in made], "computed" if surrogate.selects else "y", axis=-1)
+    if surrogate.selects:
+        columns = [column - len(surrogate.inputs) for column in surrogate.columns]
+        nodes.add("Gather", [computed, nodes.integers(columns)], "y", axis=-1)
+    _late(
+        nodes, surrogate, computed, join_states(nodes, made, "state_out" if not surrogate.late else "state_before_late")
+    )
+    _flags(nodes, surrogate, computed, made)
     return nodes
 
 
-def _late(nodes: Nodes, surrogate: Surrogate, state: str) -> None:
+def _late(nodes: Nodes, surrogate: Surrogate, computed: str, state: str) -> None:
     """Put what was computed after it was read into the next state."""
     late = surrogate.late
     if not late:
         return
-    channels = nodes.add("Concat", ["u", "y"], "channels", axis=-1)
+    channels = nodes.add("Concat", ["u", computed], "channels", axis=-1)
     values = nodes.add("Gather", [channels, nodes.integers([one.column for one in late])], "late", axis=-1)
     offset, scale = (
         nodes.numbers(f"late_{side}", [getattr(one, side) for one in late]) for side in ("offset", "scale")
@@ -253,7 +259,8 @@ def _within_limits(nodes: Nodes, stage: Stage, draft: _Draft, known: str) -> Mad
                 beyond = part.add("Greater" if side.upper else "Less", [values[j], limit], "beyond")
                 numbers[j] = part.add("Where", [beyond, number, numbers[j]], "number")
                 values[j] = part.add("Where", [beyond, limit, values[j]], "value")
-                limited.append(part.add("Equal", [values[j], limit], "reached"))
+                if stage.told[j]:
+                    limited.append(part.add("Equal", [values[j], limit], "reached"))
         scaled = nodes.add("Concat", numbers, "scaled_within_limits", axis=1)
         outputs = nodes.add("Concat", values, "outputs_within_limits", axis=1)
     state = draft.following(scaled)
@@ -337,12 +344,12 @@ def clipped(nodes: Nodes, output: str, stage: Stage) -> str:
     return nodes.add("Clip", [output, low, high], "bounded")
 
 
-def _flags(nodes: Nodes, surrogate: Surrogate, made: Sequence[Made]) -> None:
+def _flags(nodes: Nodes, surrogate: Surrogate, computed: str, made: Sequence[Made]) -> None:
     """The flags of a sample, with few nodes: in one step a node costs more than its arithmetic."""
     low, high = ([getattr(port, side) for port in surrogate.inputs] for side in ("low", "high"))
     below = nodes.add("Less", ["u", nodes.numbers("declared_low", low)], "u_below")
     above = nodes.add("Greater", ["u", nodes.numbers("declared_high", high)], "u_above")
-    known = nodes.add("Concat", ["u", "y"], "u_and_y", axis=-1)
+    known = nodes.add("Concat", ["u", computed], "u_and_y", axis=-1)
     raised = {
         Flag.OUTSIDE_RANGE: [nodes.add("Or", [below, above], "u_outside")],
         Flag.AT_BOUND: held_outputs(nodes, surrogate, made),

@@ -120,15 +120,14 @@ def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, star
 
 def _from_rest(surrogate: Surrogate, name: str, inputs: NDArray[np.float64]) -> ParityCase:
     change = _disturbances(surrogate)
-    output = surrogate.simulate(inputs)
-    levels = surrogate.levels(inputs[0])[len(surrogate.inputs) :]
-    disturbed = surrogate.simulate(inputs, rest_outputs=levels + change)
+    computed = surrogate.compute(inputs)
+    disturbed = surrogate.compute(inputs, surrogate.rest(inputs[0]) + change)
     return ParityCase(
         name=name,
         inputs=inputs,
         state=surrogate.at_rest(inputs[0]),
-        output=output,
-        amplification=largest_difference(disturbed / change, output / change),
+        output=surrogate.chosen(computed),
+        amplification=largest_difference(surrogate.chosen(disturbed / change), surrogate.chosen(computed / change)),
     )
 
 

@@ -115,7 +115,8 @@ def bundle_run_times(bundle: Bundle, *, repeats: int = 3) -> tuple[RunTime, ...]
         )
         for entry in bundle.metadata["files"]
     ]
-    return measure_run_times(Surrogate.of(bundle.model, ranges), files, bundle.folder, repeats=repeats)
+    outputs = [str(entry["name"]) for entry in bundle.outputs]
+    return measure_run_times(Surrogate.of(bundle.model, ranges, outputs=outputs), files, bundle.folder, repeats=repeats)
 
 
 def _timed(run: Callable[[], object], own: Callable[[], None], repeats: int) -> tuple[float, float]:

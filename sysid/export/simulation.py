@@ -110,8 +110,8 @@ def _check_sample_time(trace: Trace, sample_time: float) -> None:
 
 def _run(bundle: Bundle, given: Trace, channels: tuple[Channel, ...], initial: float | None) -> Simulation:
     ranges = {entry["name"]: tuple(entry["range"]) for entry in bundle.inputs if entry["range"] is not None}
-    surrogate = Surrogate.of(bundle.model, ranges)
     outputs = tuple(channel_of(entry) for entry in bundle.outputs)
+    surrogate = Surrogate.of(bundle.model, ranges, outputs=[channel.name for channel in outputs])
     if initial is not None and len(outputs) > 1:
         raise ConfigError(
             "the outputs cannot all begin at one value",
@@ -121,7 +121,8 @@ def _run(bundle: Bundle, given: Trace, channels: tuple[Channel, ...], initial: f
         )
     names = tuple(channel.name for channel in channels)
     values = given.columns(names)
-    found = surrogate.simulate(values, None if initial is None else np.array([initial]))
+    computed = surrogate.compute(values, surrogate.rest(values[0], None if initial is None else np.array([initial])))
+    found = surrogate.chosen(computed)
     trace = Trace(
         name=given.name,
         sample_time=given.sample_time,
@@ -131,5 +132,5 @@ def _run(bundle: Bundle, given: Trace, channels: tuple[Channel, ...], initial: f
         usable=given.usable,
         provenance=(*given.provenance, f"{surrogate.mapping} simulated in free run by {bundle.folder}"),
     )
-    flags = expected_flags(surrogate, values, found)
+    flags = expected_flags(surrogate, values, computed)
     return Simulation(trace=trace, inputs=names, outputs=tuple(c.name for c in outputs), flags=flags)

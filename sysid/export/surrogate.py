@@ -13,167 +13,22 @@ import re
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.cell import Cell, cell_of
-from sysid.export.layout import DelayLine, SpaceState, StateLayout, layout_of
-from sysid.export.space import SpaceCell
-from sysid.models import AbstractModel, Cascade, History, Limit
-from sysid.models.wiring import Member, Wiring
+from sysid.export.cell import cell_of
+from sysid.export.layout import DelayLine, SpaceState
+from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
+from sysid.models import AbstractModel, Cascade, History
+from sysid.models.wiring import Wiring
 
-Range = tuple[float, float]
-"""Least and greatest value, in the channel's unit."""
-Level = float | str
-"""A value at rest, or the input whose first sample it is."""
 LONGEST_IDENTIFIER = 60
 """Characters. A file's name may have 255, with its folders 260 on Windows, and a cascade may have eighty outputs."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Port:
-    """An input or output of a surrogate.
-
-    Args:
-        name: Name of the channel.
-        unit: Its unit.
-        identifier: The name as a lower-case C identifier.
-        level: Its value before the first sample, or the name of the input whose first sample it is; an input's own
-            name is the usual case.
-        range: The values that an input is declared for; ``None`` where nothing is declared.
-        start: The value of an input that nobody sets.
-    """
-
-    name: str
-    unit: str
-    identifier: str
-    level: Level
-    range: Range | None = None
-    start: float = 0.0
-
-    @property
-    def low(self) -> float:
-        """Least declared value; ``-inf`` where nothing is declared."""
-        return -np.inf if self.range is None else self.range[0]
-
-    @property
-    def high(self) -> float:
-        """Greatest declared value; ``inf`` where nothing is declared."""
-        return np.inf if self.range is None else self.range[1]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Side:
-    """One declared limit of an output.
-
-    Args:
-        upper: Whether the output may not be above it; below it otherwise.
-        value: The limit in the channel's unit, where it is not a channel.
-        column: The channel that is the limit, in ``[inputs of the whole | outputs]``; ``None`` where it is a value.
-    """
-
-    upper: bool
-    value: float = 0.0
-    column: int | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Late:
-    """A number of the state that is a channel which a later stage computes.
-
-    Args:
-        place: Its place in the state of the whole.
-        column: The channel, in ``[inputs of the whole | outputs of the whole]``.
-        offset: In the channel's unit.
-        scale: In the channel's unit.
-    """
-
-    place: int
-    column: int
-    offset: float
-    scale: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Stage:
-    """One model of a surrogate.
-
-    Args:
-        model: The model.
-        sources: For each of its inputs the column in ``[inputs of the whole | outputs of the whole]``.
-        targets: For each of its outputs the column.
-        limits: For each of its outputs the declared limits: the upper before the lower, which wins where they cross.
-        first: Where its state begins in the state of the whole.
-        first_remainder: Where its remainders begin among those of the whole, in float32.
-    """
-
-    model: Member
-    sources: tuple[int, ...]
-    targets: tuple[int, ...]
-    limits: tuple[tuple[Side, ...], ...]
-    first: int
-    first_remainder: int
-
-    @cached_property
-    def cell(self) -> Cell | SpaceCell:
-        """What is written."""
-        return cell_of(self.model)
-
-    @cached_property
-    def state(self) -> StateLayout | SpaceState:
-        """The layout of its own state, counted from ``first``."""
-        return layout_of(self.model)
-
-    @property
-    def lagged(self) -> tuple[Cell, StateLayout]:
-        """Cell and layout of a model over lagged regressors."""
-        cell = Cell.of(self.model)
-        return cell, StateLayout.of_cell(cell)
-
-    @property
-    def space(self) -> SpaceCell:
-        """The cell of a model that is a state space."""
-        if isinstance(self.cell, SpaceCell):
-            return self.cell
-        raise ConfigError("not a state space", got=self.cell.ends.outputs)
-
-    @property
-    def known_sources(self) -> tuple[int, ...]:
-        """Columns that are known when it runs; the first one in place of those that are computed later.
-
-        What stands there is not read: of a channel that is computed later, a stage uses past samples only.
-        """
-        return tuple(source if source < self.targets[0] else 0 for source in self.sources)
-
-    @property
-    def late(self) -> tuple[Late, ...]:
-        """Numbers of its state that are set once the whole step is computed."""
-        return tuple(
-            Late(place=self.first + line.first, column=source, offset=line.offset, scale=line.scale)
-            for source, line in zip(self.sources, self.state.lines, strict=False)
-            if source > self.targets[-1] and line.length
-        )
-
-    @property
-    def remainders(self) -> int:
-        """Numbers more in its state in float32: what rounding took from its newest numbers, for the next step."""
-        if isinstance(self.cell, SpaceCell):
-            return self.state.size
-        return self.cell.n_outputs if self.cell.adds else 0
-
-    @property
-    def bounded(self) -> bool:
-        """Whether its outputs are held within bounds of the model itself."""
-        return bool(np.isfinite(self.cell.low) or np.isfinite(self.cell.high))
-
-    @property
-    def limited(self) -> bool:
-        """Whether an output has a declared limit."""
-        return any(self.limits)
+MANY = 8
+"""Stages beyond which their structures are not listed in a line."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -183,12 +38,14 @@ class Surrogate:
     Args:
         source: The model or cascade that is written.
         inputs: What goes in.
-        outputs: What comes out, in the order in which it is computed.
+        computed: What the stages compute, in that order.
+        outputs: What of it comes out.
         stages: In the order in which they run.
     """
 
     source: AbstractModel | Cascade
     inputs: tuple[Port, ...]
+    computed: tuple[Port, ...]
     outputs: tuple[Port, ...]
     stages: tuple[Stage, ...]
 
@@ -198,6 +55,7 @@ class Surrogate:
         source: AbstractModel | Cascade,
         ranges: Dict[str, Range] | None = None,
         starts: Dict[str, float] | None = None,
+        outputs: Sequence[str] | None = None,
     ) -> Surrogate:
         """A model or a cascade as a surrogate.
 
@@ -206,12 +64,14 @@ class Surrogate:
             ranges: The values that inputs are declared for, by channel.
             starts: The values of inputs that nobody sets, by channel; the middle of their range by default, 0
                 without one.
+            outputs: What comes out, in this order; all that is computed by default.
 
         Returns:
             The surrogate.
 
         Raises:
-            ConfigError: If a model is of a kind that cannot be written, or models in a circle have no input.
+            ConfigError: If a model is of a kind that cannot be written, models in a circle have no input, or an output
+                is not computed.
         """
         if isinstance(source, Cascade):
             models, wiring, limits = source.models, source.wiring, source.limits
@@ -237,16 +97,33 @@ class Surrogate:
             )
             for name in wiring.inputs
         )
-        outputs = tuple(
-            Port(name=name, unit=wiring.units[name], identifier=identifiers[name], level=levels[name])
+        computed = {
+            name: Port(name=name, unit=wiring.units[name], identifier=identifiers[name], level=levels[name])
             for name in wiring.outputs
+        }
+        names = _known_names(wiring.outputs if outputs is None else outputs, computed)
+        return cls(
+            source=source,
+            inputs=inputs,
+            computed=tuple(computed.values()),
+            outputs=tuple(computed[name] for name in names),
+            stages=stages_of(models, wiring, limits, names),
         )
-        return cls(source=source, inputs=inputs, outputs=outputs, stages=_stages(models, wiring, limits))
 
     @property
     def channels(self) -> tuple[Port, ...]:
-        """Inputs, then outputs."""
-        return (*self.inputs, *self.outputs)
+        """Inputs, then everything that is computed."""
+        return (*self.inputs, *self.computed)
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Where each output stands among :attr:`channels`."""
+        return tuple(len(self.inputs) + self.computed.index(port) for port in self.outputs)
+
+    @property
+    def selects(self) -> bool:
+        """Whether what comes out is not simply all that is computed."""
+        return self.outputs != self.computed
 
     @property
     def sample_time(self) -> float:
@@ -273,7 +150,9 @@ class Surrogate:
 
     @property
     def label(self) -> str:
-        """The structures of the stages."""
+        """The structures of the stages; of many, their number."""
+        if len(self.stages) > MANY:
+            return f"{len(self.stages)} models with {self.source.n_parameters} parameters"
         return ", ".join(stage.model.structure.label for stage in self.stages)
 
     @property
@@ -316,7 +195,7 @@ class Surrogate:
             first: The inputs' first sample, shape ``(n_inputs,)``.
 
         Returns:
-            Shape ``(n_inputs + n_outputs,)``, in units.
+            Shape ``(n_channels,)``, in units.
         """
         values = dict(zip((port.name for port in self.inputs), map(float, first), strict=True))
         return np.array([values[p.level] if isinstance(p.level, str) else p.level for p in self.channels])
@@ -336,7 +215,7 @@ class Surrogate:
     def simulate(
         self, inputs: NDArray[np.float64], rest_outputs: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Free run from rest by the model or cascade itself.
+        """Free run from rest by the model or cascade itself, of what comes out.
 
         Args:
             inputs: Shape ``(n_samples, n_inputs)``, in their units.
@@ -346,7 +225,39 @@ class Surrogate:
             Shape ``(n_samples, n_outputs)``, in their units.
         """
         inputs = np.asarray(inputs, dtype=np.float64)
-        rest = self.levels(inputs[0])[len(self.inputs) :] if rest_outputs is None else rest_outputs
+        return self.chosen(self.compute(inputs, self.rest(inputs[0], rest_outputs)))
+
+    def rest(self, first: NDArray[np.float64], outputs: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """What is computed, before the first sample.
+
+        Args:
+            first: The inputs' first sample, shape ``(n_inputs,)``.
+            outputs: Other values of the outputs, shape ``(n_outputs,)``; the declared levels by default.
+
+        Returns:
+            Shape ``(n_computed,)``, in units.
+        """
+        levels = self.levels(first)
+        if outputs is not None:
+            levels[list(self.columns)] = outputs
+        return levels[len(self.inputs) :]
+
+    def chosen(self, computed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What comes out of what is computed: shape ``(n_samples, n_outputs)`` of ``(n_samples, n_computed)``."""
+        return computed[:, [column - len(self.inputs) for column in self.columns]] if self.selects else computed
+
+    def compute(self, inputs: NDArray[np.float64], rest: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Free run from rest by the model or cascade itself, of everything that is computed.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in their units.
+            rest: Shape ``(n_computed,)``; the declared levels by default.
+
+        Returns:
+            Shape ``(n_samples, n_computed)``, in their units.
+        """
+        inputs = np.asarray(inputs, dtype=np.float64)
+        rest = self.rest(inputs[0]) if rest is None else rest
         if isinstance(self.source, Cascade):
             levels = dict(zip(self.source.outputs, map(float, rest), strict=True))
             return self.source.simulate(inputs, rest=levels).values[:, len(self.inputs) :]
@@ -366,33 +277,17 @@ class Surrogate:
         return text | ({"state_spaces": [{"first": at, **state.to_dict()} for at, state in spaces]} if spaces else {})
 
 
-def _stages(models: Sequence[Member], wiring: Wiring, limits: Dict[str, Limit]) -> tuple[Stage, ...]:
-    columns = {name: i for i, name in enumerate(wiring.channels)}
-    stages: list[Stage] = []
-    first = remainder = 0
-    for model in models:
-        ends = cell_of(model).ends
-        stage = Stage(
-            model=model,
-            sources=tuple(columns[name] for name in ends.inputs),
-            targets=tuple(columns[name] for name in ends.outputs),
-            limits=tuple(_sides(limits.get(name, Limit()), columns) for name in ends.outputs),
-            first=first,
-            first_remainder=remainder,
+def _known_names(names: Sequence[str], computed: Dict[str, Port]) -> tuple[str, ...]:
+    """Names of outputs, each of something that is computed, and once."""
+    if not names or len(set(names)) < len(names) or not set(names) <= set(computed):
+        raise ConfigError(
+            "these cannot be the outputs of what is exported",
+            where="outputs",
+            expected=f"some of {', '.join(computed)}, each once",
+            got=", ".join(names) or "none",
+            remedy="name what the models compute",
         )
-        stages.append(stage)
-        first, remainder = first + stage.state.size, remainder + stage.remainders
-    return tuple(stages)
-
-
-def _sides(limit: Limit, columns: Dict[str, int]) -> tuple[Side, ...]:
-    sides = []
-    for upper, value in ((True, limit.high), (False, limit.low)):
-        if isinstance(value, str):
-            sides.append(Side(upper=upper, column=columns[value]))
-        elif value is not None and np.isfinite(value):
-            sides.append(Side(upper=upper, value=float(value)))
-    return tuple(sides)
+    return tuple(names)
 
 
 def _levels(source: AbstractModel | Cascade, wiring: Wiring) -> dict[str, Level]:

@@ -11,7 +11,8 @@ from torch import Tensor, nn
 from sysid.export.cell import Cell
 from sysid.export.flags import Flag
 from sysid.export.space import SpaceCell
-from sysid.export.surrogate import Stage, Surrogate
+from sysid.export.stage import Stage
+from sysid.export.surrogate import Surrogate
 
 
 class Limits(nn.Module):
@@ -22,6 +23,7 @@ class Limits(nn.Module):
     """
 
     outputs: list[int]
+    told: list[bool]
     upper: list[bool]
     values: list[float]
     columns: list[int]
@@ -36,6 +38,7 @@ class Limits(nn.Module):
         self.scales = [float(value) for value in cell.scale[n:]]
         sides = [(j, side) for j, own in enumerate(stage.limits) for side in own]
         self.outputs = [j for j, _ in sides]
+        self.told = [stage.told[j] for j, _ in sides]
         self.upper = [side.upper for _, side in sides]
         self.values = [float(side.value) for _, side in sides]
         self.columns = [-1 if side.column is None else int(side.column) for _, side in sides]
@@ -64,7 +67,8 @@ class Limits(nn.Module):
             beyond = channels[at] > limit if self.upper[i] else channels[at] < limit
             channels[at] = torch.where(beyond, limit, channels[at])
             numbers[j] = torch.where(beyond, (limit - self.offsets[j]) / self.scales[j], numbers[j])
-            reached = reached | (channels[at] == limit)
+            if self.told[i]:
+                reached = reached | (channels[at] == limit)
         return torch.cat(numbers, dim=1), torch.cat(channels[self.first :], dim=1), reached
 
 
@@ -238,6 +242,7 @@ class SurrogateStep(nn.Module):
 
     declared_low: Tensor
     declared_high: Tensor
+    columns: Tensor
     late_places: Tensor
     late_columns: Tensor
     late_offset: Tensor
@@ -253,6 +258,8 @@ class SurrogateStep(nn.Module):
         )
         self.register_buffer("declared_low", torch.tensor([port.low for port in surrogate.inputs], dtype=dtype))
         self.register_buffer("declared_high", torch.tensor([port.high for port in surrogate.inputs], dtype=dtype))
+        self.selects = surrogate.selects
+        self.register_buffer("columns", torch.tensor(surrogate.columns, dtype=torch.int64))
         late = surrogate.late
         self.circular = len(late) > 0
         self.register_buffer("late_places", torch.tensor([one.place for one in late], dtype=torch.int64))
@@ -292,7 +299,8 @@ class SurrogateStep(nn.Module):
         if self.circular:
             late = (known.index_select(1, self.late_columns) - self.late_offset) / self.late_scale
             following = following.index_copy(1, self.late_places, late)
-        return known[:, n_inputs:], following, flags
+        y = known.index_select(1, self.columns) if self.selects else known[:, n_inputs:]
+        return y, following, flags
 
 
 class SurrogateSequence(nn.Module):

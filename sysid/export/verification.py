@@ -80,8 +80,8 @@ def _outside(surrogate: Surrogate, inputs: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _record(surrogate: Surrogate, inputs: NDArray[np.float64]) -> str:
-    outputs = surrogate.simulate(inputs)
-    flags = expected_flags(surrogate, inputs, outputs)
+    computed = surrogate.compute(inputs)
+    outputs, flags = surrogate.chosen(computed), expected_flags(surrogate, inputs, computed)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     ports = (*surrogate.inputs, *surrogate.outputs)

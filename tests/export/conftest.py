@@ -422,11 +422,14 @@ def build_circle() -> Cascade:
     )
 
 
-CASCADES = {
-    "three models": build_cascade,
-    "every kind, limits and levels": build_limited,
-    "in a circle": build_circle,
+CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
+    "three models": (build_cascade, None),
+    "every kind, limits and levels": (build_limited, None),
+    "in a circle": (build_circle, None),
+    "some outputs, in another order": (build_limited, ("BC", "AR")),
+    "one output of a circle": (build_circle, ("ER",)),
 }
+"""Models wired, and which outputs leave them."""
 
 
 @pytest.fixture(scope="session")
@@ -436,7 +439,8 @@ def cascade() -> Surrogate:
 
 @pytest.fixture(params=CASCADES, scope="session")
 def any_cascade(request: pytest.FixtureRequest) -> Surrogate:
-    return Surrogate.of(CASCADES[request.param](), {"STP": (0.0, 80.0)})
+    build, outputs = CASCADES[request.param]
+    return Surrogate.of(build(), {"STP": (0.0, 80.0)}, outputs=outputs)
 
 
 @pytest.fixture(scope="session")

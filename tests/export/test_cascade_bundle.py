@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from sysid.errors import ChannelError, ConfigError
-from sysid.export import EXPORTERS, export_bundle, read_bundle, zip_bundle
+from sysid.export import EXPORTERS, export_bundle, read_bundle, simulate_bundle, zip_bundle
 from sysid.export.manifest import schema_text
 from sysid.models import Cascade
+from tests.export.test_surrogate import linear
 
 
 @pytest.fixture
@@ -87,6 +88,30 @@ def test_receivers_find_every_record_as_recorded(bundle, tmp_path):
         records = sorted((bundle.folder / "verify").glob("record*.csv"))
         done = subprocess.run([tmp_path / "v", *records], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout
+
+
+def test_a_bundle_of_some_outputs_tells_of_these_alone(limited, command, tmp_path):
+    bundle = export_bundle(limited, command, tmp_path / "b", outputs=["BC", "AR"], formats=["onnx", "c"])
+    manifest = json.loads((bundle.folder / "model.json").read_text(encoding="utf-8"))
+    jsonschema.validate(manifest, json.loads(schema_text()))
+    assert (manifest["mapping"], len(manifest["stages"])) == ("STP+FLOW -> BC, AR", len(limited.models))
+    assert "Outputs: BC [psi gauge], AR [psi]." in (bundle.folder / "MODEL_CARD.md").read_text(encoding="utf-8")
+    run = simulate_bundle(read_bundle(bundle.folder), command["VAL01"])
+    assert run.trace.channel_names == ("STP", "FLOW", "BC", "AR")
+    expected = limited.simulate(command["VAL01"].columns(limited.inputs))
+    for name in run.outputs:
+        np.testing.assert_array_equal(run.trace[name], expected[name])
+    python = [sys.executable, "-I", bundle.folder / "verify" / "verify.py"]
+    done = subprocess.run(python, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr, done.stdout.count(": as recorded")) == (0, "", 3)
+
+
+def test_many_models_are_counted_not_listed(command, tmp_path):
+    models = tuple(linear(text) for text in ("STP -> X1", *(f"X{i} -> X{i + 1}" for i in range(1, 12))))
+    folder = export_bundle(Cascade(models=models), command, tmp_path / "b", outputs=["X12"], formats=[]).folder
+    card = (folder / "MODEL_CARD.md").read_text(encoding="utf-8")
+    assert card.startswith("# STP -> X12: 12 models with ")
+    assert "12 models, run one after the other within a sample: see `stages` in `model.json`" in card
 
 
 def test_the_same_cascade_gives_the_same_bytes(limited, command, tmp_path):

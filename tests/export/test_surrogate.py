@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.export import Surrogate
+from sysid.export import Flag, Surrogate, expected_flags
 from sysid.models import ARX, NARX, ARXModel, Cascade, Mapping
 
 
@@ -123,6 +123,44 @@ def test_the_identifier_of_many_outputs_is_short_enough_to_name_a_file_and_diffe
     assert one.startswith("stp_to_ch000_ch001_")
     assert one.isidentifier()
     assert one != other
+
+
+def test_what_comes_out_may_be_some_of_what_is_computed(limited):
+    whole, some = Surrogate.of(limited), Surrogate.of(limited, outputs=["BC", "AR"])
+    u = np.random.default_rng(2).uniform(20.0, 80.0, (50, 2))
+    assert [port.name for port in some.outputs] == ["BC", "AR"]
+    assert [some.channels[column].name for column in some.columns] == ["BC", "AR"]
+    assert (some.mapping, some.identifier) == ("STP+FLOW -> BC, AR", "stp_flow_to_bc_ar")
+    assert (whole.selects, some.selects) == (False, True)
+    assert (some.computed, some.state_size) == (whole.computed, whole.state_size)
+    places = [whole.outputs.index(port) for port in some.outputs]
+    np.testing.assert_array_equal(some.simulate(u), whole.simulate(u)[:, places])
+
+
+def test_where_some_outputs_begin_elsewhere_the_others_stand_at_their_levels(limited):
+    whole, some = Surrogate.of(limited), Surrogate.of(limited, outputs=["BC", "AR"])
+    u = np.full((50, 2), 60.0)
+    rest = whole.rest(u[0])
+    rest[[whole.outputs.index(port) for port in some.outputs]] = [37.7, 20.0]
+    np.testing.assert_array_equal(some.rest(u[0], np.array([37.7, 20.0])), rest)
+    assert not np.array_equal(some.rest(u[0]), rest)
+    np.testing.assert_array_equal(some.simulate(u, np.array([37.7, 20.0])), some.chosen(whole.compute(u, rest)))
+
+
+def test_nobody_is_told_of_the_limits_of_what_does_not_come_out(limited):
+    u = np.random.default_rng(2).uniform(20.0, 80.0, (200, 2))
+    found = {}
+    for outputs in (None, ["BC"], ["X"]):
+        surrogate = Surrogate.of(limited, outputs=outputs)
+        found[str(outputs)] = expected_flags(surrogate, u, surrogate.compute(u)) & Flag.AT_LIMIT
+    whole, *parts = found.values()
+    assert all(((part & whole) == part).all() and 0 < (part > 0).sum() < (whole > 0).sum() for part in parts)
+
+
+@pytest.mark.parametrize("outputs", [["BC", "nothing"], ["BC", "BC"], []])
+def test_outputs_that_are_not_computed_are_named(limited, outputs):
+    with pytest.raises(ConfigError, match="cannot be the outputs"):
+        Surrogate.of(limited, outputs=outputs)
 
 
 def test_state_of_a_single_model_is_the_models_own(narx, declared):

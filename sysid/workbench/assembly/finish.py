@@ -143,8 +143,8 @@ class Finish:
         self.context.tell(events.StepStarted(step=step))
         provenance = {"pipeline": self.context.config.name, "command": self.context.command}
         bundle = export_bundle(
-            whole, cases, self.context.store.path / "bundle", formats=asked.formats, tolerance=asked.tolerance,
-            metrics=evaluation, provenance=provenance,
+            whole, cases, self.context.store.path / "bundle", outputs=self.context.config.outputs,
+            formats=asked.formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
         )  # fmt: skip
         worst = max((entry.largest_difference for entry in bundle.files), default=0.0)
         self.context.tell(

@@ -1,0 +1,210 @@
+"""A stage: one model of what is exported, where its channels stand, and what holds its outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sysid.errors import ConfigError
+from sysid.export.cell import Cell, cell_of
+from sysid.export.layout import SpaceState, StateLayout, layout_of
+from sysid.export.space import SpaceCell
+from sysid.models import Limit
+from sysid.models.wiring import Member, Wiring
+
+Range = tuple[float, float]
+"""Least and greatest value, in the channel's unit."""
+Level = float | str
+"""A value at rest, or the input whose first sample it is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Port:
+    """An input or output of a surrogate.
+
+    Args:
+        name: Name of the channel.
+        unit: Its unit.
+        identifier: The name as a lower-case C identifier.
+        level: Its value before the first sample, or the name of the input whose first sample it is; an input's own
+            name is the usual case.
+        range: The values that an input is declared for; ``None`` where nothing is declared.
+        start: The value of an input that nobody sets.
+    """
+
+    name: str
+    unit: str
+    identifier: str
+    level: Level
+    range: Range | None = None
+    start: float = 0.0
+
+    @property
+    def low(self) -> float:
+        """Least declared value; ``-inf`` where nothing is declared."""
+        return -np.inf if self.range is None else self.range[0]
+
+    @property
+    def high(self) -> float:
+        """Greatest declared value; ``inf`` where nothing is declared."""
+        return np.inf if self.range is None else self.range[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """One declared limit of an output.
+
+    Args:
+        upper: Whether the output may not be above it; below it otherwise.
+        value: The limit in the channel's unit, where it is not a channel.
+        column: The channel that is the limit, in ``[inputs of the whole | computed]``; ``None`` where it is a value.
+    """
+
+    upper: bool
+    value: float = 0.0
+    column: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Late:
+    """A number of the state that is a channel which a later stage computes.
+
+    Args:
+        place: Its place in the state of the whole.
+        column: The channel, in ``[inputs of the whole | what it computes]``.
+        offset: In the channel's unit.
+        scale: In the channel's unit.
+    """
+
+    place: int
+    column: int
+    offset: float
+    scale: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stage:
+    """One model of a surrogate.
+
+    Args:
+        model: The model.
+        sources: For each of its inputs the column in ``[inputs of the whole | what it computes]``.
+        targets: For each of its outputs the column.
+        limits: For each of its outputs the declared limits: the upper before the lower, which wins where they cross.
+        told: For each of its outputs whether it leaves the whole. Of one that does not, nobody is told that it is at a
+            limit: what is between two limits by its nature, such as a switch, is at one nearly always.
+        first: Where its state begins in the state of the whole.
+        first_remainder: Where its remainders begin among those of the whole, in float32.
+    """
+
+    model: Member
+    sources: tuple[int, ...]
+    targets: tuple[int, ...]
+    limits: tuple[tuple[Side, ...], ...]
+    told: tuple[bool, ...]
+    first: int
+    first_remainder: int
+
+    @cached_property
+    def cell(self) -> Cell | SpaceCell:
+        """What is written."""
+        return cell_of(self.model)
+
+    @cached_property
+    def state(self) -> StateLayout | SpaceState:
+        """The layout of its own state, counted from ``first``."""
+        return layout_of(self.model)
+
+    @property
+    def lagged(self) -> tuple[Cell, StateLayout]:
+        """Cell and layout of a model over lagged regressors."""
+        cell = Cell.of(self.model)
+        return cell, StateLayout.of_cell(cell)
+
+    @property
+    def space(self) -> SpaceCell:
+        """The cell of a model that is a state space."""
+        if isinstance(self.cell, SpaceCell):
+            return self.cell
+        raise ConfigError("not a state space", got=self.cell.ends.outputs)
+
+    @property
+    def known_sources(self) -> tuple[int, ...]:
+        """Columns that are known when it runs; the first one in place of those that are computed later.
+
+        What stands there is not read: of a channel that is computed later, a stage uses past samples only.
+        """
+        return tuple(source if source < self.targets[0] else 0 for source in self.sources)
+
+    @property
+    def late(self) -> tuple[Late, ...]:
+        """Numbers of its state that are set once the whole step is computed."""
+        return tuple(
+            Late(place=self.first + line.first, column=source, offset=line.offset, scale=line.scale)
+            for source, line in zip(self.sources, self.state.lines, strict=False)
+            if source > self.targets[-1] and line.length
+        )
+
+    @property
+    def remainders(self) -> int:
+        """Numbers more in its state in float32: what rounding took from its newest numbers, for the next step."""
+        if isinstance(self.cell, SpaceCell):
+            return self.state.size
+        return self.cell.n_outputs if self.cell.adds else 0
+
+    @property
+    def bounded(self) -> bool:
+        """Whether its outputs are held within bounds of the model itself."""
+        return bool(np.isfinite(self.cell.low) or np.isfinite(self.cell.high))
+
+    @property
+    def limited(self) -> bool:
+        """Whether an output has a declared limit."""
+        return any(self.limits)
+
+
+def stages_of(
+    models: Sequence[Member], wiring: Wiring, limits: Dict[str, Limit], outputs: Sequence[str]
+) -> tuple[Stage, ...]:
+    """The models of a wiring as stages.
+
+    Args:
+        models: In the order in which they run.
+        wiring: How they read each other.
+        limits: What holds each output.
+        outputs: What leaves the whole.
+
+    Returns:
+        The stages, in that order.
+    """
+    columns = {name: i for i, name in enumerate(wiring.channels)}
+    stages: list[Stage] = []
+    first = remainder = 0
+    for model in models:
+        ends = cell_of(model).ends
+        stage = Stage(
+            model=model,
+            sources=tuple(columns[name] for name in ends.inputs),
+            targets=tuple(columns[name] for name in ends.outputs),
+            limits=tuple(_sides(limits.get(name, Limit()), columns) for name in ends.outputs),
+            told=tuple(name in outputs for name in ends.outputs),
+            first=first,
+            first_remainder=remainder,
+        )
+        stages.append(stage)
+        first, remainder = first + stage.state.size, remainder + stage.remainders
+    return tuple(stages)
+
+
+def _sides(limit: Limit, columns: Dict[str, int]) -> tuple[Side, ...]:
+    sides = []
+    for upper, value in ((True, limit.high), (False, limit.low)):
+        if isinstance(value, str):
+            sides.append(Side(upper=upper, column=columns[value]))
+        elif value is not None and np.isfinite(value):
+            sides.append(Side(upper=upper, value=float(value)))
+    return tuple(sides)
