@@ -150,7 +150,7 @@ def _texts(surrogate: Surrogate, version: int, variables: list[dict[str, Any]]) 
         "time_name": _free("time", {row["name"] for row in variables}),
         "units": unit_definitions(row["unit"] for row in variables if row["unit"]),
         "starts": [c_real(port.start) for port in surrogate.inputs],
-        "rests": [c_real(value) for value in surrogate.levels(starts)[len(surrogate.inputs) :]],
+        "rests": [c_real(value) for value in surrogate.levels(starts)[list(surrogate.columns)]],
         "followed": [
             (k, names.index(port.level)) for k, port in enumerate(surrogate.outputs) if isinstance(port.level, str)
         ],
