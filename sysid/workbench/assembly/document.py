@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.stress import Stress
 from sysid.workbench.assembly.views import (
+    export_table,
     growth_chart,
     growth_table,
     line_chart,
@@ -25,6 +26,9 @@ from sysid.workbench.assembly.views import (
     line_table,
     stress_tables,
 )
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
 
 COLUMNS = 300
 """Width of the charts in points: enough for the eye, and a page of some hundred kilobytes."""
@@ -53,6 +57,7 @@ class Outcome:
         worst: The sequences that the whole did worst on, for their charts.
         growth: What growing the training data brought, if it was asked for.
         line: How the places do between those that are modelled, if they were asked for.
+        exported: The bundle, if one was asked for.
     """
 
     whole: Cascade
@@ -66,6 +71,7 @@ class Outcome:
     worst: Sequence[Trace] = ()
     growth: Sequence[Growth] = ()
     line: LineScores | None = None
+    exported: Bundle | None = None
 
 
 def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
@@ -86,6 +92,8 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
         tables += stress_tables(found.stressed)
     tables += [growth_table(one) for one in found.growth]
     tables.append(_time_table(found.timing, found.cases))
+    if found.exported is not None:
+        tables.append(export_table(found.exported))
     return {
         "title": "The assembly",
         "headline": _headline(config, found),
@@ -149,8 +157,9 @@ def _points(config: AssemblyConfig, found: Outcome) -> list[tuple[str, str]]:
             (
                 "Weakness",
                 f"Of {stressed.sequences} random sequences {stressed.lost} diverge and "
-                f"{number(100.0 * stressed.within)} % stay within {number(stressed.limit)} (root mean square of "
-                f"{stressed.output}); the worst is {stressed.worst[0][0]} with {number(stressed.worst[0][1])}.",
+                f"{number(100.0 * stressed.within)} % stay within {stressed.limit:g} {stressed.unit} (root mean "
+                f"square of {stressed.output}); the worst is {stressed.worst[0][0]} with "
+                f"{quantity(stressed.worst[0][1], stressed.unit)}.",
             )
         )
     return points

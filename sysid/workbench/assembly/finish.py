@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sysid.models import Cascade
 from sysid.reporting.judgement import parse_judgement
@@ -28,6 +28,9 @@ from sysid.workbench.assembly.members import whole_score, written
 from sysid.workbench.assembly.stress import Stress, stress
 from sysid.workbench.environment import environment
 from sysid.workbench.store import digest, strict, write_json
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
 
 ASSEMBLY, LINE = "assembly.json", "line.json"
 """In the run folder: the chosen whole, and its line."""
@@ -69,13 +72,13 @@ class Finish:
         write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
         stressed, worst = self._stressed(whole)
         line = self._line(whole)
-        self._export(whole, cases, evaluate_cascade(whole, cases))
+        exported = self._export(whole, cases, evaluate_cascade(whole, cases))
         said = document(
             config,
             Outcome(
                 whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.course.notes,
                 timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst, line=line,
-                growth=tuple(self.course.growth),
+                growth=tuple(self.course.growth), exported=exported,
             ),
         )  # fmt: skip
         results = JudgementResults(
@@ -134,12 +137,12 @@ class Finish:
         )
         return scores
 
-    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any) -> None:
+    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any) -> Bundle | None:
         from sysid.export import export_bundle
 
         asked, step = self.context.config.export, "Exporting the assembly"
         if asked is None:
-            return
+            return None
         self.context.tell(events.StepStarted(step=step))
         provenance = {"pipeline": self.context.config.name, "command": self.context.command}
         bundle = export_bundle(
@@ -150,6 +153,7 @@ class Finish:
         self.context.tell(
             events.StepDone(step=step, stored=False, detail=f"{len(bundle.files)} files, at most {worst:.1e} off")
         )
+        return bundle
 
     def report(self) -> Path:
         """Write the report.

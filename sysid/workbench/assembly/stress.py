@@ -23,6 +23,7 @@ class Stress:
 
     Args:
         output: Output that was judged.
+        unit: Its unit.
         sequences: How many were run.
         lost: How many were held by a network's bound, or left all numbers.
         quantiles: Root mean square error of a sequence, by quantile over the sequences, in the output's unit.
@@ -34,6 +35,7 @@ class Stress:
     """
 
     output: str
+    unit: str
     sequences: int
     lost: int
     quantiles: dict[float, float]
@@ -79,6 +81,7 @@ def stress(
     order = np.argsort(-np.nan_to_num(errors, nan=np.inf))
     return Stress(
         output=output,
+        unit=traces[0].channel(output).unit,
         sequences=len(traces),
         lost=int(lost),
         quantiles={q: float(np.quantile(errors, q)) for q in QUANTILES},

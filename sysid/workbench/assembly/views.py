@@ -1,8 +1,8 @@
-"""Stress, growth and line as tables, charts and points of the report."""
+"""Stress, growth, line and exported files as tables, charts and points of the report."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from sysid.reporting.numbers import number, seconds
 from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.stress import Stress
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
 
 
 def stress_tables(found: Stress) -> list[dict[str, Any]]:
@@ -22,15 +25,15 @@ def stress_tables(found: Stress) -> list[dict[str, Any]]:
         One or two tables, as :class:`sysid.reporting.judgement.TableRecord` has them.
     """
     rows: list[list[Any]] = [
-        [f"{100.0 * q:g} % of the sequences at most", value] for q, value in found.quantiles.items()
+        [f"{100.0 * q:g} % of the sequences at most, {found.unit}", value] for q, value in found.quantiles.items()
     ]
-    rows.append([f"share of sequences under {found.limit:g}", found.within])
+    rows.append([f"share of sequences under {found.limit:g} {found.unit}", found.within])
     rows.append(["sequences that diverged", float(found.lost)])
-    rows += [[f"worst: {name}", value] for name, value in found.worst]
+    rows += [[f"worst: {name}, {found.unit}", value] for name, value in found.worst]
     tables: list[dict[str, Any]] = [
         {
             "caption": f"{found.output} on {found.sequences} random sequences of the reference",
-            "head": [["", ""], ["Root mean square error", "in its unit"]],
+            "head": [["", ""], ["Root mean square error", ""]],
             "rows": rows,
             "note": "A sequence diverged if a network was held at its bound, far outside what it was trained on.",
         }
@@ -39,13 +42,30 @@ def stress_tables(found: Stress) -> list[dict[str, Any]]:
         tables.append(
             {
                 "caption": f"{found.output} on the random sequences, state by state",
-                "head": [["State", ""], *([f"{100.0 * q:g} % at most", "rms"] for q in found.quantiles)],
+                "head": [["State", ""], *([f"{100.0 * q:g} % at most", found.unit] for q in found.quantiles)],
                 "rows": [[label, *by.values()] for label, by in found.by_state.items()],
-                "note": "Root mean square error over the samples of a state in a sequence, in the output's unit; "
+                "note": "Root mean square error over the samples of a state in a sequence; "
                 "quantiles over the sequences that are in the state.",
             }
         )
     return tables
+
+
+def export_table(bundle: Bundle) -> dict[str, Any]:
+    """The exported files, and how each compares with the whole.
+
+    Args:
+        bundle: Where they lie.
+
+    Returns:
+        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+    """
+    units = sorted({str(output["unit"]) for output in bundle.outputs})
+    return {
+        "caption": f"Exported to {bundle.folder.name}/: each file against the whole, on every case and on random input",
+        "head": [["", ""], ["Largest difference", ", ".join(units)], ["Tolerance", ", ".join(units)]],
+        "rows": [[f"{one.name} ({one.format})", one.largest_difference, one.tolerance] for one in bundle.files],
+    }
 
 
 def growth_table(grown: Growth) -> dict[str, Any]:

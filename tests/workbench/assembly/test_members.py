@@ -164,6 +164,7 @@ def test_stress_says_what_the_errors_of_each_state_are():
     assert "never" not in found.by_state
     plain, by_state = stress_tables(found)
     assert [row[0] for row in by_state["rows"]] == ["early", "late"]
+    assert "share of sequences under 1 psi" in [row[0] for row in plain["rows"]], "with the output's unit"
     assert stress_tables(stress(whole, sequences, "AR", 1.0)) == [plain]
 
 

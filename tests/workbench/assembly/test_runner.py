@@ -13,6 +13,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, Status
+from sysid.export import read_bundle
 from sysid.reporting import publish_run
 from sysid.reporting.judgement_report import read_judgement_results
 from sysid.workbench.assembly.joint_round import JointRound
@@ -343,3 +344,16 @@ def test_a_limit_that_changes_leaves_the_fits_and_not_what_runs_on_the_others(wo
     assert run(workspace) == 0
     changed = {file.parent.name for file, stamp in zip(files, stamps, strict=True) if file.stat().st_mtime_ns != stamp}
     assert changed == {"upper-lower-retrained-0"}
+
+
+def test_the_report_says_what_was_exported_and_how_far_it_is_from_the_whole(workspace: Path) -> None:
+    file = workspace / "pipelines" / "tanks.yaml"
+    file.write_text(file.read_text().replace("export: null", "export: {formats: [torchscript], tolerance: 1.0e-6}"))
+    assert run(workspace) == 0
+    results = read_judgement_results(workspace / "runs" / "tanks")
+    assert results is not None
+    exported = results.judgement.tables[-1]
+    bundle = read_bundle(workspace / "runs" / "tanks" / "bundle")
+    assert exported.head[1] == ("Largest difference", "cm")
+    assert [row[0] for row in exported.rows] == [f"{one.name} (torchscript)" for one in bundle.files]
+    assert all(row[1] <= row[2] == 1e-6 for row in exported.rows)
