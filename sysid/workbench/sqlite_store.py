@@ -11,6 +11,7 @@ from typing import Any
 from filelock import FileLock
 
 from sysid.atomic import replacing
+from sysid.errors import ConfigError
 
 SQLITE = "sqlite:///"
 """How the address of such a store begins."""
@@ -29,6 +30,9 @@ def held(database: Path, make: Callable[[Path], None]) -> Iterator[None]:
 
     Yields:
         Nothing; the store is there.
+
+    Raises:
+        ConfigError: If its file is no database: MLflow would ask for it again for 102 s before it says so.
     """
     with FileLock(database.with_name(f"{database.name}.lock")):
         if not database.exists():
@@ -48,9 +52,17 @@ def _write_ahead(database: Path) -> None:
     try:
         with closing(sqlite3.connect(database, timeout=0.0)) as connection:
             connection.execute("PRAGMA journal_mode=WAL")
-    except sqlite3.Error:
-        # In use, read-only, or no database at all: it stays as it is, and what opens it next says what is wrong.
+    except sqlite3.OperationalError:
+        # In use or read-only: it stays as it is, and what opens it next says what is wrong.
         return
+    except sqlite3.DatabaseError as error:
+        raise ConfigError(
+            "the store of tracked runs cannot be read",
+            where=str(database),
+            expected="an SQLite database that MLflow has made",
+            got=str(error),
+            remedy="move it away: the next run makes a new one, and tracks again what its folder holds",
+        ) from error
 
 
 def _do_not_wait() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import create_engine, text
 
+from sysid.errors import ConfigError
 from sysid.workbench.sqlite_store import held
 
 FULL, NORMAL = 2, 1
@@ -67,9 +68,10 @@ def test_a_store_in_use_stays_as_it_is(tmp_path: Path) -> None:
     assert journal(database) == "delete"
 
 
-def test_what_is_no_database_is_left_for_others_to_refuse(tmp_path: Path) -> None:
+def test_what_is_no_database_is_refused_at_once_and_left_as_it_is(tmp_path: Path) -> None:
     database = tmp_path / "mlflow.db"
     database.write_bytes(b"not a database at all" * 100)
-    with held(database, make):
+    with pytest.raises(ConfigError, match="cannot be read") as error, held(database, make):
         pass
-    assert database.read_bytes().startswith(b"not a database")
+    assert "move it away" in str(error.value)
+    assert database.read_bytes() == b"not a database at all" * 100
