@@ -79,8 +79,8 @@ def fit_transfer_function(
         ),
     )
     chosen_on = experiments_of(selection, mapping, start or Start(), rest)
-    # BLAS threads that wake for matrices of some ten columns cost more than they give: measured beside one other process
-    # on two cores, a fit took four times as long with them.
+    # BLAS threads that wake for matrices of some ten columns cost more than they give: beside one other process on two
+    # cores a fit took four times as long with them.
     with threadpool_limits(1, "blas"):
         return problem.solve(began, on_iteration, (lambda model: _mean_mse(model, chosen_on)) if selection else None)
 
