@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,11 +77,21 @@ class Screen:
         self._progress.start()
 
 
-class LogFile:
-    """Writes a run's steps into ``log.txt``, with the time of day."""
+SILENCE_S = 60.0
+"""Seconds after which a log says again how a step goes: one of hours shows that it lives, a short one stays a line."""
 
-    def __init__(self) -> None:
+
+class LogFile:
+    """Writes a run's steps into ``log.txt``, with the time of day; how a long one goes, once a minute.
+
+    Args:
+        clock: Seconds, from any beginning.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._path: Path | None = None
+        self._clock = clock
+        self._began = self._said = clock()
 
     def write_to(self, folder: Path, command: str) -> None:
         """Begin the log of a run that does not say so itself.
@@ -101,7 +111,11 @@ class LogFile:
                 self._path = event.folder / "log.txt"
                 self._write(f"run {event.run_id}: {event.command}")
             case StepStarted():
+                self._began = self._said = self._clock()
                 self._write(f"{event.step} ...")
+            case StepProgress() if self._clock() - self._said >= SILENCE_S:
+                self._said = self._clock()
+                self._write(f"{event.step}: {_standing(event, self._said - self._began)}")
             case StepDone():
                 self._write(f"{event.step}: {'stored' if event.stored else 'done'}. {event.detail}")
             case Warned():
@@ -113,6 +127,14 @@ class LogFile:
         if self._path is not None:
             with self._path.open("a", encoding="utf-8") as log:
                 log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')}  {text}\n")
+
+
+def _standing(event: StepProgress, elapsed_s: float) -> str:
+    """How a step stands, and how long it has to go if it goes on like this."""
+    if not event.fraction:
+        return event.detail
+    left = elapsed_s * (1.0 - event.fraction) / event.fraction
+    return f"{100.0 * event.fraction:.0f} %, {duration(left)} left; {event.detail}"
 
 
 def duration(seconds: float) -> str:
