@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from sysid.errors import ConfigError
 from sysid.reporting.comparison import with_published
 from sysid.reporting.document import Document, build_document
 from sysid.reporting.html import readable
@@ -30,6 +32,12 @@ from sysid.reporting.tables import scored_cases
 
 LEFT_OUT: Final = ("fit-", "frequency-response", "residuals")
 """Beginnings of the anchors of sections that only the whole report has."""
+BUNDLE: Final = "bundle"
+"""The folder of the frozen surrogate, in a run's folder and beside a page."""
+FROZEN: Final = f"""
+The frozen surrogate lies beside this page, in [{BUNDLE}]({BUNDLE}): what it was exported as, with its card, its range
+and how far each file is from the model. `sysid simulate` runs it.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +49,9 @@ class _Source:
     shown: Callable[[str], bool]
 
 
-def publish_run(run_folder: Path, into: Path, *, name: str | None = None, workspace: Path | None = None) -> Path:
+def publish_run(
+    run_folder: Path, into: Path, *, name: str | None = None, workspace: Path | None = None, bundle: bool = False
+) -> Path:
     """Publish the report of a run, of fits or of a judgement; nothing is fitted or simulated.
 
     Args:
@@ -49,14 +59,19 @@ def publish_run(run_folder: Path, into: Path, *, name: str | None = None, worksp
         into: Folder of the published reports.
         name: Name of the report; the pipeline's by default.
         workspace: Where the user's own tables of published figures lie; ``None`` is the current folder.
+        bundle: Whether the frozen surrogate that the run exported goes with the page.
 
     Returns:
-        The page, ``<into>/<name>/README.md``, with its figures beside it, and ``scores.json`` for programs.
+        The page, ``<into>/<name>/README.md``, with its figures beside it, and ``scores.json`` for programs; the
+        surrogate in ``bundle``.
 
     Raises:
-        ConfigError: If the folder holds no results, or there is another page of that name that is not ours.
+        ConfigError: If the folder holds no results, or no bundle that was asked for, or there is another page of that
+            name that is not ours.
+        BundleError: If the bundle is damaged.
     """
     source = _source(Path(run_folder), workspace)
+    frozen = _frozen(Path(run_folder)) if bundle else None
     chosen = name or source.document.results.pipeline
     target = into / chosen
     refuse_others(target)
@@ -65,7 +80,11 @@ def publish_run(run_folder: Path, into: Path, *, name: str | None = None, worksp
     with tempfile.TemporaryDirectory(dir=into, prefix=f".{chosen}-") as scratch:
         draft = Path(scratch) / chosen
         draft.mkdir()
-        text = _page(source, chosen, f"sysid publish {run_folder} --as {chosen}", draft)
+        command = f"sysid publish {run_folder} --as {chosen}{' --bundle' if frozen else ''}"
+        text = _page(source, chosen, command, draft)
+        if frozen:
+            shutil.copytree(frozen, draft / BUNDLE)
+            text += FROZEN
         (draft / PAGE).write_text(text, encoding="utf-8", newline="\n")
         if source.scores:
             write_scores(draft, source.scores)
@@ -87,6 +106,22 @@ def _source(folder: Path, workspace: Path | None) -> _Source:
         scores=score_of(results),
         shown=lambda drawing: _worst_case(drawing, results),
     )
+
+
+def _frozen(run_folder: Path) -> Path:
+    """The bundle that a run left, whole."""
+    from sysid.export import read_bundle
+
+    folder = run_folder / BUNDLE
+    if not folder.is_dir():
+        raise ConfigError(
+            "there is no bundle to publish",
+            where=folder,
+            expected="the bundle that a run leaves whose pipeline says export",
+            got="no such folder",
+            remedy="run a pipeline with an export, or leave --bundle out",
+        )
+    return read_bundle(folder).folder
 
 
 def _page(source: _Source, name: str, command: str, folder: Path) -> str:

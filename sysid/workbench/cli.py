@@ -268,11 +268,14 @@ def publish(
     run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")],
     name: Annotated[str | None, typer.Option("--as", help="Name of the report; the pipeline's by default.")] = None,
     into: Annotated[Path, typer.Option(help="Folder of the published reports.")] = Path("reports"),
+    bundle: Annotated[
+        bool, typer.Option("--bundle", help="The frozen surrogate that the run exported as well.")
+    ] = False,
 ) -> None:
     """Publish a run's report: a page of text and a few figures, small enough to be kept under version control."""
     from sysid.workbench.commands.publish import publish_command
 
-    publish_command(run_folder, name=name, into=into)
+    publish_command(run_folder, name=name, into=into, bundle=bundle)
 
 
 @app.command(epilog="Example: sysid ui")

@@ -249,6 +249,8 @@ class AssemblyConfig(BaseModel):
         definitions: Anything, to be repeated by YAML's anchors; not read.
         members: The members.
         known: Members that are declared, not fitted; members may read them, and they the members.
+        begin: Bundle of a trained whole to go on from, seen from the folder of the YAML: its networks stand where the
+            members would be fitted, and ``together`` trains them on.
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
         limits: Limits of outputs; in its other places a member has those of its first, unless they have their own.
         retrain: Members to train again on what the others put out.
@@ -277,6 +279,7 @@ class AssemblyConfig(BaseModel):
     definitions: dict[str, Any] = Field(default_factory=dict)
     members: tuple[MemberConfig, ...] = Field(min_length=1)
     known: tuple[KnownConfig, ...] = ()
+    begin: str | None = None
     rest: dict[str, float | str] = Field(default_factory=dict)
     limits: dict[str, LimitConfig] = Field(default_factory=dict)
     retrain: RetrainConfig | None = None
@@ -317,6 +320,25 @@ class AssemblyConfig(BaseModel):
                 expected="line, or committee",
                 got=f"line, and committee: {self.committee}",
                 remedy="leave committee out: the best start is taken",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_begin(self) -> AssemblyConfig:
+        if self.begin is None:
+            return self
+        fitted = {
+            "candidates": any(member.candidates > 1 for member in self.members),
+            "retrain": self.retrain is not None,
+            "grow": self.grow is not None,
+            "starts": self.starts > 1,
+        }
+        if asked := [name for name, yes in fitted.items() if yes]:
+            raise FieldError(
+                f"a whole that is begun from another one has {', '.join(asked)}",
+                expected="begin and together: there is one beginning, and no fit of a member alone",
+                got=f"begin: {self.begin}, and {', '.join(asked)}",
+                remedy=f"leave out {', '.join(asked)}, or begin",
             )
         return self
 

@@ -15,6 +15,7 @@ from sysid.estimation.result import Status
 from sysid.models import Cascade, NARXModel
 from sysid.traces import Role, Trace
 from sysid.workbench import events
+from sysid.workbench.assembly.begun import begun, read_whole
 from sysid.workbench.assembly.config import MemberConfig
 from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
@@ -32,6 +33,7 @@ from sysid.workbench.assembly.stages import (
 from sysid.workbench.record import is_final
 from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
 
+BEGUN = "as it was begun from"
 ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
 GROWN, TOGETHER = "grown", "trained end to end"
 
@@ -57,10 +59,16 @@ class Course:
     def run(self) -> None:
         """Go through all stages."""
         estimation, selection = self.material.estimation, self.material.selection
+        if self.context.config.begin is not None:
+            given, said = read_whole(self.context.beside / self.context.config.begin)
+            self.notes.append(said)
+            self.stages[BEGUN] = begun(self.context.config, given, estimation[0])
+            self._together(self.stages[BEGUN], estimation, selection)
+            return
         models, key = self._members(estimation, selection)
         models, key = self._retrained(models, key, estimation, selection)
         models, key, added = self._grown(models, key, estimation, selection)
-        self._together(models, (*estimation, *added), selection)
+        self._together(assembled(self.context.config, models), (*estimation, *added), selection)
 
     def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
         """Every member's candidates; the best of each alone, and those that are best together."""
@@ -211,10 +219,10 @@ class Course:
         self.stages[GROWN] = assembled(self.context.config, grown.models)
         return grown.models, grown.key, tuple(trace for trace in sources if trace.name in grown.added)
 
-    def _together(self, models: Members, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
+    def _together(self, whole: Cascade, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
         """Every round of training end to end, each from where the one before ended."""
         also = self.material.also
-        asked, whole = self.context.config.together, assembled(self.context.config, models)
+        asked = self.context.config.together
         rounds = asked.rounds if asked else ()
         for number, one in enumerate(rounds, start=1):
             suffix = "" if number == 1 else f", round {number}"

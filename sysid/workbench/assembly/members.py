@@ -90,17 +90,28 @@ def assembled(config: AssemblyConfig, models: Members, *, without: str | None = 
     Raises:
         ConfigError: If they cannot be wired.
     """
-    wired = [
-        placed(member, models[member.mapping.output], place)
-        for member in config.standing
-        if member.mapping.output != without
-        for place in member.places
-    ]
-    outputs = {model.mapping.output for model in wired}
-    read = {name for model in wired for name in model.mapping.inputs}
+    standing = (member for member in config.standing if member.mapping.output != without)
+    return wired(config, [placed(one, models[one.mapping.output], place) for one in standing for place in one.places])
+
+
+def wired(config: AssemblyConfig, models: Sequence[NARXModel]) -> Cascade:
+    """Models in their places as one, at rest and between limits as declared.
+
+    Args:
+        config: The pipeline.
+        models: Over the channels of their places.
+
+    Returns:
+        The cascade.
+
+    Raises:
+        ConfigError: If they cannot be wired.
+    """
+    outputs = {model.mapping.output for model in models}
+    read = {name for model in models for name in model.mapping.inputs}
     rest = {name: level for name, level in config.rest.items() if name in outputs | read}
     limits = {name: limit for name, limit in limits_of(config).items() if name in outputs}
-    return Cascade(models=tuple(wired), rest=rest, limits=limits | bounds_of(config.known))
+    return Cascade(models=tuple(models), rest=rest, limits=limits | bounds_of(config.known))
 
 
 def limits_of(config: AssemblyConfig) -> dict[str, Limit]:

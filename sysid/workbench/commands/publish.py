@@ -7,17 +7,18 @@ from pathlib import Path
 from sysid.workbench.audience import console
 
 
-def publish_command(run_folder: Path, *, name: str | None, into: Path) -> None:
+def publish_command(run_folder: Path, *, name: str | None, into: Path, bundle: bool) -> None:
     """Publish a run.
 
     Args:
         run_folder: The run folder.
         name: Name of the report; the pipeline's by default.
         into: Folder of the published reports.
+        bundle: Whether the frozen surrogate goes with it.
 
     Raises:
-        ConfigError: If the folder holds no results.
+        UserError: If the folder holds no results, or no whole bundle that was asked for.
     """
     from sysid.reporting import publish_run
 
-    console().print(f"Published: {publish_run(run_folder, into, name=name)}", soft_wrap=True)
+    console().print(f"Published: {publish_run(run_folder, into, name=name, bundle=bundle)}", soft_wrap=True)

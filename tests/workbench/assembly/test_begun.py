@@ -1,0 +1,130 @@
+"""A whole that goes on from a trained one: its networks as they stand, under what is declared now."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from sysid.errors import BundleError, ConfigError
+from sysid.export import export_bundle
+from sysid.ingest import load_dataset
+from sysid.reporting import publish_run
+from sysid.reporting.judgement_report import read_judgement_results
+from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.kinds import RunRequest
+from sysid.workbench.record import read_fit
+from tests.workbench.assembly.conftest import PIPELINE
+
+QUICK = PIPELINE.replace("candidates: 2", "candidates: 1").replace(
+    "retrain: {members: [lower], max_iterations: 5}\n", ""
+)
+FIRST = QUICK.replace("export: null", "export: {formats: [c]}")
+KNOWN = "known: [{mapping: upper -> LH, gains: {upper: 0.9}, low: 0, high: 100, rest: 0}]\n"
+SECOND = QUICK.replace("name: tanks\n", "name: further\nbegin: ../runs/tanks/bundle\n", 1)
+
+
+def run(workspace: Path, name: str, text: str) -> Path:
+    file = workspace / "pipelines" / f"{name}.yaml"
+    file.write_text(text, encoding="utf-8")
+    assert run_assembly(RunRequest(path=file, typed=name, tracking=False)) == 0
+    return workspace / "runs" / name
+
+
+@pytest.fixture
+def trained(workspace: Path) -> Path:
+    """The run folder of the first whole."""
+    return run(workspace, "tanks", FIRST)
+
+
+def test_its_networks_stand_where_members_would_be_fitted(workspace: Path, trained: Path) -> None:
+    folder = run(workspace, "further", SECOND)
+    results = read_judgement_results(folder)
+    assert results is not None
+    assert [subject.name for subject in results.subjects] == ["as it was begun from", "trained end to end"]
+    assert not list(folder.rglob("fit.json"))
+    before, after = read_judgement_results(trained), results.judgement.tables[0]
+    assert before is not None
+    chosen = next(row for row in before.judgement.tables[0].rows if str(row[0]).endswith("(chosen)"))
+    assert after.rows[0][1:] == chosen[1:]
+    assert any(
+        "Begun from the networks of bundle (sysid run tanks; digest " in one for one in results.judgement.sentences
+    )
+
+
+def test_its_rounds_are_found_again_until_it_begins_from_another_whole(workspace: Path, trained: Path) -> None:
+    file = run(workspace, "further", SECOND) / "together.json"
+    stamp = file.stat().st_mtime_ns
+    run(workspace, "further", SECOND)
+    assert file.stat().st_mtime_ns == stamp
+    run(workspace, "tanks", FIRST.replace("max_iterations: 4", "max_iterations: 2"))
+    run(workspace, "further", SECOND)
+    assert file.stat().st_mtime_ns != stamp
+
+
+def test_what_is_declared_is_the_new_pipelines(workspace: Path, trained: Path) -> None:
+    held = SECOND.replace("  lower: {low: 0}", "  lower: {low: 0, high: LH}")
+    folder = run(workspace, "further", held.replace("together:", f"{KNOWN}together:"))
+    whole = read_assembly(folder)
+    assert "LH" in whole.outputs
+    assert whole.limits["lower"].high == "LH"
+    assert read_assembly(trained).limits["lower"].high is None
+
+
+def test_a_round_may_have_closed_a_circle_before(workspace: Path) -> None:
+    chain = FIRST.replace("mapping: pump+lower -> upper", "mapping: pump -> upper").replace(
+        "input_delays: [[0, 1], [1]]", "input_delays: [0, 1]"
+    )
+    closed = chain.replace("stride: 2, looks: 2}\n", "stride: 2, looks: 2}\n  again: [{reads: {upper: {lower: 1}}}]\n")
+    given = read_assembly(run(workspace, "tanks", closed))
+    folder = run(
+        workspace, "further", chain.replace("name: tanks\n", "name: further\nbegin: ../runs/tanks/bundle\n", 1)
+    )
+    assert str(read_assembly(folder).member("upper").mapping) == str(given.member("upper").mapping)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("neurons: 3}\n    rest: 0\ntogether", "neurons: 4}\n    rest: 0\ntogether", "has no such"),
+        ("neurons: 3}", "neurons: 3, gated: true}", "has no such upper"),
+        ("seed: 3", "seed: 3\nstarts: 2", "begun from another one has starts"),
+        ("together:", "retrain: {members: [lower]}\ntogether:", "begun from another one has retrain"),
+    ],
+)
+def test_what_it_lacks_is_said(workspace: Path, trained: Path, old: str, new: str, complaint: str) -> None:
+    text = SECOND.replace("    training: *short\ntogether", "together")
+    assert old in text
+    with pytest.raises(ConfigError, match=complaint):
+        run(workspace, "further", text.replace(old, new))
+
+
+def test_a_damaged_bundle_is_refused(workspace: Path, trained: Path) -> None:
+    file = trained / "bundle" / "model.json"
+    file.write_text(file.read_text(encoding="utf-8").replace("0.1", "0.2"), encoding="utf-8")
+    with pytest.raises(BundleError):
+        run(workspace, "further", SECOND)
+
+
+def test_a_bundle_of_one_model_is_no_whole(workspace: Path, trained: Path) -> None:
+    fit = read_fit(trained / "fits" / "upper-lower-0")
+    shutil.rmtree(trained / "bundle")
+    export_bundle(fit, load_dataset("tanks"), trained / "bundle", formats=["c"], tolerance=1e-6)
+    with pytest.raises(ConfigError, match="no whole to begin from"):
+        run(workspace, "further", SECOND)
+
+
+def test_a_published_bundle_is_begun_from_as_well(workspace: Path, trained: Path) -> None:
+    page = publish_run(trained, workspace / "reports", bundle=True)
+    assert "[bundle](bundle)" in page.read_text(encoding="utf-8")
+    shutil.rmtree(trained)
+    published = SECOND.replace("../runs/tanks/bundle", "../reports/tanks/bundle")
+    assert read_judgement_results(run(workspace, "further", published)) is not None
+
+
+def test_a_bundle_that_is_not_there_is_not_published(workspace: Path) -> None:
+    folder = run(workspace, "tanks", QUICK)
+    with pytest.raises(ConfigError, match="no bundle to publish"):
+        publish_run(folder, workspace / "reports", bundle=True)
+    assert not (workspace / "reports").exists()
