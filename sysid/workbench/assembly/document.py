@@ -14,12 +14,14 @@ from sysid.reporting.thinning import thin
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.growth import Growth
+from sysid.workbench.assembly.limit_check import LimitCheck
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.stress import Stress
 from sysid.workbench.assembly.views import (
     export_table,
     growth_chart,
     growth_table,
+    limits_table,
     line_chart,
     line_metrics,
     line_point,
@@ -53,6 +55,7 @@ class Outcome:
         notes: Sentences on how it came about.
         timing: Seconds of a free run of the whole by case.
         cases: The cases.
+        limits: What is declared of limits, beside what was trained on.
         stressed: What came of the random sequences.
         worst: The sequences that the whole did worst on, for their charts.
         growth: What growing the training data brought, if it was asked for.
@@ -67,6 +70,7 @@ class Outcome:
     notes: Sequence[str]
     timing: Mapping[str, float]
     cases: Sequence[Trace]
+    limits: LimitCheck
     stressed: Stress | None
     worst: Sequence[Trace] = ()
     growth: Sequence[Growth] = ()
@@ -92,6 +96,8 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
         tables += stress_tables(found.stressed)
     tables += [growth_table(one) for one in found.growth]
     tables.append(_time_table(found.timing, found.cases))
+    if found.limits.passed:
+        tables.append(limits_table(found.limits))
     if found.exported is not None:
         tables.append(export_table(found.exported))
     return {
@@ -103,6 +109,7 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
             f"{', '.join(whole.inputs)} and nothing else.",
             f"The stage was chosen by the error of the whole on the selection traces "
             f"({found.selection[found.chosen]:.3g}, a geometric mean over traces and outputs).",
+            *([found.limits.sentence] if found.limits.sentence else []),
             *found.notes,
         ],
         "tables": tables,

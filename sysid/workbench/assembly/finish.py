@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +22,7 @@ from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.document import SELECTION, Outcome, document
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
+from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.members import whole_score, written
 from sysid.workbench.assembly.starts import Trained
 from sysid.workbench.assembly.stress import Stress, stress
@@ -48,12 +48,12 @@ class Finish:
     context: Context
     trained: Trained
 
-    def results(self, cases: TraceSet, selection: Sequence[Trace]) -> JudgementResults:
+    def results(self, cases: TraceSet, material: Material) -> JudgementResults:
         """Score every stage, choose one, and prove and export it.
 
         Args:
             cases: The cases that are scored.
-            selection: Traces that choose.
+            material: What was trained on, and chooses.
 
         Returns:
             What is reported, as it is stored.
@@ -66,7 +66,7 @@ class Finish:
             evaluation = evaluate_cascade(cascade.upstream_of(config.wanted), cases, outputs=config.outputs)
             scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
             timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
-            chosen_by[stage] = whole_score(cascade, selection, outputs)
+            chosen_by[stage] = whole_score(cascade, material.choosing, outputs)
         chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
         whole = self.trained.stages[chosen].upstream_of(config.wanted)
         write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
@@ -78,7 +78,7 @@ class Finish:
             Outcome(
                 whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.trained.notes,
                 timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst, line=line,
-                growth=self.trained.growth, exported=exported,
+                growth=self.trained.growth, exported=exported, limits=material.limits,
             ),
         )  # fmt: skip
         results = JudgementResults(

@@ -41,23 +41,54 @@ class Passed:
     trace: str
     unit: str
 
-    def __str__(self) -> str:
+
+@dataclass(frozen=True, kw_only=True)
+class LimitCheck:
+    """Every limit that is a channel, beside measured traces.
+
+    Args:
+        limits: By how much each is passed.
+        traces: How many traces were looked at.
+    """
+
+    limits: tuple[Passed, ...]
+    traces: int
+
+    @property
+    def passed(self) -> list[Passed]:
+        """Those that some trace passes, the furthest first."""
+        return sorted((one for one in self.limits if one.most > 0.0), key=lambda one: -one.summed)
+
+    @property
+    def sentence(self) -> str | None:
+        """How many are passed, and which the furthest; ``None`` where no limit is a channel."""
+        if not self.limits:
+            return None
+        if not (passed := self.passed):
+            return f"No training trace ({self.traces}) passes a limit that is a channel ({len(self.limits)})."
+        worst = passed[0]
         return (
-            f"{self.limit} by at most {self.most:.2g} {self.unit} in a sample and {self.summed:.2g} {self.unit} summed "
-            f"over a trace ({self.trace})"
+            f"Training traces ({self.traces}) pass {len(passed)} of {len(self.limits)} limits that are channels, "
+            f"{worst.limit} the furthest: {worst.output} would be held back by {worst.summed:.2g} {worst.unit} over "
+            f"{worst.trace}."
         )
 
 
-def limits_passed(config: AssemblyConfig, traces: Sequence[Trace]) -> list[Passed]:
-    """Measured traces beside the limits that are channels.
+def check_limits(config: AssemblyConfig, traces: Sequence[Trace]) -> LimitCheck:
+    """Hold measured traces against what is declared of their limits.
 
     Args:
         config: The pipeline.
         traces: Measured traces, with what the known members say; at least one.
 
     Returns:
-        For each such limit by how much it is passed, rounding and the first sample apart (nothing is known before it).
+        What came of it.
     """
+    return LimitCheck(limits=tuple(_limits_passed(config, traces)), traces=len(traces))
+
+
+def _limits_passed(config: AssemblyConfig, traces: Sequence[Trace]) -> list[Passed]:
+    """How far each limit that is a channel is passed; not in the first sample, before which nothing is known."""
     found = []
     for output, limit in limits_of(config).items():
         for sign, channel in ((-1.0, limit.low), (1.0, limit.high)):
@@ -83,23 +114,3 @@ def _excess(trace: Trace, over: NDArray[np.float64], output: str) -> NDArray[np.
     """How far a trace is over a limit, sample by sample."""
     rounding = ROUNDING * float(np.max(np.abs(trace[output]), initial=0.0))
     return np.where(over > rounding, over, 0.0)[1:][trace.usable_samples[1:]]
-
-
-def limit_note(config: AssemblyConfig, traces: Sequence[Trace]) -> str | None:
-    """The same as a sentence for the report.
-
-    Args:
-        config: The pipeline.
-        traces: Measured traces, with what the known members say; at least one.
-
-    Returns:
-        It names the limits that are passed; ``None`` where no limit is a channel.
-    """
-    found = limits_passed(config, traces)
-    if not found:
-        return None
-    passed = sorted((one for one in found if one.most > 0.0), key=lambda one: -one.summed)
-    if not passed:
-        return f"No training trace ({len(traces)}) passes a limit that is a channel ({len(found)})."
-    listed = "; ".join(str(one) for one in passed)
-    return f"Training traces ({len(traces)}) pass {len(passed)} of {len(found)} limits that are channels: {listed}."

@@ -10,7 +10,7 @@ from sysid.errors import ConfigError
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.known import with_known
-from sysid.workbench.assembly.limit_check import limit_note
+from sysid.workbench.assembly.limit_check import LimitCheck, check_limits
 from sysid.workbench.assembly.members import dealt
 from sysid.workbench.assembly.rehearsal import rehearse
 
@@ -23,13 +23,13 @@ class Material:
         estimation: Traces to fit.
         selection: Traces that choose.
         also: Of each data set that some rounds have beside the others, its traces to fit and those that choose.
-        notes: Sentences on them.
+        limits: What is declared of limits, beside all that is fitted.
     """
 
     estimation: tuple[Trace, ...]
     selection: tuple[Trace, ...]
     also: Mapping[str, tuple[list[Trace], list[Trace]]]
-    notes: tuple[str, ...]
+    limits: LimitCheck
 
     @classmethod
     def of(cls, context: Context) -> Material:
@@ -56,8 +56,8 @@ class Material:
         estimation, selection = with_known(config.known, estimation), with_known(config.known, selection)
         also = {name: _beside(context, name) for name in (config.together.data if config.together else ())}
         rehearse(config, estimation[0])
-        said = limit_note(config, [*estimation, *chain.from_iterable(one for one, _ in also.values())])
-        return cls(estimation=tuple(estimation), selection=tuple(selection), also=also, notes=(said,) if said else ())
+        limits = check_limits(config, [*estimation, *chain.from_iterable(one for one, _ in also.values())])
+        return cls(estimation=tuple(estimation), selection=tuple(selection), also=also, limits=limits)
 
     @property
     def choosing(self) -> tuple[Trace, ...]:

@@ -81,7 +81,7 @@ def _run(context: Context) -> tuple[JudgementResults, Path]:
     write_json(context.store.path / "environment.json", environment())
     cases, material = context.load(context.config.data), Material.of(context)
     finish = Finish(context=context, trained=train(context, material))
-    results = finish.results(cases, material.choosing)
+    results = finish.results(cases, material)
     page = finish.report()
     finish.track(results, page)
     return results, page

@@ -59,7 +59,7 @@ def train(context: Context, material: Material) -> Trained:
         courses[-1].run()
     if len(courses) == 1:
         (only,) = courses
-        return Trained(stages=only.stages, notes=(*material.notes, *only.notes), growth=tuple(only.growth))
+        return Trained(stages=only.stages, notes=tuple(only.notes), growth=tuple(only.growth))
     return _the_best_of(courses, context, material)
 
 
@@ -89,7 +89,7 @@ def _the_best_of(courses: Sequence[Course], context: Context, material: Material
     notes += [
         f"Start {index + 1}, {note[:1].lower()}{note[1:]}" for index in sorted(chosen) for note in courses[index].notes
     ]
-    return Trained(stages=stages, notes=(*material.notes, *notes), growth=tuple(courses[chosen[0]].growth))
+    return Trained(stages=stages, notes=tuple(notes), growth=tuple(courses[chosen[0]].growth))
 
 
 def committee(wholes: Sequence[Runs], traces: Sequence[Trace], outputs: Sequence[str], most: int) -> list[int]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sysid.reporting.numbers import number, seconds
 from sysid.workbench.assembly.growth import Growth
+from sysid.workbench.assembly.limit_check import LimitCheck
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.stress import Stress
 
@@ -65,6 +66,24 @@ def export_table(bundle: Bundle) -> dict[str, Any]:
         "caption": f"Exported to {bundle.folder.name}/: each file against the whole, on every case and on random input",
         "head": [["", ""], ["Largest difference", ", ".join(units)], ["Tolerance", ", ".join(units)]],
         "rows": [[f"{one.name} ({one.format})", one.largest_difference, one.tolerance] for one in bundle.files],
+    }
+
+
+def limits_table(found: LimitCheck) -> dict[str, Any]:
+    """The limits that measured traces pass, and by how much.
+
+    Args:
+        found: What came of holding them beside each other.
+
+    Returns:
+        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+    """
+    return {
+        "caption": "Limits that training traces pass",
+        "head": [["Limit", ""], ["Holds", ""], ["In a sample", "at most"], ["Over a trace", "sum"], ["Trace", ""]],
+        "rows": [[one.limit, f"{one.output} ({one.unit})", one.most, one.summed, one.trace] for one in found.passed],
+        "note": "So far the output is held back from where it was measured. A limit that is passed by much is none of "
+        "the system's: correct what is declared.",
     }
 
 

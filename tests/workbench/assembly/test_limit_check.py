@@ -8,7 +8,8 @@ import pytest
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.known import with_known
-from sysid.workbench.assembly.limit_check import limit_note, limits_passed
+from sysid.workbench.assembly.limit_check import check_limits
+from sysid.workbench.assembly.views import limits_table
 
 NARX = {"kind": "NARX", "input_delays": [0], "output_delays": 1, "neurons": 2}
 
@@ -51,32 +52,37 @@ def seen(asked: AssemblyConfig, *levels: list[float], names: tuple[str, ...] = (
 def test_a_limit_that_the_traces_pass_is_named_with_how_far_and_where():
     asked = config({"low": 0, "high": "most"})
     traces = seen(asked, [0.0, 1.0, 1.5, 2.5], [0.0, 3.0, 3.0, 5.5], [0.0, 2.0, 1.0, 3.0])
-    (passed,) = limits_passed(asked, traces)
+    found = check_limits(asked, traces)
+    (passed,) = found.limits
     assert (passed.output, passed.limit, passed.trace) == ("level", "most", "t1")
     assert (passed.most, passed.summed) == pytest.approx((2.0, 3.5))
-    assert limit_note(asked, traces) == (
-        "Training traces (3) pass 1 of 1 limits that are channels: most by at most 2 cm in a sample and 3.5 cm summed "
-        "over a trace (t1)."
+    assert found.sentence == (
+        "Training traces (3) pass 1 of 1 limits that are channels, most the furthest: level would be held back by "
+        "3.5 cm over t1."
     )
+    assert limits_table(found)["rows"] == [["most", "level (cm)", passed.most, passed.summed, "t1"]]
 
 
 def test_a_limit_from_below_is_passed_downwards():
     asked = config({"low": "most", "high": 100})
-    (passed,) = limits_passed(asked, seen(asked, [1.0, 2.0, 2.5, 3.5]))
+    (passed,) = check_limits(asked, seen(asked, [1.0, 2.0, 2.5, 3.5])).limits
     assert (passed.most, passed.summed) == pytest.approx((0.5, 0.5))
 
 
 def test_limits_that_hold_are_counted():
     asked = config({"low": 0, "high": "most"})
-    assert (
-        limit_note(asked, seen(asked, [0.0, 1.0, 2.0])) == "No training trace (1) passes a limit that is a channel (1)."
-    )
+    found = check_limits(asked, seen(asked, [0.0, 1.0, 2.0]))
+    assert found.sentence == "No training trace (1) passes a limit that is a channel (1)."
+    assert found.passed == []
 
 
 def test_each_place_has_its_own():
     asked = config({"low": 0, "high": "most"}, places=("", "9"))
     traces = seen(asked, [0.0, 1.0, 3.0], names=("level", "level9"))
-    assert [(one.output, one.limit) for one in limits_passed(asked, traces)] == [("level", "most"), ("level9", "most9")]
+    assert [(one.output, one.limit) for one in check_limits(asked, traces).limits] == [
+        ("level", "most"),
+        ("level9", "most9"),
+    ]
 
 
 def test_what_was_not_measured_is_not_counted():
@@ -85,10 +91,10 @@ def test_what_was_not_measured_is_not_counted():
     masked = Trace(
         name="t", sample_time=1.0, channels=trace.channels, values=trace.values, usable=np.array([True, False, True])
     )
-    (passed,) = limits_passed(asked, [masked])
+    (passed,) = check_limits(asked, [masked]).limits
     assert passed.summed == 0.0
 
 
 def test_numbers_are_no_matter_of_the_traces():
     asked = config({"low": 0, "high": 1})
-    assert limit_note(asked, seen(asked, [0.0, 5.0])) is None
+    assert check_limits(asked, seen(asked, [0.0, 5.0])).sentence is None
