@@ -4,6 +4,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 # One BLAS thread per process: two processes with default threads were measured ten times slower.
 export OMP_NUM_THREADS = 1
+# A file of tests stays in one process, with what it prepares for all of its tests; each process takes a gigabyte.
+SIDE_BY_SIDE := --numprocesses=auto --maxprocesses=4 --dist=loadfile
 export MLFLOW_DISABLE_TELEMETRY = true
 
 .PHONY: run test check lint types setup bench docs clean
@@ -20,7 +22,7 @@ run: setup  ## the main job: traces, fits, export, report
 	$(BIN)/sysid run service-brake
 
 test: setup lint types  ## everything that CI runs
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
 
 lint: setup
 	$(BIN)/ruff format --check .
