@@ -34,8 +34,11 @@ class TableRecord(_Record):
 
     caption: str
     head: list[tuple[str, str]] = Field(description="Names of the columns, each with a second line, such as its unit.")
-    rows: list[list[float | str | None]] = Field(description="Numbers, words, or null for what there is not.")
+    rows: list[list[int | float | str | None]] = Field(
+        description="Counts, numbers, words, or null for what there is not."
+    )
     note: str = ""
+    folded: list[str] = Field(default=[], description="Sentences for whoever asks further; folded away below it.")
 
 
 class LineRecord(_Record):
@@ -154,12 +157,15 @@ def _section(record: JudgementRecord, index: int) -> Section:
 
 def _table(table: TableRecord) -> Table:
     rows = tuple(tuple(_cell(value, first=k == 0) for k, value in enumerate(row)) for row in table.rows)
-    return Table(caption=table.caption, head=tuple(table.head), rows=rows, note=table.note)
+    head, folded = tuple(table.head), tuple(table.folded)
+    return Table(caption=table.caption, head=head, rows=rows, note=table.note, folded=folded)
 
 
 def _cell(value: float | str | None, *, first: bool) -> Cell:
     if value is None:
         return Cell(text="")
+    if isinstance(value, int):  # a count has no significant digits
+        return Cell(text=str(value), value=value, mark="number")
     return Cell(text=value, header=first) if isinstance(value, str) else figure_cell(value)
 
 

@@ -66,7 +66,7 @@ def section_lines(section: Section, drawings: Drawings) -> list[str]:
 
 
 def table_lines(table: Table) -> list[str]:
-    """A table with its caption above and its note below.
+    """A table with its caption above, and its note and what is folded away below.
 
     Args:
         table: The table.
@@ -77,7 +77,8 @@ def table_lines(table: Table) -> list[str]:
     head = [escape(" ".join(filter(None, (name, f"({below})" if below else "")))) for name, below in table.head]
     rows = [[_cell(cell) for cell in row] for row in table.rows]
     lines = [arrow(table.caption), "", *rows_lines([head, ["---"] * len(head), *rows])]
-    return [*lines, "", f"*{arrow(table.note)}*"] if table.note else lines
+    lines += ["", f"*{arrow(table.note)}*"] if table.note else []
+    return [*lines, "", *_folded(table.folded)] if table.folded else lines
 
 
 def rows_lines(rows: Iterable[Sequence[str]]) -> list[str]:
@@ -143,6 +144,12 @@ def _part(part: Part, drawings: Drawings) -> list[str]:
     if isinstance(part, Table):
         return [] if part.caption.startswith("Notes of the fits") else [*table_lines(part), ""]
     return drawings.draw(part) if isinstance(part, Picture) else [arrow(part), ""]
+
+
+def _folded(sentences: Sequence[str]) -> list[str]:
+    """Sentences that open when they are asked for; the empty lines keep them Markdown."""
+    inside = [line for sentence in sentences for line in ("", arrow(sentence))]
+    return ["<details><summary>In words</summary>", *inside, "", "</details>"]
 
 
 def _name(part: Picture) -> str:

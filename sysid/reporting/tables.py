@@ -45,12 +45,14 @@ class Table:
         head: Names of the columns, each with a second line (may be empty).
         rows: The rows.
         note: A sentence below it.
+        folded: Sentences that are folded away below that.
     """
 
     caption: str
     head: tuple[tuple[str, str], ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+    folded: tuple[str, ...] = ()
 
 
 def figure_cell(

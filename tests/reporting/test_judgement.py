@@ -10,7 +10,14 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.reporting.judgement import FOLDER, judgement_sections, parse_judgement, read_judgements
-from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.judgement_report import (
+    JudgementResults,
+    SceneRecord,
+    read_judgement_results,
+    write_judgement_report,
+)
+from sysid.reporting.markdown import table_lines
+from sysid.reporting.numbers import number
 from sysid.reporting.parts import Picture
 from sysid.reporting.tables import Table
 
@@ -50,6 +57,32 @@ def test_a_section_begins_with_what_matters() -> None:
     assert table.rows[0][0].header
     assert table.rows[0][1].value == 1.25
     assert table.rows[1][1].text == ""
+
+
+def test_a_count_is_printed_as_it_is_and_a_number_in_three_digits() -> None:
+    said = SAID | {"tables": [SAID["tables"][0] | {"rows": [["level", 12345], ["hill", 12345.0]]}]}
+    (section,) = judgement_sections([parse_judgement(json.loads(json.dumps(said)), where="here")])
+    (table,) = (part for part in section.parts if isinstance(part, Table))
+    assert [row[1].text for row in table.rows] == ["12345", number(12345.0)]
+    assert [row[1].value for row in table.rows] == [12345, 12345.0]
+
+
+def test_what_stands_behind_a_table_is_folded_away_below_it(tmp_path: Path) -> None:
+    table = SAID["tables"][0] | {"note": "Scenes of the judge.", "folded": ["Level -> late.", "Hill <not run>."]}
+    record = parse_judgement(SAID | {"tables": [table], "charts": []}, where="here")
+    results = JudgementResults(
+        kind="stops", pipeline="stopping", command="sysid run stopping", created="", environment={},
+        data=SceneRecord(name="scenes"), subjects=[], judgement=record,
+    )  # fmt: skip
+    page = write_judgement_report(tmp_path, results).read_text(encoding="utf-8")
+    folded = page[page.index("Scenes of the judge.") :]
+    assert "<details" in folded
+    assert folded.index("<summary>") < folded.index("<p>Level → late.</p>") < folded.index("Hill &lt;not run&gt;.")
+    (section,) = judgement_sections([record])
+    lines = table_lines(next(part for part in section.parts if isinstance(part, Table)))
+    start = lines.index("<details><summary>In words</summary>")
+    assert lines[start - 2] == "*Scenes of the judge.*"
+    assert lines[start + 1 :] == ["", "Level → late.", "", "Hill &lt;not run>.", "", "</details>"]
 
 
 def test_two_judgements_have_names_of_their_own_in_the_page() -> None:

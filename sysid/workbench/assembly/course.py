@@ -23,6 +23,7 @@ from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.known import known_model, with_known
 from sysid.workbench.assembly.material import Material, lacks_a_role
 from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
+from sysid.workbench.assembly.rounds import RoundDone
 from sysid.workbench.assembly.stages import (
     choose_together,
     fit_member,
@@ -45,9 +46,10 @@ class Course:
     Args:
         context: The run.
         material: What it is trained on.
-        notes: Sentences on how it came about.
+        notes: Sentences on how it came about, but for the rounds of training end to end.
         stages: The whole after each stage.
         growth: What growing the training data brought, where it was asked for.
+        rounds: The rounds of training end to end.
     """
 
     context: Context
@@ -55,6 +57,7 @@ class Course:
     notes: list[str] = field(default_factory=list)
     stages: dict[str, Cascade] = field(default_factory=dict)
     growth: list[Growth] = field(default_factory=list)
+    rounds: list[RoundDone] = field(default_factory=list)
 
     def run(self) -> None:
         """Go through all stages."""
@@ -234,8 +237,11 @@ class Course:
             key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
             name = self.context.named("together" if number == 1 else f"together-{number}")
             fit = self._round(name, self.context.titled(f"Training end to end{suffix}"), key, ready)
-            said = (*fit.notes, fit.status.value) if fit.status is Status.UNSTABLE else fit.notes
-            self.notes.extend(said if len(rounds) == 1 else [f"Round {number}: {note}" for note in said])
+            start, own = self.context.start, f"round {number}"
+            called = own.capitalize() if self.context.config.starts == 1 else f"Start {start}, {own}"
+            self.rounds.append(RoundDone.of(self.context.config, one, ready, fit, called=called))
+            if fit.status is Status.UNSTABLE:  # a word in a table is not enough for this
+                self.notes.append(fit.status.value if len(rounds) == 1 else f"Round {number}: {fit.status.value}")
             self.stages[f"{TOGETHER}{suffix}"] = whole = fit.model
 
     def _round(self, name: str, step: str, key: str, ready: JointRound) -> CascadeFit:

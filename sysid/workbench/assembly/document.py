@@ -16,6 +16,7 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.limit_check import LimitCheck
 from sysid.workbench.assembly.line import LineScores
+from sysid.workbench.assembly.rounds import RoundDone, rounds_table
 from sysid.workbench.assembly.stress import Stress
 from sysid.workbench.assembly.views import (
     export_table,
@@ -52,7 +53,8 @@ class Outcome:
         stages: Scores by stage, in their order.
         selection: Score of each stage on the selection traces.
         chosen: The stage that was chosen.
-        notes: Sentences on how it came about.
+        notes: Sentences on how it came about, but for the rounds.
+        rounds: The rounds of training end to end, if there were any.
         timing: Seconds of a free run of the whole by case.
         cases: The cases.
         limits: What is declared of limits, beside what was trained on.
@@ -68,6 +70,7 @@ class Outcome:
     selection: Mapping[str, float]
     chosen: str
     notes: Sequence[str]
+    rounds: Sequence[RoundDone]
     timing: Mapping[str, float]
     cases: Sequence[Trace]
     limits: LimitCheck
@@ -89,17 +92,6 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
         JSON values.
     """
     whole = found.whole
-    tables = [_stage_table(config, name, found) for name in config.outputs]
-    if found.line is not None:
-        tables += [line_table(found.line, output) for output in found.line.mse]
-    if found.stressed is not None:
-        tables += stress_tables(found.stressed)
-    tables += [growth_table(one) for one in found.growth]
-    tables.append(_time_table(found.timing, found.cases))
-    if found.limits.passed:
-        tables.append(limits_table(found.limits))
-    if found.exported is not None:
-        tables.append(export_table(found.exported))
     return {
         "title": "The assembly",
         "headline": _headline(config, found),
@@ -112,7 +104,7 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
             *([found.limits.sentence] if found.limits.sentence else []),
             *found.notes,
         ],
-        "tables": tables,
+        "tables": _tables(config, found),
         "charts": [
             *(_chart(whole, trace, name) for name in config.outputs for trace in found.cases),
             *([] if found.line is None else [line_chart(found.line, name) for name in found.line.mse]),
@@ -127,6 +119,24 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
             for stage, scores in found.stages.items()
         },
     }
+
+
+def _tables(config: AssemblyConfig, found: Outcome) -> list[dict[str, Any]]:
+    """The stages first, then how they came about, and what else the whole was put to."""
+    tables = [_stage_table(config, name, found) for name in config.outputs]
+    if found.rounds:
+        tables.append(rounds_table(found.rounds))
+    if found.line is not None:
+        tables += [line_table(found.line, output) for output in found.line.mse]
+    if found.stressed is not None:
+        tables += stress_tables(found.stressed)
+    tables += [growth_table(one) for one in found.growth]
+    tables.append(_time_table(found.timing, found.cases))
+    if found.limits.passed:
+        tables.append(limits_table(found.limits))
+    if found.exported is not None:
+        tables.append(export_table(found.exported))
+    return tables
 
 
 def _squared(output: str, found: Outcome) -> str:

@@ -77,8 +77,8 @@ class Finish:
             config,
             Outcome(
                 whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.trained.notes,
-                timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst, line=line,
-                growth=self.trained.growth, exported=exported, limits=material.limits,
+                rounds=self.trained.rounds, timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst,
+                line=line, growth=self.trained.growth, exported=exported, limits=material.limits,
             ),
         )  # fmt: skip
         results = JudgementResults(

@@ -10,12 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from sysid.estimation import CascadeFit, JointTraining, fit_cascade
 from sysid.models import Cascade, Ends
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.everywhere import Everywhere
-from sysid.workbench.assembly.members import placed_outputs, seen_from
+from sysid.workbench.assembly.members import placed_outputs, seen_from, whole_score
 from sysid.workbench.assembly.stage_config import TogetherConfig
 from sysid.workbench.assembly.stages import Report
 
@@ -99,6 +101,21 @@ class JointRound:
             "estimation": [trace.digest for trace in self.estimation],
             "selection": [trace.digest for trace in self.selection],
         }
+
+    def error(self, whole: Cascade) -> float:
+        """The error by which a round's states are chosen.
+
+        Args:
+            whole: With this round's part in some state.
+
+        Returns:
+            Geometric mean over selection traces and targets of the mean squared error of the part's free run, each in
+            the error of its target that counts as one.
+        """
+        models = tuple(whole.member(Ends.of(model).outputs[0]) for model in self.part.models)
+        ones = np.array(list(self.targets.values()))
+        score = whole_score(replace(self.part, models=models), self.selection, list(self.targets))
+        return score / float(np.exp(np.mean(np.log(ones**2))))
 
     def fit(self, report: Report) -> CascadeFit:
         """Train it.

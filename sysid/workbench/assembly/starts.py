@@ -23,6 +23,7 @@ from sysid.workbench.assembly.course import Course
 from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.members import free_runs, score_of, whole_score
+from sysid.workbench.assembly.rounds import RoundDone
 
 Runs = Sequence[NDArray[np.float64]]
 """Free runs of a whole on some traces, an array of shape ``(n_samples, n_outputs)`` of each."""
@@ -34,13 +35,15 @@ class Trained:
 
     Args:
         stages: Wholes by what they are called: of one start its stages, of several each one's best, and their mean.
-        notes: Sentences on how they came about.
+        notes: Sentences on how they came about, but for the rounds of training end to end.
         growth: What growing the training data brought, where it was asked for.
+        rounds: The rounds of training end to end; of several starts those of the chosen ones.
     """
 
     stages: dict[str, Cascade]
     notes: tuple[str, ...]
     growth: tuple[Growth, ...]
+    rounds: tuple[RoundDone, ...]
 
 
 def train(context: Context, material: Material) -> Trained:
@@ -59,7 +62,9 @@ def train(context: Context, material: Material) -> Trained:
         courses[-1].run()
     if len(courses) == 1:
         (only,) = courses
-        return Trained(stages=only.stages, notes=tuple(only.notes), growth=tuple(only.growth))
+        return Trained(
+            stages=only.stages, notes=tuple(only.notes), growth=tuple(only.growth), rounds=tuple(only.rounds)
+        )
     return _the_best_of(courses, context, material)
 
 
@@ -89,7 +94,8 @@ def _the_best_of(courses: Sequence[Course], context: Context, material: Material
     notes += [
         f"Start {index + 1}, {note[:1].lower()}{note[1:]}" for index in sorted(chosen) for note in courses[index].notes
     ]
-    return Trained(stages=stages, notes=tuple(notes), growth=tuple(courses[chosen[0]].growth))
+    rounds = tuple(one for index in sorted(chosen) for one in courses[index].rounds)
+    return Trained(stages=stages, notes=tuple(notes), growth=tuple(courses[chosen[0]].growth), rounds=rounds)
 
 
 def committee(wholes: Sequence[Runs], traces: Sequence[Trace], outputs: Sequence[str], most: int) -> list[int]:

@@ -94,6 +94,23 @@ def test_what_it_depends_on_is_the_same_in_whichever_order_the_whole_has_its_mem
     assert all(one == terms[0] for one in terms)
 
 
+def test_its_error_is_that_by_which_it_chooses_among_its_states() -> None:
+    asked = {"targets": {"AR": 0.5, "BC": 2.0}, "measured": ["BP"], "training": {"max_iterations": 2, "looks": 1}}
+    ready = JointRound.of(
+        CONFIG,
+        TogetherConfig.model_validate(asked),
+        service(),
+        estimation=[record()],
+        selection=[record(), record(1)],
+    )
+    fit = ready.fit(lambda _: None)
+    start, end = ready.error(ready.whole), ready.error(fit.model)
+    assert end < start
+    chosen, others = fit.notes
+    assert chosen.endswith(f"on the selection traces {end:.4g}.")
+    assert f" {start:.4g} (0)" in others
+
+
 def test_members_that_are_named_are_the_ones_trained(monkeypatch: pytest.MonkeyPatch) -> None:
     whole, _, names = trained(monkeypatch, targets={"BC": 1.0}, members=["AR"])
     assert names == ["AR"]

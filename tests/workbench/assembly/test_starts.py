@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,9 @@ def test_every_start_is_trained_stored_and_shown_and_the_best_mean_is_taken(work
         assert any(f"Start {number} (seed {seed}) does best" in one for one in results.judgement.sentences)
     alone = any("alone" in one and "No mean of" in one for one in results.judgement.sentences)
     assert alone == all("mean" not in stage for stage in stages)
+    taken = sorted(re.findall(r"\d", stages[-1] if "mean" in stages[-1] else chosen))
+    rounds = next(one for one in results.judgement.tables if one.caption.startswith("Training end to end"))
+    assert [row[0] for row in rounds.rows] == [f"Start {number}, round 1" for number in taken]
     # What the table says is what the stored assembly does.
     pump = np.repeat(np.random.default_rng(3).uniform(0.0, 2.0, 15), 20)
     pump[:5] = 0.0
