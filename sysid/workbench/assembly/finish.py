@@ -95,7 +95,7 @@ class Finish:
                 others={name: found for name, found in self.context.digests.items() if name != cases.name},
             ),
             subjects=[
-                SubjectRecord(name=stage, parts=written(cascade)) for stage, cascade in self.trained.stages.items()
+                SubjectRecord(name=stage, parts=parts) for stage, parts in written(config, self.trained.stages).items()
             ],
             judgement=parse_judgement(strict(said), where="assembly"),
         )

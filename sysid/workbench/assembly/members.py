@@ -277,6 +277,39 @@ def whole_score(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str
     return score_of(free_runs(cascade, traces, outputs), traces, outputs)
 
 
-def written(cascade: Cascade) -> list[str]:
-    """Each member's mapping and structure, one sentence for members that differ in their place alone."""
-    return [f"{'+'.join(Ends.of(model).outputs)}: {model.structure.label}" for model in cascade.models]
+def written(config: AssemblyConfig, stages: Dict[str, Cascade]) -> dict[str, list[str]]:
+    """What the whole is made of, stage by stage: its networks, where they are others than in the stage before.
+
+    What is declared stands in the pipeline, and is the same in all stages: it is counted.
+
+    Args:
+        config: The pipeline.
+        stages: The whole after each stage.
+
+    Returns:
+        Of each stage its networks, each with what it reads and its structure, and how many other members there are.
+    """
+    found, before = {}, dict[str, str]()
+    for stage, whole in stages.items():
+        now = _members_written(config, whole)
+        if now.keys() != before.keys():
+            found[stage] = list(now.values())
+        else:
+            others = [said for name, said in now.items() if said != before[name]]
+            found[stage] = [*others, "the rest as before"] if others else ["all as before"]
+        before = now
+    return found
+
+
+def _members_written(config: AssemblyConfig, whole: Cascade) -> dict[str, str]:
+    """Each network by its output, and how many members are declared, or are what a mean of several starts is of."""
+    networks = {name for one in config.members for name in placed_outputs(one)}
+    declared = len({name for one in config.known for name in placed_outputs(one)} & set(whole.outputs))
+    found = {}
+    for model in whole.models:
+        name = Ends.of(model).outputs[0]
+        if name in networks:
+            found[name] = f"{model.mapping}: {model.structure.label}"
+    others = len(whole.models) - len(found) - declared
+    counts = {"that the pipeline declares": declared, "of the starts": others}
+    return found | {said: f"and {count} {said}" for said, count in counts.items() if count}

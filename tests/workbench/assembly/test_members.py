@@ -9,12 +9,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ConfigError
-from sysid.models import Mapping
+from sysid.models import Mapping, mean_of
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.known import known_model
-from sysid.workbench.assembly.members import assembled, in_place, own_traces, simulated_inputs, whole_score
-from sysid.workbench.assembly.stages import choose_together
+from sysid.workbench.assembly.members import assembled, in_place, own_traces, simulated_inputs, whole_score, written
+from sysid.workbench.assembly.stages import choose_together, reading_more
 from sysid.workbench.assembly.stress import stress
 from sysid.workbench.assembly.views import stress_tables
 from sysid.yaml_files import check, parse_yaml
@@ -71,6 +71,29 @@ def test_a_member_stands_in_all_its_places():
     assert (whole.limits["AR"].high, whole.limits["AR9"].high) == ("BP", "BP9")
     own = assembled(config(TWO_PLACES.replace("limits: {", "limits: {AR9: {low: 0, high: STP}, ")), models())
     assert (own.limits["AR9"].low, own.limits["AR9"].high) == (0, "STP")
+
+
+def test_a_stage_names_its_networks_where_they_are_others_than_before_and_counts_what_is_declared():
+    relay = "known: [{mapping: BP+AR -> RL, gains: {BP: 1, AR: -1}, low: 0, high: 1, rest: 0, places: ['', '9']}]\n"
+    asked = config(TWO_PLACES.replace("rest: {BP", f"{relay}rest: {{BP"))
+    alone = assembled(asked, {**models(), "RL": known_model(asked.known[0], trace())})
+    wider = reading_more(alone, {"AR": {"RL": (1,)}})
+    label = alone.member("AR").structure.label
+    said = written(asked, {"each alone": alone, "round 1": alone, "round 2": wider, "round 3": wider})
+    assert sorted(said["each alone"][:-1]) == sorted(
+        f"{one}: {label}" for one in ("STP -> BP", "STP -> BP9", "BP+STP -> AR", "BP9+STP -> AR9")
+    )
+    assert said["each alone"][-1] == "and 2 that the pipeline declares"
+    assert said["round 1"] == said["round 3"] == ["all as before"]
+    assert said["round 2"] == [f"BP+STP+RL -> AR: {wider.member('AR').structure.label}", "the rest as before"]
+
+
+def test_a_mean_of_starts_is_what_it_puts_out_and_what_that_is_of():
+    start = assembled(config(), models())
+    said = written(config(), {"start 1": start, "mean of starts 1, 2": mean_of([start, start], ["BP", "AR"])})
+    assert [one.split(":")[0] for one in said["mean of starts 1, 2"]] == [
+        "BP_1+BP_2 -> BP", "AR_1+AR_2 -> AR", "and 8 of the starts",
+    ]  # fmt: skip
 
 
 def test_a_limit_may_be_declared_from_what_it_limits_a_sample_ago():
