@@ -237,9 +237,8 @@ class Course:
             key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
             name = self.context.named("together" if number == 1 else f"together-{number}")
             fit = self._round(name, self.context.titled(f"Training end to end{suffix}"), key, ready)
-            start, own = self.context.start, f"round {number}"
-            called = own.capitalize() if self.context.config.starts == 1 else f"Start {start}, {own}"
-            self.rounds.append(RoundDone.of(self.context.config, one, ready, fit, called=called))
+            start = None if self.context.config.starts == 1 else self.context.start
+            self.rounds.append(RoundDone.of(self.context.config, one, ready, fit, number=number, start=start))
             if fit.status is Status.UNSTABLE:  # a word in a table is not enough for this
                 self.notes.append(fit.status.value if len(rounds) == 1 else f"Round {number}: {fit.status.value}")
             self.stages[f"{TOGETHER}{suffix}"] = whole = fit.model

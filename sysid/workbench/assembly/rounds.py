@@ -21,7 +21,8 @@ class RoundDone:
     """A round that was trained.
 
     Args:
-        called: What it is called: its number, and its start where there are several.
+        number: From 1 on.
+        start: Which of the pipeline's starts it belongs to; ``None`` of a single one.
         trained: Outputs of the members that it trained, each in its first place.
         everywhere: Whether it trained them in all of their places.
         measured: Outputs that were as measured.
@@ -31,7 +32,8 @@ class RoundDone:
         fit: What came of it.
     """
 
-    called: str
+    number: int
+    start: int | None
     trained: tuple[str, ...]
     everywhere: bool
     measured: tuple[str, ...]
@@ -42,7 +44,14 @@ class RoundDone:
 
     @classmethod
     def of(
-        cls, config: AssemblyConfig, asked: TogetherConfig, ready: JointRound, fit: CascadeFit, *, called: str
+        cls,
+        config: AssemblyConfig,
+        asked: TogetherConfig,
+        ready: JointRound,
+        fit: CascadeFit,
+        *,
+        number: int,
+        start: int | None,
     ) -> RoundDone:
         """Say what a round did.
 
@@ -51,13 +60,15 @@ class RoundDone:
             asked: The round.
             ready: What it trained, and on what.
             fit: What came of it.
-            called: What it is called.
+            number: Which round it is.
+            start: Which start it belongs to, of several.
 
         Returns:
             The round.
         """
         return cls(
-            called=called,
+            number=number,
+            start=start,
             trained=tuple(
                 one.mapping.output for one in config.members if not set(placed_outputs(one)).isdisjoint(ready.trained)
             ),
@@ -82,7 +93,8 @@ class RoundDone:
     @property
     def sentences(self) -> list[str]:
         """All that its fit says: which states were looked at, which was chosen, and how it ended."""
-        return [f"{self.called}: {said}" for said in (*self.fit.notes, self.fit.status.value)]
+        called = f"Round {self.number}" if self.start is None else f"Start {self.start}, round {self.number}"
+        return [f"{called}: {said}" for said in (*self.fit.notes, self.fit.status.value)]
 
 
 def rounds_table(rounds: Sequence[RoundDone]) -> dict[str, Any]:
@@ -97,13 +109,13 @@ def rounds_table(rounds: Sequence[RoundDone]) -> dict[str, Any]:
     return {
         "caption": "Training end to end, round by round",
         "head": [
-            ["", ""], ["Trained", "members"], ["As measured", ""], ["Traces", ""], ["Iterations", ""],
+            ["Round", ""], ["Trained", "members"], ["As measured", ""], ["Traces", ""], ["Iterations", ""],
             ["Time", "s"], ["Residual", "mean squared"], ["Selection", "at the start"], ["Selection", "as chosen"],
             ["Ended", ""],
         ],
         "rows": [
             [
-                one.called,
+                str(one.number) if one.start is None else f"{one.number} of start {one.start}",
                 f"{_few(one.trained)}{', everywhere' if one.everywhere else ''}",
                 _few(one.measured),
                 one.traces, one.iterations, one.fit.train_time_s, one.loss, one.before, one.after,
@@ -111,9 +123,10 @@ def rounds_table(rounds: Sequence[RoundDone]) -> dict[str, Any]:
             ]
             for one in rounds
         ],
-        "note": "Iterations and residual are those of the state that was chosen, the time is the whole round's. The "
-        "residual and the errors on the selection traces (geometric mean over traces and targets) are squared, in the "
-        "errors that the round counts as one. Targets and traces are a round's own: compare within a row.",
+        "note": "Iterations and residual are those of the state that was chosen (no residual where that is the start); "
+        "the time is the whole round's. The residual and the errors on the selection traces (geometric mean over "
+        "traces and targets) are squared, in the errors that the round counts as one. Targets and traces are a round's "
+        "own: compare within a row.",
         "folded": [said for one in rounds for said in one.sentences],
     }  # fmt: skip
 

@@ -34,7 +34,7 @@ def test_a_row_says_what_a_round_trained_and_what_it_brought(workspace: Path) ->
     found = read_judgement_results(folder)
     assert found is not None
     table = next(one for one in found.judgement.tables if one.caption.startswith("Training end to end"))
-    assert [row[:4] for row in table.rows] == [["Round 1", "upper", "lower", 2], ["Round 2", "upper, lower", "", 1]]
+    assert [row[:4] for row in table.rows] == [["1", "upper", "lower", 2], ["2", "upper, lower", "", 1]]
 
     names = ("together.json", "together-2.json")
     fits = [CascadeFit.from_dict(json.loads((folder / one).read_text(encoding="utf-8"))) for one in names]
@@ -65,8 +65,8 @@ def done(**changes: object) -> RoundDone:
         history={"iteration": np.array([0.0, 1.0, 2.0]), "loss": np.array([4.0, 2.0, 1.0])},
         train_time_s=3.0,
     )
-    own = {"called": "Round 1", "trained": ("BC",), "everywhere": False, "measured": (), "traces": 5, "fit": fit}
-    return RoundDone(**{"before": 2.0, "after": 0.5, **own, **changes})
+    own = {"number": 1, "start": None, "trained": ("BC",), "everywhere": False, "measured": (), "traces": 5}
+    return RoundDone(**{"before": 2.0, "after": 0.5, "fit": fit, **own, **changes})
 
 
 def test_a_round_that_brought_nothing_has_no_curve_and_no_residual() -> None:
@@ -78,11 +78,14 @@ def test_a_round_that_brought_nothing_has_no_curve_and_no_residual() -> None:
 @pytest.mark.parametrize(
     ("changes", "column", "said"),
     [
+        ({"number": 3, "start": 2}, 0, "3 of start 2"),
         ({"trained": ("AR", "BC"), "everywhere": True}, 1, "AR, BC, everywhere"),
         ({"measured": ("BP", "AR", "ER")}, 2, "BP, AR, ER"),
         ({"measured": ("BP", "AR", "ER", "VO")}, 2, "4 outputs"),
     ],
 )
-def test_a_cell_names_a_few_outputs_and_counts_many(changes: dict[str, object], column: int, said: str) -> None:
+def test_a_cell_says_which_start_it_was_names_a_few_outputs_and_counts_many(
+    changes: dict[str, object], column: int, said: str
+) -> None:
     (row,) = rounds_table([done(**changes)])["rows"]
     assert row[column] == said

@@ -96,7 +96,8 @@ def test_every_start_is_trained_stored_and_shown_and_the_best_mean_is_taken(work
     assert alone == all("mean" not in stage for stage in stages)
     taken = sorted(re.findall(r"\d", stages[-1] if "mean" in stages[-1] else chosen))
     rounds = next(one for one in results.judgement.tables if one.caption.startswith("Training end to end"))
-    assert [row[0] for row in rounds.rows] == [f"Start {number}, round 1" for number in taken]
+    assert [row[0] for row in rounds.rows] == [f"1 of start {number}" for number in taken]
+    assert all(one.startswith(tuple(f"Start {number}, round 1: " for number in taken)) for one in rounds.folded)
     # What the table says is what the stored assembly does.
     pump = np.repeat(np.random.default_rng(3).uniform(0.0, 2.0, 15), 20)
     pump[:5] = 0.0
