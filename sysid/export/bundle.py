@@ -131,7 +131,9 @@ def export_bundle(
         tolerance_float32: The same for files that compute in float32.
         metrics: The figures on the cases, as :func:`sysid.validation.evaluate` or ``evaluate_cascade`` give them.
         fits: Where a cascade's models come from, by mapping.
-        provenance: JSON values about where the fit comes from, kept as they are.
+        provenance: JSON values about where the fit comes from, kept as they are. A ``training`` among them,
+            with the data sets that were ``fitted`` and that have ``chosen`` (``name`` and ``sha256`` of each) and
+            ``notes``, is told on the card apart from the cases, on which the surrogate was scored.
 
     Returns:
         The bundle.

@@ -130,6 +130,7 @@ def test_card_names_every_trace_with_its_hash_and_every_figure(bundle, traces, m
     for trace in traces:
         assert f"`{trace.digest}`" in card
         assert f"{metrics.cases[trace.name].free_run.mse:.4g}" in card
+    assert "## Scored on" not in card, "a fit's cases are those that it was trained and scored on"
 
 
 def test_same_fit_gives_the_same_bytes(*, bundle, fit, traces, start, metrics, tmp_path):

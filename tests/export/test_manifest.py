@@ -45,6 +45,7 @@ def test_it_travels_in_the_bundle(bundle):
         pytest.param(lambda m: m["files"][0].update(sha256="0"), id="a hash that is none"),
         pytest.param(lambda m: m["inputs"][0].update(range=[1.0]), id="half a range"),
         pytest.param(lambda m: m.update(sample_time_s=0), id="no sample time"),
+        pytest.param(lambda m: m["provenance"].update(training={"fitted": []}), id="half a training"),
         pytest.param(lambda m: m["files"][0]["parity"].pop("random_difference"), id="no random parity"),
     ],
 )

@@ -13,15 +13,15 @@ import numpy as np
 from sysid.estimation import CascadeFit
 from sysid.estimation.result import Status
 from sysid.models import Cascade, NARXModel
-from sysid.traces import Role, Trace
+from sysid.traces import Trace
 from sysid.workbench import events
 from sysid.workbench.assembly.begun import begun, read_whole
 from sysid.workbench.assembly.config import MemberConfig
 from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
 from sysid.workbench.assembly.joint_round import JointRound
-from sysid.workbench.assembly.known import known_model, with_known
-from sysid.workbench.assembly.material import Material, lacks_a_role
+from sysid.workbench.assembly.known import known_model
+from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
 from sysid.workbench.assembly.rounds import RoundDone
 from sysid.workbench.assembly.stages import (
@@ -179,13 +179,9 @@ class Course:
     ) -> tuple[Members, str, tuple[Trace, ...]]:
         """The members of the best round, and the sequences that had been added by then."""
         asked = self.context.config.grow
-        if asked is None:
+        if asked is None or self.material.pool is None:
             return models, key, ()
-        pool = self.context.load(asked.data)
-        known = self.context.config.known
-        sources, held_out = (with_known(known, pool.with_role(role)) for role in (Role.ESTIMATION, Role.SELECTION))
-        if not sources or not held_out:
-            raise lacks_a_role("the pool lacks a role", pool)
+        sources, held_out = self.material.pool
 
         def fit(
             member: MemberConfig, now: Members, traces: Sequence[Trace], number: int, before: str

@@ -72,7 +72,7 @@ class Finish:
         write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
         stressed, worst = self._stressed(whole)
         line = self._line(whole)
-        exported = self._export(whole, cases, evaluate_cascade(whole, cases))
+        exported = self._export(whole, cases, evaluate_cascade(whole, cases), material)
         said = document(
             config,
             Outcome(
@@ -129,14 +129,22 @@ class Finish:
         )
         return scores
 
-    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any) -> Bundle | None:
+    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any, material: Material) -> Bundle | None:
         from sysid.export import export_bundle
 
         asked, step = self.context.config.export, "Exporting the assembly"
         if asked is None:
             return None
         self.context.tell(events.StepStarted(step=step))
-        provenance = {"pipeline": self.context.config.name, "command": self.context.command}
+        provenance = {
+            "pipeline": self.context.config.name,
+            "command": self.context.command,
+            "training": {
+                "fitted": [self._data(name) for name in material.fitted],
+                "chosen": [self._data(name) for name in material.chosen],
+                "notes": list(self.trained.notes),
+            },
+        }
         bundle = export_bundle(
             whole, cases, self.context.store.path / "bundle", outputs=self.context.config.outputs,
             formats=asked.formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
@@ -146,6 +154,9 @@ class Finish:
             events.StepDone(step=step, stored=False, detail=f"{len(bundle.files)} files, at most {worst:.1e} off")
         )
         return bundle
+
+    def _data(self, name: str) -> dict[str, str]:
+        return {"name": name, "sha256": self.context.digests[name]}
 
     def report(self) -> Path:
         """Write the report.

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
 from sysid.errors import ConfigError
 from sysid.traces import Role, Trace, TraceSet
+from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.known import with_known
 from sysid.workbench.assembly.limit_check import LimitCheck, check_limits
@@ -23,13 +24,19 @@ class Material:
         estimation: Traces to fit.
         selection: Traces that choose.
         also: Of each data set that some rounds have beside the others, its traces to fit and those that choose.
+        pool: Sequences to grow by and sequences that say what a round has brought, if that was asked for.
         limits: What is declared of limits, beside all that is fitted.
+        fitted: Names of the data sets that have traces to fit among these.
+        chosen: Names of those that have traces which choose.
     """
 
     estimation: tuple[Trace, ...]
     selection: tuple[Trace, ...]
     also: Mapping[str, tuple[list[Trace], list[Trace]]]
+    pool: tuple[list[Trace], list[Trace]] | None
     limits: LimitCheck
+    fitted: tuple[str, ...]
+    chosen: tuple[str, ...]
 
     @classmethod
     def of(cls, context: Context) -> Material:
@@ -47,17 +54,27 @@ class Material:
         config = context.config
         names = (config.training,) if isinstance(config.training, str) else config.training
         training = [context.load(name) for name in names]
+        choosing = training if config.selection is None else [*training, context.load(config.selection)]
         estimation = dealt([one.with_role(Role.ESTIMATION) for one in training])
-        selection = [trace for one in training for trace in one.with_role(Role.SELECTION)]
-        if config.selection is not None:
-            selection += context.load(config.selection).with_role(Role.SELECTION)
+        selection = [trace for one in choosing for trace in one.with_role(Role.SELECTION)]
         if not estimation or not selection:
-            raise lacks_a_role("the training data lack a role", *training)
+            raise _lacks_a_role("the training data lack a role", *training)
         estimation, selection = with_known(config.known, estimation), with_known(config.known, selection)
-        also = {name: _beside(context, name) for name in (config.together.data if config.together else ())}
+        beside = {name: context.load(name) for name in (config.together.data if config.together else ())}
+        pool = None if config.grow is None else context.load(config.grow.data)
+        also = {name: _beside(config, one) for name, one in beside.items()}
         rehearse(config, estimation[0])
         limits = check_limits(config, [*estimation, *chain.from_iterable(one for one, _ in also.values())])
-        return cls(estimation=tuple(estimation), selection=tuple(selection), also=also, limits=limits)
+        more = [*beside.values(), *([] if pool is None else [pool])]
+        return cls(
+            estimation=tuple(estimation),
+            selection=tuple(selection),
+            also=also,
+            pool=None if pool is None else _pool(config, pool),
+            limits=limits,
+            fitted=_having(Role.ESTIMATION, [*training, *more]),
+            chosen=_having(Role.SELECTION, [*choosing, *more]),
+        )
 
     @property
     def choosing(self) -> tuple[Trace, ...]:
@@ -65,25 +82,28 @@ class Material:
         return (*self.selection, *chain.from_iterable(chosen_by for _, chosen_by in self.also.values()))
 
 
-def _beside(context: Context, name: str) -> tuple[list[Trace], list[Trace]]:
+def _beside(config: AssemblyConfig, found: TraceSet) -> tuple[list[Trace], list[Trace]]:
     """A data set that some rounds have beside the others: to fit, and to choose by if it has such."""
-    found = context.load(name)
     if not (traces := found.with_role(Role.ESTIMATION)):
-        raise lacks_a_role("the data of a round lack a role", found)
-    known = context.config.known
-    return with_known(known, traces), with_known(known, found.with_role(Role.SELECTION))
+        raise _lacks_a_role("the data of a round lack a role", found)
+    return with_known(config.known, traces), with_known(config.known, found.with_role(Role.SELECTION))
 
 
-def lacks_a_role(what: str, *found: TraceSet) -> ConfigError:
-    """What is said of data without traces to fit, or without any that choose.
+def _pool(config: AssemblyConfig, found: TraceSet) -> tuple[list[Trace], list[Trace]]:
+    """A data set to grow by: sequences to add, and sequences that train nothing."""
+    sources, held_out = found.with_role(Role.ESTIMATION), found.with_role(Role.SELECTION)
+    if not sources or not held_out:
+        raise _lacks_a_role("the pool lacks a role", found)
+    return with_known(config.known, sources), with_known(config.known, held_out)
 
-    Args:
-        what: What is wrong.
-        found: The data sets.
 
-    Returns:
-        The error.
-    """
+def _having(role: Role, found: Sequence[TraceSet]) -> tuple[str, ...]:
+    """Names of the data sets that have traces in a role, each once."""
+    return tuple(dict.fromkeys(one.name for one in found if one.with_role(role)))
+
+
+def _lacks_a_role(what: str, *found: TraceSet) -> ConfigError:
+    """What is said of data without traces to fit, or without any that choose."""
     return ConfigError(
         what,
         where=f"data set {', '.join(one.name for one in found)}",
