@@ -10,6 +10,7 @@ import difflib
 import re
 import typing
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +20,8 @@ from pydantic import BaseModel, ValidationError
 from sysid.errors import ConfigError
 
 Model = TypeVar("Model", bound=BaseModel)
+Loc = tuple[str | int, ...]
+"""Where something stands in plain data: keys and indices."""
 
 
 class _Loader(yaml.SafeLoader):
@@ -63,6 +66,13 @@ for _kind, (_pattern, _first) in _RESOLVERS.items():
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(_pattern), _letters)
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_core_int)
 _Loader.add_constructor("tag:yaml.org,2002:float", _Loader.construct_core_float)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes what the loader above would not read as text."""
+
+
+_Dumper.yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -131,13 +141,70 @@ def parse_yaml(text: str, *, where: object) -> dict[str, Any]:
     return data
 
 
+def yaml_text(data: Mapping[str, Any]) -> str:
+    r"""Plain data as YAML that :func:`parse_yaml` reads as the same data.
+
+    Args:
+        data: Plain data.
+
+    Returns:
+        The YAML, its keys in their order.
+
+    Example:
+        >>> yaml_text({"sample_time": 1e-3, "words": ["no", "1e-3"]})
+        "sample_time: 0.001\nwords: [no, '1e-3']\n"
+    """
+    text: str = yaml.dump(dict(data), Dumper=_Dumper, sort_keys=False, width=116, default_flow_style=None)
+    return text
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origins:
+    """Where data stand that were put together from several files, so that an error names the file at fault.
+
+    Args:
+        file: The file of everything that ``parts`` does not name.
+        parts: What stands elsewhere, by its location in the whole: the origins of it, and its location there.
+    """
+
+    file: object
+    parts: Mapping[Loc, tuple[Origins, Loc]] = field(default_factory=dict)
+
+    def of(self, loc: Sequence[str | int]) -> tuple[object, Loc]:
+        """The file in which a part of the whole stands.
+
+        Args:
+            loc: Keys and indices in the whole.
+
+        Returns:
+            The file, and keys and indices there.
+        """
+        for length in range(len(loc), 0, -1):
+            if (found := self.parts.get(tuple(loc[:length]))) is not None:
+                origins, there = found
+                return origins.of((*there, *loc[length:]))
+        return self.file, tuple(loc)
+
+    def place(self, loc: Sequence[str | int]) -> str:
+        """Where a part of the whole stands, as an error names it.
+
+        Args:
+            loc: Keys and indices in the whole.
+
+        Returns:
+            For example ``valve.yaml, line 7, field channels[0].unit``.
+        """
+        file, there = self.of(loc)
+        return f"{file}{_line_of(file, there)}, field {path_text(there)}"
+
+
 def check(model: type[Model], data: Mapping[str, Any], *, where: object) -> Model:
     """Check plain data against a model.
 
     Args:
         model: The pydantic model.
         data: Plain data, as from :func:`read_yaml`.
-        where: Named in errors: the file the data came from.
+        where: Named in errors: the file the data came from, or the :class:`Origins` of its parts.
 
     Returns:
         The checked object.
@@ -149,10 +216,11 @@ def check(model: type[Model], data: Mapping[str, Any], *, where: object) -> Mode
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise _config_error(error, model, where) from None
+        origins = where if isinstance(where, Origins) else Origins(file=where)
+        raise _config_error(error, model, origins) from None
 
 
-def _config_error(error: ValidationError, model: type[BaseModel], where: object) -> ConfigError:
+def _config_error(error: ValidationError, model: type[BaseModel], origins: Origins) -> ConfigError:
     # A misspelt field usually causes the "missing" beside it: name the cause first.
     found = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
     first, others = found[0], found[1:]
@@ -161,7 +229,6 @@ def _config_error(error: ValidationError, model: type[BaseModel], where: object)
     expected: object
     got: object
     remedy = "correct the value"
-    place = f"{where}{_line_of(where, loc)}"
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, loc[:-1])
         near = difflib.get_close_matches(str(loc[-1]), known, n=1)
@@ -177,10 +244,16 @@ def _config_error(error: ValidationError, model: type[BaseModel], where: object)
             what, expected, got, remedy = cause.what, cause.expected, cause.got, cause.remedy
     else:
         wanted = first["msg"].removeprefix("Input should be ").split(", unable to parse")[0]
-        what, expected, got = f"{path_text(loc)} cannot be used as it is", wanted, _short(first["input"])
+        what, expected, got = f"{path_text(origins.of(loc)[1])} cannot be used as it is", wanted, _short(first["input"])
     if others:
-        remedy += f" (also at fault: {', '.join(sorted({path_text(item['loc']) for item in others}))})"
-    return ConfigError(what, where=f"{place}, field {path_text(loc)}", expected=expected, got=got, remedy=remedy)
+        remedy += f" (also at fault: {', '.join(sorted({_beside(loc, item['loc'], origins) for item in others}))})"
+    return ConfigError(what, where=origins.place(loc), expected=expected, got=got, remedy=remedy)
+
+
+def _beside(first: Sequence[str | int], loc: Sequence[str | int], origins: Origins) -> str:
+    """A further field at fault, with its file where that is not the first one's."""
+    file, there = origins.of(loc)
+    return path_text(there) if file == origins.of(first)[0] else f"{path_text(there)} in {file}"
 
 
 def _line_of(where: object, loc: Sequence[str | int]) -> str:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict
 
 from sysid.errors import ConfigError
-from sysid.yaml_files import check, parse_yaml, read_yaml
+from sysid.yaml_files import Origins, check, parse_yaml, read_yaml, yaml_text
 
 
 @pytest.mark.parametrize(
@@ -69,6 +69,20 @@ def test_any_text_is_parsed_or_refused(text: str) -> None:
         assert error.remedy
 
 
+LEAVES = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=12)
+ENTRIES = st.lists(LEAVES, max_size=3) | st.dictionaries(st.text(max_size=5), LEAVES, max_size=3)
+
+
+@given(st.dictionaries(st.text(max_size=5), LEAVES | ENTRIES, max_size=4))
+def test_plain_data_are_written_as_they_are_read(data: dict[str, object]) -> None:
+    assert parse_yaml(yaml_text(data), where="x") == data
+
+
+@pytest.mark.parametrize("text", ["1e-3", "0o17", "010", "no", "true", "null", "1_000", "12:30", ""])
+def test_text_that_looks_like_something_else_stays_text(text: str) -> None:
+    assert parse_yaml(yaml_text({"key": text}), where="x") == {"key": text}
+
+
 def test_an_unreadable_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot be read"):
         read_yaml(tmp_path / "none.yaml")
@@ -107,3 +121,37 @@ def test_a_field_at_fault_is_named_with_its_path(data: dict[str, object], where:
 
 def test_good_data_becomes_the_model() -> None:
     assert check(Outer, {"name": "a", "steps": [{"neurons": 4}]}, where="x").steps[0].neurons == 4
+
+
+@pytest.fixture
+def origins(tmp_path: Path) -> Origins:
+    """Of a whole whose steps stand in two files, one of them the second of the first file's."""
+    base, own = tmp_path / "base.yaml", tmp_path / "own.yaml"
+    base.write_text("name: base\nsteps:\n  - {neurons: 1}\n  - neurons: 2\n    delays: two\n", encoding="utf-8")
+    own.write_text("name: own\n\nsteps:\n  - {neurons: three}\n", encoding="utf-8")
+    return Origins(
+        file=own,
+        parts={("steps", 0): (Origins(file=base), ("steps", 1))} | {("steps", 1): (Origins(file=own), ("steps", 0))},
+    )
+
+
+def test_a_part_stands_in_its_file(origins: Origins, tmp_path: Path) -> None:
+    assert origins.of(("name",)) == (tmp_path / "own.yaml", ("name",))
+    assert origins.place(("steps", 0, "delays")) == f"{tmp_path / 'base.yaml'}, line 5, field steps[1].delays"
+    assert origins.place(("steps", 1, "neurons")) == f"{tmp_path / 'own.yaml'}, line 4, field steps[0].neurons"
+
+
+def test_what_was_joined_twice_stands_where_it_was_written(origins: Origins, tmp_path: Path) -> None:
+    further = Origins(file=tmp_path / "further.yaml", parts={("steps",): (origins, ("steps",))})
+    assert further.of(("steps", 0, "delays")) == (tmp_path / "base.yaml", ("steps", 1, "delays"))
+    assert further.of(("steps", 7)) == (tmp_path / "own.yaml", ("steps", 7))
+    assert further.of(("name",)) == (tmp_path / "further.yaml", ("name",))
+
+
+def test_an_error_names_the_file_of_each_part_at_fault(origins: Origins, tmp_path: Path) -> None:
+    data = {"name": "own", "steps": [{"neurons": 2, "delays": "two"}, {"neurons": "three"}]}
+    with pytest.raises(ConfigError) as caught:
+        check(Outer, data, where=origins)
+    assert caught.value.what == "steps[1].delays cannot be used as it is"
+    assert caught.value.where == f"{tmp_path / 'base.yaml'}, line 5, field steps[1].delays"
+    assert str(caught.value.remedy).endswith(f"(also at fault: steps[0].neurons in {tmp_path / 'own.yaml'})")

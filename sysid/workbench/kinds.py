@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.errors import ConfigError
-from sysid.yaml_files import read_yaml
+from sysid.yaml_files import Origins, read_yaml
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -108,7 +108,16 @@ def kind_of(path: Path) -> str:
     Raises:
         ConfigError: If the file cannot be read, or there is no such kind.
     """
-    name = read_yaml(path).get("kind", DEFAULT)
+    data = read_yaml(path)
+    if "extends" in data and "kind" not in data:
+        raise ConfigError(
+            "a pipeline that extends another does not say of which kind it is",
+            where=Origins(file=path).place(("extends",)),
+            expected="kind: assembly, whose pipelines extend one another",
+            got=f"no kind, which is a pipeline of {DEFAULT}",
+            remedy="add kind: assembly",
+        )
+    name = data.get("kind", DEFAULT)
     known = kinds()
     if not isinstance(name, str) or name not in known:
         near = difflib.get_close_matches(str(name), known, n=1)

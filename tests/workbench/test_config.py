@@ -13,9 +13,10 @@ from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import Loop, Training
 from sysid.models import NARX, StartKind
+from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.config import find_pipeline, json_schema, parse_pipeline
 from sysid.workbench.kinds import kind_of, kinds
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import check
 
 GOOD = """\
 name: first
@@ -152,7 +153,8 @@ def test_schema_knows_the_structures() -> None:
 @pytest.mark.parametrize("file", sorted(content_folders("pipelines")[0].glob("*.yaml")), ids=lambda file: file.stem)
 def test_built_in_pipelines_can_be_read(file: Path) -> None:
     kind = kind_of(file)
-    config: Any = check(kinds()[kind].load_config(), read_yaml(file), where=file)
+    read = read_joined(file)
+    config: Any = check(kinds()[kind].load_config(), read.data, where=read.origins)
     assert config.name == file.stem
     assert find_pipeline(file.stem).resolve() == file
     # What an installed package brings checks its own options.

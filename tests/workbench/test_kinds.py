@@ -33,6 +33,14 @@ def test_a_misspelt_kind_is_named(tmp_path: Path) -> None:
         kind_of(file)
 
 
+def test_a_pipeline_that_extends_another_says_its_kind(tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("name: a\nextends: b.yaml", encoding="utf-8")
+    with pytest.raises(ConfigError, match="add kind: assembly") as caught:
+        kind_of(file)
+    assert caught.value.where == f"{file}, line 2, field extends"
+
+
 @pytest.mark.parametrize("name", sorted(set(kinds()) - set(KINDS)))
 def test_a_kind_that_a_package_brings_is_as_strict(name: str) -> None:
     config = kinds()[name].load_config()

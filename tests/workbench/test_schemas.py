@@ -28,6 +28,23 @@ BAD_PIPELINES = {
 }
 
 
+EXTENDING = "kind: assembly\nextends: base.yaml\nname: grown\n"
+GOOD_EXTENDING = {
+    "nothing but a name": EXTENDING,
+    "what is taken away": f"{EXTENDING}stress: null\nknown: null\nlimits: {{BP: null, AR: {{low: 0}}}}",
+    "another start": f"{EXTENDING}begin: ../runs/base/bundle\ntogether: {{targets: {{BP: 0.1}}}}",
+}
+BAD_EXTENDING = {
+    "a misspelt field": f"{EXTENDING}sed: 1",
+    "a word for the seed": f"{EXTENDING}seed: one",
+    "a misspelt limit": f"{EXTENDING}limits: {{BP: {{lw: 0}}}}",
+    "a known member in part": f"{EXTENDING}known: [{{mapping: BP -> X, low: 0}}]",
+    "no name": EXTENDING.replace("name: grown\n", ""),
+    "a name taken away": EXTENDING.replace("grown", "null"),
+    "nothing that it extends": EXTENDING.replace("extends: base.yaml\n", ""),
+}
+
+
 @pytest.fixture(scope="module")
 def pipelines() -> jsonschema.Draft202012Validator:
     jsonschema.Draft202012Validator.check_schema(pipeline_schema())
@@ -44,6 +61,24 @@ def test_mistakes_are_marked_while_one_types(old: str, new: str, pipelines: json
     text = (TEMPLATE / "pipelines" / "tank.yaml").read_text(encoding="utf-8")
     assert old in text
     assert not pipelines.is_valid(parse_yaml(text.replace(old, new), where="test"))
+
+
+@pytest.mark.parametrize("text", GOOD_EXTENDING.values(), ids=GOOD_EXTENDING)
+def test_a_pipeline_that_extends_another_leaves_out_what_it_has(
+    text: str, pipelines: jsonschema.Draft202012Validator
+) -> None:
+    pipelines.validate(parse_yaml(text, where="test"))
+
+
+@pytest.mark.parametrize("text", BAD_EXTENDING.values(), ids=BAD_EXTENDING)
+def test_mistakes_are_marked_in_it_as_well(text: str, pipelines: jsonschema.Draft202012Validator) -> None:
+    assert not pipelines.is_valid(parse_yaml(text, where="test"))
+
+
+@pytest.mark.parametrize("key", ["data", "limits", "known"])
+def test_a_pipeline_that_extends_none_takes_nothing_away(key: str, pipelines: jsonschema.Draft202012Validator) -> None:
+    file = ROOT / "pipelines" / "combined-brake-held.yaml"
+    assert not pipelines.is_valid({**read_yaml(file), key: None})
 
 
 @pytest.mark.parametrize("file", DATASETS, ids=lambda file: file.parent.name)

@@ -2,6 +2,7 @@
 
 ================  ===================================================================================
 ``config``        the pipeline's YAML
+``extending``     a YAML that builds on another one
 ``stage_config``  what it asks of retraining, growing and training end to end
 ``members``       the members: where each stands, what it is fitted on, how it is put in its place
 ``known``         members that are declared and not fitted

@@ -5,11 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import NARX
+from sysid.workbench.assembly.extending import extending_schema
 from sysid.workbench.assembly.stage_config import GrowConfig, RetrainConfig, TogetherConfig
 from sysid.workbench.config import ExportConfig
 from sysid.workbench.fields import STRICT, MappingField, StructureField, TrainingConfig, as_field_error
@@ -238,6 +239,8 @@ class AssemblyConfig(BaseModel):
 
     Args:
         kind: ``assembly``.
+        extends: YAML of a pipeline that this one builds on, seen from the folder of the YAML; the two are joined before
+            anything is checked (:mod:`sysid.workbench.assembly.extending`).
         name: Name of the run folder; letters, digits, dots, dashes and underscores.
         description: What it is for.
         data: Data set whose cases are scored; they need the inputs of the whole and the outputs that are scored.
@@ -266,9 +269,10 @@ class AssemblyConfig(BaseModel):
         export: What leaves the workbench; ``null`` for nothing.
     """
 
-    model_config = STRICT
+    model_config = ConfigDict(**STRICT, json_schema_extra=extending_schema)
 
     kind: Literal["assembly"]
+    extends: str | None = None
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
     description: str = ""
     data: str

@@ -12,6 +12,7 @@ from sysid.estimation import FitProgress, FitResult
 from sysid.traces import TraceSet
 from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.extending import Joined
 from sysid.workbench.record import is_final, read_fit, write_fit
 from sysid.workbench.store import RunFolder, code_digest, digest, strict
 
@@ -27,7 +28,7 @@ class Context:
 
     Args:
         config: The pipeline.
-        text: Its YAML.
+        joined: Its YAML, with what that extends.
         beside: Folder of the YAML, where data sets are looked for first.
         store: Folder of the run.
         command: What was typed.
@@ -38,7 +39,7 @@ class Context:
     """
 
     config: AssemblyConfig
-    text: bytes
+    joined: Joined
     beside: Path
     store: RunFolder
     command: str

@@ -12,14 +12,15 @@ from sysid.reporting.judgement_report import JudgementResults
 from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
+from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.assembly.finish import ASSEMBLY, LINE, Finish
 from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.starts import train
 from sysid.workbench.environment import environment
 from sysid.workbench.kinds import RunRequest
-from sysid.workbench.store import RunFolder, read_json, write_bytes, write_json
-from sysid.yaml_files import check, read_yaml
+from sysid.workbench.store import RunFolder, read_json, write_json
+from sysid.yaml_files import check
 
 
 def run_assembly(request: RunRequest) -> int:
@@ -38,7 +39,8 @@ def run_assembly(request: RunRequest) -> int:
     from sysid.workbench.screen import LogFile, Screen
     from sysid.workbench.tracking import Tracker
 
-    config = check(AssemblyConfig, read_yaml(request.path), where=request.path)
+    joined = read_joined(request.path)
+    config = check(AssemblyConfig, joined.data, where=joined.origins)
     folder = (request.out or Path("runs") / config.name).resolve()
     command = shlex.join(["sysid", "run", request.typed, *(["--out", str(request.out)] if request.out else [])])
     target = console()
@@ -52,7 +54,7 @@ def run_assembly(request: RunRequest) -> int:
     tracker = Tracker.of_workspace(Path.cwd(), warn) if request.tracking else None
     context = Context(
         config=config,
-        text=request.path.read_bytes(),
+        joined=joined,
         beside=request.path.parent,
         store=RunFolder(path=folder),
         command=command,
@@ -77,7 +79,7 @@ def run_assembly(request: RunRequest) -> int:
 
 def _run(context: Context) -> tuple[JudgementResults, Path]:
     """Every step, in order; the results and the page."""
-    write_bytes(context.store.path / "pipeline.yaml", context.text)
+    context.joined.keep(context.store.path)
     write_json(context.store.path / "environment.json", environment())
     cases, material = context.load(context.config.data), Material.of(context)
     finish = Finish(context=context, trained=train(context, material))
