@@ -8,7 +8,7 @@ a generator make the traces and keeps them in a cache.
 
 from sysid.ingest.assemble import Wanted, assemble
 from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
-from sysid.ingest.dataset import Progress, find_dataset, load_dataset
+from sysid.ingest.dataset import Progress, find_dataset, load_dataset, load_described
 from sysid.ingest.description import DatasetDescription, read_description
 from sysid.ingest.generators import Generator, find_generator
 from sysid.ingest.inspection import ColumnFinding, FileFinding, inspect_file
@@ -45,6 +45,7 @@ __all__ = [
     "find_generator",
     "inspect_file",
     "load_dataset",
+    "load_described",
     "propose_dataset",
     "read_description",
     "read_table",

@@ -95,7 +95,32 @@ def load_dataset(
         TraceError: If something is wrong with the samples and its repair was not asked for.
     """
     path = find_dataset(name_or_path, search=search)
-    description = read_description(path)
+    return load_described(read_description(path), path, cases=cases, cache=cache, progress=progress)
+
+
+def load_described(
+    description: DatasetDescription,
+    path: Path,
+    *,
+    cases: Sequence[str] | None = None,
+    cache: bool | Path = True,
+    progress: Progress | None = None,
+) -> TraceSet:
+    """Load the traces of a description, as :func:`load_dataset` does.
+
+    Args:
+        description: The data set.
+        path: Its file: named in errors, and what its files are seen from.
+        cases: Only these; ``None`` is all.
+        cache: Whether generated traces are kept, or the folder to keep them in.
+        progress: Called before each case.
+
+    Returns:
+        The traces, with the roles that the description gives them.
+
+    Raises:
+        UserError: As :func:`load_dataset`.
+    """
     chosen = _choose(description, cases, path)
     store = None
     if cache is not False:

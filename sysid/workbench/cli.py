@@ -226,6 +226,26 @@ def simulate(
     simulate_command(bundle, inputs, out, initial=initial, command=command, time_unit=time_unit, unit=unit, plot=plot)
 
 
+@app.command(
+    epilog="Example: sysid worst runs/combined-brake-held/bundle --like abdx-combined-pool --seeds 130000:132999 "
+    "--output BC --keep 200 --into datasets/found"
+)
+def worst(
+    bundle: Annotated[Path, typer.Argument(help="Folder or zip of an exported model or cascade.")],
+    *,
+    like: Annotated[str, typer.Option(help="Data set of random sequences; new ones are drawn as a case of it is.")],
+    seeds: Annotated[str, typer.Option(help="Seeds of the new sequences, the first and the last: 130000:132999.")],
+    output: Annotated[str, typer.Option(help="Output whose error counts.")],
+    keep: Annotated[int, typer.Option(help="How many are kept, the worst ones.")],
+    into: Annotated[Path, typer.Option(help="Folder of the data set that is written.")],
+    case: Annotated[str | None, typer.Option(help="The case; the first by default.")] = None,
+) -> None:
+    """Find what an exported model is worst at among new sequences of the reference, as a data set to train on."""
+    from sysid.workbench.commands.worst import worst_command
+
+    worst_command(bundle, like=like, case=case, seeds=seeds, output=output, keep=keep, into=into)
+
+
 @app.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')
 def export(
     pipeline: Annotated[str, typer.Argument(help="Name of a pipeline that has been run, or its YAML file.")],
