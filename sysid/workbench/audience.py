@@ -11,7 +11,7 @@ from rich.console import Console
 
 from sysid.workbench.events import Event, Warned, Watcher
 from sysid.workbench.screen import LogFile, Screen
-from sysid.workbench.tracking import Tracker
+from sysid.workbench.tracker import Tracker
 
 PIPED_WIDTH = 160
 """Columns where there is no terminal to ask: enough for a table of five cases on one line."""

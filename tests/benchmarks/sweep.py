@@ -263,7 +263,8 @@ def tracking(base: Path) -> None:
 
     from sysid.reporting.sweep_record import read_sweep
     from sysid.workbench.events import SweepReady
-    from sysid.workbench.tracking import Tracker, connect
+    from sysid.workbench.tracker import Tracker
+    from sysid.workbench.tracking import connect
 
     if not (base / "undisturbed").exists():
         undisturbed(base)

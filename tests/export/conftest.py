@@ -1,4 +1,4 @@
-"""The table of models that every exporter is held to, and traces to run them on."""
+"""The table of files that every exporter is held to, written and opened; and traces to run models on."""
 
 from __future__ import annotations
 
@@ -20,105 +20,12 @@ from sysid.export import (
     Surrogate,
     export_bundle,
 )
-from sysid.models import (
-    ARX,
-    NARX,
-    AbstractModel,
-    ARXModel,
-    Cascade,
-    Domain,
-    History,
-    Limit,
-    Mapping,
-    NARXModel,
-    Scaling,
-    Start,
-    TransferFunction,
-    VectorMapping,
-    VectorNARX,
-    VectorNARXModel,
-    VectorScaling,
-    parameter_count,
-)
-from sysid.models.transfer_function import TransferFunctionModel
+from sysid.models import NARX, AbstractModel, Cascade, History, NARXModel, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.units import Reference
 from sysid.validation import evaluate_cascade
-
-MAPPINGS = {1: "BP -> BC", 2: "BP+AR -> BC"}
-
-
-def build_arx(*, na: int, nb: tuple[int, ...], nk: tuple[int, ...], seed: int = 1) -> ARXModel:
-    """A stable ARX model: the moduli of its ``a`` add up to 0.9."""
-    rng = np.random.default_rng(seed)
-    b, a = rng.normal(size=sum(nb)), rng.uniform(0.1, 1.0, na) * rng.choice([-1.0, 1.0], na)
-    a *= 0.9 / max(np.abs(a).sum(), 1e-3)
-    return ARXModel(
-        orders=ARX(na=na, nb=nb, nk=nk),
-        coefficients=np.concatenate([b, a]),
-        intercept=1.5,
-        mapping=Mapping.parse(MAPPINGS[len(nb)]),
-        sample_time=0.1,
-        input_units=("psi",) * len(nb),
-        output_unit="psi",
-        rest_output=2.0,
-    )
-
-
-def build_narx(
-    structure: NARX, *, n_inputs: int = 2, clamp: float = 3.0, gain: float = 0.4, seed: int = 2
-) -> NARXModel:
-    """A NARX network with random weights, shrunk until its free run forgets where it started."""
-    rng = np.random.default_rng(seed)
-    lags = structure.lags(n_inputs)
-    count = parameter_count(lags, structure.neurons, linear=structure.feedthrough, gated=structure.gated)
-    theta = rng.normal(size=count)
-    theta *= gain / np.sqrt(len(theta))
-    theta[structure.neurons * lags.n_regressors :] *= 2.0
-    return NARXModel(
-        network=structure,
-        theta=theta,
-        scaling=Scaling(
-            input_offset=(45.0, 70.0)[:n_inputs],
-            input_scale=(45.0, 20.0)[:n_inputs],
-            output_offset=38.0,
-            output_scale=40.0,
-        ),
-        mapping=Mapping.parse(MAPPINGS[n_inputs]),
-        sample_time=0.1,
-        input_units=("psi",) * n_inputs,
-        output_unit="psi",
-        rest_output=0.0,
-        clamp=clamp,
-    )
-
-
-MODELS: dict[str, Callable[[], AbstractModel]] = {
-    "ARX": lambda: build_arx(na=2, nb=(2,), nk=(1,)),
-    "ARX, two inputs, dead times": lambda: build_arx(na=3, nb=(2, 3), nk=(0, 5)),
-    "ARX, finite impulse response": lambda: build_arx(na=0, nb=(4,), nk=(1,)),
-    "ARX, direct input only": lambda: build_arx(na=0, nb=(1,), nk=(0,)),
-    "ARX, one input unused": lambda: build_arx(na=1, nb=(0, 2), nk=(0, 1)),
-    "ARX, no input used": lambda: build_arx(na=2, nb=(0,), nk=(0,)),
-    "NARX 4/4/20": lambda: build_narx(NARX(input_delays=4, output_delays=4, neurons=20)),
-    "NARX, one input": lambda: build_narx(NARX(input_delays=2, output_delays=3, neurons=5), n_inputs=1),
-    "NARX without feed-through": lambda: build_narx(
-        NARX(input_delays=2, output_delays=2, neurons=6, feedthrough=False)
-    ),
-    "NARX, linear part alone": lambda: build_narx(NARX(input_delays=2, output_delays=2, neurons=0)),
-    "NARX, direct input": lambda: build_narx(NARX(input_delays="0:3", output_delays=2, neurons=5)),
-    "NARX, direct input only": lambda: build_narx(NARX(input_delays="0:0", output_delays=1, neurons=5)),
-    "NARX, sparse lags": lambda: build_narx(NARX(input_delays=[1, 2, 4, 8], output_delays=[2, 5], neurons=5)),
-    "NARX, delays per input": lambda: build_narx(NARX(input_delays=[[0], [1, 2, 4]], output_delays="1:2", neurons=5)),
-    "NARX against its bounds": lambda: build_narx(
-        NARX(input_delays=2, output_delays=2, neurons=8), clamp=0.1, gain=3.0, seed=5
-    ),
-    "NARX, gates": lambda: build_narx(NARX(input_delays="0:1", output_delays=1, neurons=6, gated=True)),
-    "NARX, gates, sparse lags": lambda: build_narx(
-        NARX(input_delays=[[0], [1, 2, 5]], output_delays=[2, 3], neurons=4, gated=True)
-    ),
-    "NARX without bounds": lambda: build_narx(NARX(input_delays=2, output_delays=2, neurons=5), clamp=float("inf")),
-}
+from tests.export.cascades import CASCADES, build_cascade, build_circle, build_limited
+from tests.export.single_models import MODELS, build_narx
 
 
 @pytest.fixture(params=MODELS, scope="session")
@@ -311,125 +218,6 @@ def traces(fit: FitResult) -> TraceSet:
 @pytest.fixture(scope="session")
 def start() -> Start:
     return Start()
-
-
-def wired_narx(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) -> NARXModel:
-    """A network of a cascade, all of whose channels lie between 0 and 90 psi."""
-    rng = np.random.default_rng(seed)
-    parsed = Mapping.parse(mapping)
-    n_inputs = len(parsed.inputs)
-    count = parameter_count(structure.lags(n_inputs), structure.neurons, linear=True, gated=structure.gated)
-    theta = rng.normal(size=count)
-    return NARXModel(
-        network=structure,
-        theta=theta * 0.4 / np.sqrt(len(theta)),
-        scaling=Scaling(
-            input_offset=(45.0,) * n_inputs, input_scale=(45.0,) * n_inputs, output_offset=40.0, output_scale=38.0
-        ),
-        mapping=parsed,
-        sample_time=0.1,
-        input_units=("psi",) * n_inputs,
-        output_unit="psi",
-        rest_output=3.0,
-        clamp=clamp,
-    )
-
-
-def wired_vector(mapping: str, structure: VectorNARX, seed: int) -> VectorNARXModel:
-    """A network of several outputs in a cascade."""
-    parsed = VectorMapping.parse(mapping)
-    n, m = len(parsed.inputs), len(parsed.outputs)
-    theta = np.random.default_rng(seed).normal(size=structure.parameter_count(n, m))
-    return VectorNARXModel(
-        network=structure,
-        theta=theta * 0.4 / np.sqrt(len(theta)),
-        scaling=VectorScaling(
-            input_offset=(45.0,) * n, input_scale=(45.0,) * n, output_offset=(40.0,) * m, output_scale=(38.0,) * m
-        ),
-        mapping=parsed,
-        sample_time=0.1,
-        input_units=("psi",) * n,
-        output_units=("psi",) * m,
-        rest_outputs=(5.0,) * m,
-    )
-
-
-def wired_transfer_function(mapping: str) -> TransferFunctionModel:
-    """A slow linear model of one input in a cascade."""
-    return TransferFunctionModel(
-        orders=TransferFunction(poles=(2,), zeros=(1,), delays=(2,), domain=Domain.DISCRETE),
-        sections=((np.array([1.0, -1.9, 0.905]),),),
-        taps=(np.array([0.004, 0.001]),),
-        constant=0.1,
-        scaling=Scaling(input_offset=(45.0,), input_scale=(45.0,), output_offset=38.0, output_scale=40.0),
-        mapping=Mapping.parse(mapping),
-        sample_time=0.1,
-        input_units=("psi",),
-        output_unit="psi",
-        rest_output=0.0,
-    )
-
-
-def build_cascade() -> Cascade:
-    """Three models: the first computes BP, the second reads it, the third reads both outputs and the command."""
-    return Cascade(
-        models=(
-            wired_narx("STP+FLOW -> BP", NARX(input_delays="0:3", output_delays=[1, 2, 5], neurons=6), 1),
-            wired_narx("BP -> AR", NARX(input_delays=2, output_delays=3, neurons=4, gated=True), 2),
-            wired_narx(
-                "BP+AR+STP -> BC", NARX(input_delays=[[0], [1, 3], [2]], output_delays=2, neurons=5), 3, clamp=0.05
-            ),
-        )
-    )
-
-
-def build_limited() -> Cascade:
-    """Every kind of model, levels that follow an input, and limits of every kind, all of which are reached."""
-    return Cascade(
-        models=(
-            wired_narx("STP+FLOW -> BP", NARX(input_delays="0:1", output_delays=1, neurons=6), 1),
-            wired_vector(
-                "BP+STP -> AR+ER", VectorNARX(input_delays="0:1", output_delays=[[1, 2], [1, 4]], neurons=5), 2
-            ),
-            wired_vector("STP -> V+W", VectorNARX(input_delays=1, output_delays=[[2], [1]], neurons=3), 4),
-            wired_narx("BP+AR -> BC", NARX(input_delays=1, output_delays=2, neurons=5), 3),
-            wired_transfer_function("BP -> X"),
-        ),
-        rest={"BP": "STP", "AR": "STP", "ER": 60.0, "FLOW": 10.0},
-        limits={
-            "BP": Limit(low=0.0, high="STP"),
-            "AR": Limit(low=12.0, high="BP"),
-            "ER": Limit(low=41.0, high=50.0),
-            "W": Limit(low="FLOW", high=37.0),
-            "BC": Limit(low=37.6, high=37.9),
-            "X": Limit(low=36.0, high="STP"),
-        },
-    )
-
-
-def build_circle() -> Cascade:
-    """Models that read each other through the past, one of them with two outputs and one with gates, and limits."""
-    return Cascade(
-        models=(
-            wired_narx("STP+AR+ER -> BP", NARX(input_delays=[[0, 1], [1, 3], [1]], output_delays=2, neurons=5), 1),
-            wired_vector(
-                "BP+BC -> AR+ER", VectorNARX(input_delays=[[0], [2]], output_delays=[[1, 2], [1]], neurons=4), 2
-            ),
-            wired_narx("AR -> BC", NARX(input_delays="0:1", output_delays=1, neurons=3, gated=True), 3, clamp=0.05),
-        ),
-        rest={"BP": "STP", "AR": 30.0},
-        limits={"AR": Limit(low=12.0, high="BP"), "ER": Limit(low=38.0)},
-    )
-
-
-CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
-    "three models": (build_cascade, None),
-    "every kind, limits and levels": (build_limited, None),
-    "in a circle": (build_circle, None),
-    "some outputs, in another order": (build_limited, ("BC", "AR")),
-    "one output of a circle": (build_circle, ("ER",)),
-}
-"""Models wired, and which outputs leave them."""
 
 
 @pytest.fixture(scope="session")

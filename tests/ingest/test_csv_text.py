@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sysid.errors import ReaderError
-from sysid.ingest import FileOptions, read_table
+from sysid.ingest import FileOptions, RepairOptions, read_table
 
 Write = Callable[[str, str | bytes], Path]
 
@@ -129,6 +129,15 @@ def test_what_cannot_be_read_is_refused(
 ) -> None:
     with pytest.raises(ReaderError, match=message):
         read_table(write("run.csv", text), files=FileOptions.model_validate(options)).find(column)
+
+
+def test_ragged_rows_are_dropped_on_request_and_told(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("t [s],u [V]\n0,1\n1\n2,3,4\n3,4\n")
+    with pytest.raises(ReaderError, match=r"(?s)2 rows.*line 3.*expected: 2 cells.*ragged: drop"):
+        read_table(tmp_path / "run.csv")
+    table = read_table(tmp_path / "run.csv", repairs=RepairOptions(ragged="drop"))
+    assert table.find("u").values.tolist() == [1.0, 4.0]
+    assert table.notes == ("2 ragged rows dropped, first at line 3",)
 
 
 @settings(max_examples=200)

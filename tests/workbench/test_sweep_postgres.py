@@ -18,7 +18,7 @@ import pytest
 from sysid.reporting.sweep_record import SweepRecord, Trial, TrialCase, write_sweep
 from sysid.workbench.events import SweepReady
 from sysid.workbench.sweep import publish
-from sysid.workbench.tracking import Tracker
+from sysid.workbench.tracker import Tracker
 
 OWNER = "postgres"
 """PostgreSQL refuses to run as root; its package makes this user."""

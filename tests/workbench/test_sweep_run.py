@@ -17,7 +17,7 @@ from sysid.workbench.sweep_config import SweepConfig
 from sysid.workbench.sweep_run import Swept, read_sweep_file, run_sweep
 from sysid.workbench.sweep_trial import Bench
 from sysid.workbench.sweep_workers import AbstractWorkers, InThisProcess
-from sysid.workbench.tracking import Tracker
+from sysid.workbench.tracker import Tracker
 
 SWEEP = """\
 kind: sweep

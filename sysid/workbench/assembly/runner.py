@@ -37,7 +37,7 @@ def run_assembly(request: RunRequest) -> int:
     """
     from sysid.workbench.audience import console
     from sysid.workbench.screen import LogFile, Screen
-    from sysid.workbench.tracking import Tracker
+    from sysid.workbench.tracker import Tracker
 
     joined = read_joined(request.path)
     config = check(AssemblyConfig, joined.data, where=joined.origins)

@@ -1,0 +1,143 @@
+"""Models wired, and which outputs leave them: the table of cascades that every exporter is held to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sysid.models import (
+    NARX,
+    Cascade,
+    Domain,
+    Limit,
+    Mapping,
+    NARXModel,
+    Scaling,
+    TransferFunction,
+    VectorMapping,
+    VectorNARX,
+    VectorNARXModel,
+    VectorScaling,
+    parameter_count,
+)
+from sysid.models.transfer_function import TransferFunctionModel
+
+
+def wired_narx(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) -> NARXModel:
+    """A network of a cascade, all of whose channels lie between 0 and 90 psi."""
+    rng = np.random.default_rng(seed)
+    parsed = Mapping.parse(mapping)
+    n_inputs = len(parsed.inputs)
+    count = parameter_count(structure.lags(n_inputs), structure.neurons, linear=True, gated=structure.gated)
+    theta = rng.normal(size=count)
+    return NARXModel(
+        network=structure,
+        theta=theta * 0.4 / np.sqrt(len(theta)),
+        scaling=Scaling(
+            input_offset=(45.0,) * n_inputs, input_scale=(45.0,) * n_inputs, output_offset=40.0, output_scale=38.0
+        ),
+        mapping=parsed,
+        sample_time=0.1,
+        input_units=("psi",) * n_inputs,
+        output_unit="psi",
+        rest_output=3.0,
+        clamp=clamp,
+    )
+
+
+def wired_vector(mapping: str, structure: VectorNARX, seed: int) -> VectorNARXModel:
+    """A network of several outputs in a cascade."""
+    parsed = VectorMapping.parse(mapping)
+    n, m = len(parsed.inputs), len(parsed.outputs)
+    theta = np.random.default_rng(seed).normal(size=structure.parameter_count(n, m))
+    return VectorNARXModel(
+        network=structure,
+        theta=theta * 0.4 / np.sqrt(len(theta)),
+        scaling=VectorScaling(
+            input_offset=(45.0,) * n, input_scale=(45.0,) * n, output_offset=(40.0,) * m, output_scale=(38.0,) * m
+        ),
+        mapping=parsed,
+        sample_time=0.1,
+        input_units=("psi",) * n,
+        output_units=("psi",) * m,
+        rest_outputs=(5.0,) * m,
+    )
+
+
+def wired_transfer_function(mapping: str) -> TransferFunctionModel:
+    """A slow linear model of one input in a cascade."""
+    return TransferFunctionModel(
+        orders=TransferFunction(poles=(2,), zeros=(1,), delays=(2,), domain=Domain.DISCRETE),
+        sections=((np.array([1.0, -1.9, 0.905]),),),
+        taps=(np.array([0.004, 0.001]),),
+        constant=0.1,
+        scaling=Scaling(input_offset=(45.0,), input_scale=(45.0,), output_offset=38.0, output_scale=40.0),
+        mapping=Mapping.parse(mapping),
+        sample_time=0.1,
+        input_units=("psi",),
+        output_unit="psi",
+        rest_output=0.0,
+    )
+
+
+def build_cascade() -> Cascade:
+    """Three models: the first computes BP, the second reads it, the third reads both outputs and the command."""
+    return Cascade(
+        models=(
+            wired_narx("STP+FLOW -> BP", NARX(input_delays="0:3", output_delays=[1, 2, 5], neurons=6), 1),
+            wired_narx("BP -> AR", NARX(input_delays=2, output_delays=3, neurons=4, gated=True), 2),
+            wired_narx(
+                "BP+AR+STP -> BC", NARX(input_delays=[[0], [1, 3], [2]], output_delays=2, neurons=5), 3, clamp=0.05
+            ),
+        )
+    )
+
+
+def build_limited() -> Cascade:
+    """Every kind of model, levels that follow an input, and limits of every kind, all of which are reached."""
+    return Cascade(
+        models=(
+            wired_narx("STP+FLOW -> BP", NARX(input_delays="0:1", output_delays=1, neurons=6), 1),
+            wired_vector(
+                "BP+STP -> AR+ER", VectorNARX(input_delays="0:1", output_delays=[[1, 2], [1, 4]], neurons=5), 2
+            ),
+            wired_vector("STP -> V+W", VectorNARX(input_delays=1, output_delays=[[2], [1]], neurons=3), 4),
+            wired_narx("BP+AR -> BC", NARX(input_delays=1, output_delays=2, neurons=5), 3),
+            wired_transfer_function("BP -> X"),
+        ),
+        rest={"BP": "STP", "AR": "STP", "ER": 60.0, "FLOW": 10.0},
+        limits={
+            "BP": Limit(low=0.0, high="STP"),
+            "AR": Limit(low=12.0, high="BP"),
+            "ER": Limit(low=41.0, high=50.0),
+            "W": Limit(low="FLOW", high=37.0),
+            "BC": Limit(low=37.6, high=37.9),
+            "X": Limit(low=36.0, high="STP"),
+        },
+    )
+
+
+def build_circle() -> Cascade:
+    """Models that read each other through the past, one of them with two outputs and one with gates, and limits."""
+    return Cascade(
+        models=(
+            wired_narx("STP+AR+ER -> BP", NARX(input_delays=[[0, 1], [1, 3], [1]], output_delays=2, neurons=5), 1),
+            wired_vector(
+                "BP+BC -> AR+ER", VectorNARX(input_delays=[[0], [2]], output_delays=[[1, 2], [1]], neurons=4), 2
+            ),
+            wired_narx("AR -> BC", NARX(input_delays="0:1", output_delays=1, neurons=3, gated=True), 3, clamp=0.05),
+        ),
+        rest={"BP": "STP", "AR": 30.0},
+        limits={"AR": Limit(low=12.0, high="BP"), "ER": Limit(low=38.0)},
+    )
+
+
+CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
+    "three models": (build_cascade, None),
+    "every kind, limits and levels": (build_limited, None),
+    "in a circle": (build_circle, None),
+    "some outputs, in another order": (build_limited, ("BC", "AR")),
+    "one output of a circle": (build_circle, ("ER",)),
+}
+"""Models wired, and which outputs leave them."""

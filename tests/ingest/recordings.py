@@ -1,0 +1,100 @@
+"""One signal, recorded in every format that is read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+TIME = 0.05 * np.arange(40)
+PIPE = 500.0 + 10.0 * np.sin(TIME)
+VOLT = np.cos(3.0 * TIME) / 3.0
+
+
+def write_csv(path: Path) -> None:
+    rows = [f"{t!r},{p!r},{v!r}" for t, p, v in zip(TIME.tolist(), PIPE.tolist(), VOLT.tolist(), strict=True)]
+    path.write_text("\n".join(["time [s],BP [kPa gauge],u [V]", *rows]))
+
+
+def write_csv_european(path: Path) -> None:
+    cells = zip(TIME.tolist(), PIPE.tolist(), VOLT.tolist(), strict=True)
+    rows = [f"{t!r};{p!r};{v!r}".replace(".", ",") for t, p, v in cells]
+    text = "\r\n".join(["# made on the rig", "Zeit (s);BP;u", "s;kPa gauge;V", *rows])
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+
+
+def write_csv_tabs(path: Path) -> None:
+    rows = [f"{t!r}\t{p!r}\t{v!r}\t" for t, p, v in zip(TIME.tolist(), PIPE.tolist(), VOLT.tolist(), strict=True)]
+    path.write_text("\n".join(["t [s]\tBP [kPa gauge]\tu [V]\t", *rows, "", ""]), encoding="utf-16")
+
+
+def write_parquet(path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    metadata = [{"unit": "s"}, {"unit": "kPa", "reference": "gauge"}, {"unit": "V"}]
+    fields = [pa.field(n, pa.float64(), metadata=m) for n, m in zip(("time", "BP", "u"), metadata, strict=True)]
+    parquet.write_table(pa.table([TIME, PIPE, VOLT], schema=pa.schema(fields)), path)
+
+
+def write_mat5(path: Path) -> None:
+    from scipy.io import savemat
+
+    units = {"t": "s", "BP": "kPa gauge", "u": "V"}
+    savemat(path, {"run": {"t": TIME[:, None], "BP": PIPE[:, None], "u": VOLT[:, None], "units": units}})
+
+
+def write_mat73(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        run = file.create_group("run")
+        run.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, values in (("t", TIME), ("BP", PIPE), ("u", VOLT)):
+            run.create_dataset(name, data=values[None, :]).attrs["MATLAB_class"] = np.bytes_("double")
+        units = run.create_group("units")
+        units.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, text in (("t", "s"), ("BP", "kPa gauge"), ("u", "V")):
+            codes = np.array([[ord(c)] for c in text], dtype=np.uint16)
+            units.create_dataset(name, data=codes).attrs["MATLAB_class"] = np.bytes_("char")
+    mark_as_mat73(path)
+
+
+def mark_as_mat73(path: Path) -> None:
+    """Write the head by which MATLAB knows an HDF5 file with a block for its user as its own."""
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, made for a test".ljust(124) + b"\x00\x02IM")
+
+
+def write_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for name, values, unit in (("time", TIME, "s"), ("BP", PIPE, "kPa"), ("u", VOLT, "V")):
+            file.create_dataset(name, data=values).attrs["units"] = unit
+        file["BP"].attrs["reference"] = "gauge"
+
+
+def write_mdf4(path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.append(
+            [
+                Signal(PIPE, TIME, name="BP", unit="kPa gauge"),
+                Signal(VOLT, TIME, name="u", unit="V"),
+            ]
+        )
+        file.save(path, overwrite=True)
+
+
+def write_tdms(path: Path) -> None:
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(path) as file:
+        file.write_segment(
+            [
+                ChannelObject("rig", "BP", PIPE, properties={"unit_string": "kPa gauge", "wf_increment": 0.05}),
+                ChannelObject("rig", "u", VOLT, properties={"unit_string": "V", "wf_increment": 0.05}),
+            ]
+        )

@@ -1,0 +1,89 @@
+"""MATLAB files: objects that only MATLAB reads, Simulink's structures, columns of several lengths, matrices."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.errors import ReaderError
+from sysid.ingest import read_table
+from tests.ingest.recordings import PIPE, TIME, VOLT, mark_as_mat73
+
+
+def _opaque_mat5(path: Path) -> None:
+    """A MATLAB 5 file with an object in it, byte by byte (MAT-File Format, class 17)."""
+
+    def element(kind: int, data: bytes) -> bytes:
+        return struct.pack("<II", kind, len(data)) + data.ljust(-(-len(data) // 8) * 8, b"\0")
+
+    reference = element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 6, 1)) + element(1, b"")
+    reference += element(6, struct.pack("<6I", 0xDD000000, 2, 1, 1, 1, 1))
+    body = element(6, struct.pack("<II", 17, 0))
+    body += element(1, b"ts") + element(1, b"MCOS") + element(1, b"timeseries") + element(14, reference)
+    head = b"MATLAB 5.0 MAT-file, made for a test".ljust(116) + b"\0" * 8 + b"\x00\x01IM"
+    path.write_bytes(head + element(14, body))
+
+
+def _opaque_mat73(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        item = file.create_dataset("ts", data=np.array([[0xDD000000, 2, 1, 1, 1, 1]], dtype=np.uint32))
+        item.attrs["MATLAB_class"] = np.bytes_("timeseries")
+        item.attrs["MATLAB_object_decode"] = np.int32(3)
+    mark_as_mat73(path)
+
+
+@pytest.mark.parametrize("writer", [_opaque_mat5, _opaque_mat73], ids=["5", "7.3"])
+def test_a_matlab_object_is_refused_with_the_line_that_exports_it(
+    tmp_path: Path, writer: Callable[[Path], None]
+) -> None:
+    writer(tmp_path / "run.mat")
+    with pytest.raises(ReaderError, match=r"(?s)only MATLAB can read.*ts\.Time"):
+        read_table(tmp_path / "run.mat")
+
+
+def test_a_matlab_object_beside_plain_arrays_does_no_harm_until_it_is_asked_for(tmp_path: Path) -> None:
+    import h5py
+
+    _opaque_mat73(tmp_path / "run.mat")
+    with h5py.File(tmp_path / "run.mat", "a") as file:
+        for name, values in (("t", TIME), ("u", VOLT)):
+            file.create_dataset(name, data=values[None, :]).attrs["MATLAB_class"] = np.bytes_("double")
+    table = read_table(tmp_path / "run.mat")
+    np.testing.assert_array_equal(table.find("u").values, VOLT)
+    with pytest.raises(ReaderError, match="ts is a MATLAB object"):
+        table.find("ts")
+
+
+def test_simulinks_structure_with_time_is_understood(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    signals = np.array([{"values": PIPE, "label": "BP"}, {"values": VOLT, "label": ""}], dtype=object)
+    savemat(tmp_path / "run.mat", {"out": {"time": TIME, "signals": list(signals)}})
+    table = read_table(tmp_path / "run.mat")
+    assert (table.time, table.names) == ("time", ("time", "BP", "signal_2"))
+    np.testing.assert_array_equal(table.find("BP").values, PIPE)
+
+
+def test_a_column_of_another_length_is_refused_only_when_asked_for(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "run.mat", {"t": TIME, "u": VOLT, "short": VOLT[:7]})
+    table = read_table(tmp_path / "run.mat")
+    assert len(table) == len(TIME)
+    with pytest.raises(ReaderError, match=r"(?s)expected: 40 samples.*got: +7 samples"):
+        table.find("short")
+
+
+def test_a_matrix_becomes_numbered_columns(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "run.mat", {"t": TIME, "p": np.column_stack([PIPE, VOLT])})
+    table = read_table(tmp_path / "run.mat")
+    assert table.names == ("t", "p_1", "p_2")
+    np.testing.assert_array_equal(table.find("p_2").values, VOLT)
