@@ -17,7 +17,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOST, LOW, LOW_CHANNEL, SUM_HEAD, laid_out
+from sysid.kernels.cascade_layout import (
+    FREE,
+    HIGH,
+    HIGH_CHANNEL,
+    LOST,
+    LOW,
+    LOW_CHANNEL,
+    SUM_HEAD,
+    from_a_line,
+    laid_out,
+)
 from sysid.kernels.registers import LANES, affine, dot, tanh
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -111,7 +121,7 @@ def _walk(p, layout, values, past, at_sample, kept, held):
     sum_first, numbers, codes = _u(layout.sums.first), layout.sums.numbers, layout.sums.codes
     first_x_of, channel_y = _u(p.regressor_first), _u(p.output_channel)
     to_g_of = readout_first[_u(p.output_first)[:-1]]
-    x, h = np.empty(len(p.regressor_channel)), np.zeros(LANES * layout.blocks.sum())
+    x, h = np.empty(len(p.regressor_channel)), from_a_line(LANES * layout.blocks.sum())
     flat, wide = values.reshape(-1), values.shape[1]
     back = _u(p.regressor_lag * wide - p.regressor_channel)
     indices = _placed(layout.sums.indices, back)

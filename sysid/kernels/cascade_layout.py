@@ -221,6 +221,14 @@ def _levels(p, is_sum):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def from_a_line(size):
+    """Zeros from the beginning of a line of the cache on, which is as wide as a block of eight: no block lies in two."""
+    room = np.zeros(size + LANES)
+    skipped = (LANES - (room.ctypes.data // room.itemsize) % LANES) % LANES
+    return room[skipped : skipped + size]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _put(weights, first, theta, rows_at, constants_at, n, n_x):
     """Put weights and constants of neurons or gates into blocks; where the next begin."""
     for k in range(n):
@@ -239,7 +247,8 @@ def _in_blocks(p, theta, order):
         n, n_x = padded(p.neurons[m]), p.regressor_first[m + 1] - p.regressor_first[m]
         size += 2 * n * (n_x + 1)
         read += n * (p.output_first[m + 1] - p.output_first[m])
-    weights, readout, readout_first = np.zeros(size), np.zeros(read), np.zeros(len(p.output_channel), dtype=np.int64)
+    weights, readout = from_a_line(size), from_a_line(read)
+    readout_first = np.zeros(len(p.output_channel), dtype=np.int64)
     weights_first, gate_blocks, neuron_first = np.zeros_like(order), np.zeros_like(order), np.zeros_like(order)
     at, at_neuron, at_readout = 0, 0, 0
     for m in order:

@@ -227,8 +227,8 @@ def simulate(
 
 
 @app.command(
-    epilog="Example: sysid worst runs/combined-brake-held/bundle --like abdx-combined-pool --seeds 130000:132999 "
-    "--output BC --keep 200 --into datasets/found"
+    epilog="Example: sysid worst runs/tank/bundle --like tank-random --seeds 1000:1999 --output h2 --keep 100 "
+    "--into datasets/found"
 )
 def worst(
     bundle: Annotated[Path, typer.Argument(help="Folder or zip of an exported model or cascade.")],
