@@ -222,7 +222,7 @@ def _levels(p, is_sum):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def from_a_line(size):
-    """Zeros from the beginning of a line of the cache on, which is as wide as a block of eight: no block lies in two."""
+    """Zeros from the beginning of a line of the cache on, which is as wide as a block: no block lies in two."""
     room = np.zeros(size + LANES)
     skipped = (LANES - (room.ctypes.data // room.itemsize) % LANES) % LANES
     return room[skipped : skipped + size]
