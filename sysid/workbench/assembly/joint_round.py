@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from sysid.estimation import CascadeFit, JointTraining, fit_cascade
+from sysid.estimation.joint import NEGLIGIBLE
 from sysid.models import Cascade, Ends
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.everywhere import Everywhere
-from sysid.workbench.assembly.members import placed_outputs, seen_from, whole_score
+from sysid.workbench.assembly.members import free_runs, mean_squares, placed_outputs, seen_from
 from sysid.workbench.assembly.stage_config import TogetherConfig
 from sysid.workbench.assembly.stages import Report
 
@@ -114,8 +115,10 @@ class JointRound:
         """
         models = tuple(whole.member(Ends.of(model).outputs[0]) for model in self.part.models)
         ones = np.array(list(self.targets.values()))
-        score = whole_score(replace(self.part, models=models), self.selection, list(self.targets))
-        return score / float(np.exp(np.mean(np.log(ones**2))))
+        runs = free_runs(replace(self.part, models=models), self.selection, list(self.targets))
+        squares = mean_squares(runs, self.selection, list(self.targets)) / ones**2
+        # As in the fit: a target that is met exactly, such as a switch that never moves, must not outweigh all others.
+        return float(np.exp(np.mean(np.log(np.maximum(squares, NEGLIGIBLE)))))
 
     def fit(self, report: Report) -> CascadeFit:
         """Train it.

@@ -245,6 +245,27 @@ def free_runs(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str])
         return list(pool.map(one, traces))
 
 
+def mean_squares(
+    runs: Sequence[NDArray[np.float64]], traces: Sequence[Trace], outputs: Sequence[str]
+) -> NDArray[np.float64]:
+    """Errors of some free runs.
+
+    Args:
+        runs: Of each trace an array of shape ``(n_samples, n_outputs)``.
+        traces: The traces.
+        outputs: The outputs.
+
+    Returns:
+        Mean squared error of each output on each trace, shape ``(n_traces, n_outputs)``.
+    """
+    return np.array(
+        [
+            np.mean((run - trace.columns(outputs))[trace.usable_samples] ** 2, axis=0)
+            for run, trace in zip(runs, traces, strict=True)
+        ]
+    )
+
+
 def score_of(runs: Sequence[NDArray[np.float64]], traces: Sequence[Trace], outputs: Sequence[str]) -> float:
     """How good some free runs are.
 
@@ -256,11 +277,8 @@ def score_of(runs: Sequence[NDArray[np.float64]], traces: Sequence[Trace], outpu
     Returns:
         Geometric mean over traces and outputs of the mean squared error.
     """
-    errors = [
-        np.mean((run - trace.columns(outputs))[trace.usable_samples] ** 2, axis=0)
-        for run, trace in zip(runs, traces, strict=True)
-    ]
-    return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+    errors = np.maximum(mean_squares(runs, traces, outputs), np.finfo(np.float64).tiny)
+    return float(np.exp(np.mean(np.log(errors))))
 
 
 def whole_score(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -109,6 +110,21 @@ def test_its_error_is_that_by_which_it_chooses_among_its_states() -> None:
     chosen, others = fit.notes
     assert chosen.endswith(f"on the selection traces {end:.4g}.")
     assert f" {start:.4g} (0)" in others
+
+
+def test_a_target_that_is_met_exactly_does_not_outweigh_the_others() -> None:
+    own = service().simulate(command(120, 1, 0))
+    exact = replace(record(), values=np.where(np.array(record().channel_names) == "BC", record().values, own.values))
+    ready = JointRound.of(
+        CONFIG,
+        TogetherConfig.model_validate({"targets": {"AR": 0.5, "BC": 2.0}, "training": {"max_iterations": 1}}),
+        service(),
+        estimation=[record()],
+        selection=[exact],
+    )
+    start = ready.error(ready.whole)
+    assert start == pytest.approx(np.sqrt(1e-6 * np.mean((own["BC"] - exact["BC"]) ** 2) / 2.0**2))
+    assert any(f"{start:.4g}" in said for said in ready.fit(lambda _: None).notes)
 
 
 def test_members_that_are_named_are_the_ones_trained(monkeypatch: pytest.MonkeyPatch) -> None:
