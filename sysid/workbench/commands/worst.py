@@ -62,7 +62,7 @@ def worst_command(
     )
     words = ["sysid", "worst", str(bundle), "--like", like, *(["--case", case] if case else []), "--seeds", seeds]
     command = shlex.join([*words, "--output", output, "--keep", str(keep), "--into", str(into)])
-    text = kept_text(sequences, kept, name=into.name, description=said)
+    text = kept_text(sequences, kept, name=into.resolve().name, description=said)
     write_bytes(file, f"# Made by:  {command}\n{text}".encode())
     figures = ", ".join(f"{100 * q:g} % at most {np.quantile(errors, q):.3g}" for q in QUANTILES)
     out = console()
