@@ -57,10 +57,7 @@ def drawn(like: DatasetDescription, case: str | None, seeds: Sequence[int], *, w
             got=f"{count} seeds" if count else "a recipe without a seed" if recipe else "a case out of a file",
             remedy="name a case of random sequences",
         )
-    cases = {
-        f"N{seed}": CaseDescription(role=Role.VALIDATION, recipe=_with_seed(recipe, seed))
-        for seed in seeds
-    }  # fmt: skip
+    cases = {f"N{seed}": CaseDescription(role=Role.VALIDATION, recipe=_with_seed(recipe, seed)) for seed in seeds}
     return like.model_copy(update={"cases": cases})
 
 

@@ -22,9 +22,7 @@ from sysid.workbench.worst import Kept, drawn, errors_of, kept_text
 QUANTILES = (0.5, 0.9, 0.99)
 
 
-def worst_command(
-    bundle: Path, *, like: str, case: str | None, seeds: str, output: str, keep: int, into: Path
-) -> None:  # fmt: skip
+def worst_command(bundle: Path, *, like: str, case: str | None, seeds: str, output: str, keep: int, into: Path) -> None:
     """Run a surrogate beside the reference on new sequences, and write those that it is worst at as a data set.
 
     Args:
@@ -70,9 +68,7 @@ def worst_command(
     out.print(f"{keep} of them, from {np.sort(errors)[-keep]:.3g} {unit} on, kept in {file}", soft_wrap=True)
 
 
-def _searched(
-    surrogate: Bundle, sequences: DatasetDescription, output: str, source: Path
-) -> NDArray[np.float64]:  # fmt: skip
+def _searched(surrogate: Bundle, sequences: DatasetDescription, output: str, source: Path) -> NDArray[np.float64]:
     screen, step = Screen(console()), "Running the surrogate beside the reference"
     screen(events.StepStarted(step=step))
     try:
