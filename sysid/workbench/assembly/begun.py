@@ -12,8 +12,9 @@ from pathlib import Path
 from sysid.errors import ConfigError
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.known import known_model
+from sysid.workbench.assembly.member_config import MemberConfig
 from sysid.workbench.assembly.members import placed, placed_name, wired
 
 

@@ -7,143 +7,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from sysid.errors import ConfigError
-from sysid.estimation import Training
-from sysid.models import NARX
 from sysid.workbench.assembly.extending import extending_schema
-from sysid.workbench.assembly.stage_config import GrowConfig, RetrainConfig, TogetherConfig
+from sysid.workbench.assembly.member_config import KnownConfig, MemberConfig, StandingConfig
+from sysid.workbench.assembly.stage_config import (
+    GrowConfig,
+    LessonsConfig,
+    OneStepConfig,
+    RetrainConfig,
+    TogetherConfig,
+)
 from sysid.workbench.config import ExportConfig
-from sysid.workbench.fields import STRICT, MappingField, StructureField, TrainingConfig, as_field_error
-from sysid.workbench.naming import slug
+from sysid.workbench.fields import STRICT
 from sysid.yaml_files import FieldError
-
-
-class StandingConfig(BaseModel):
-    """What stands in one place or in several.
-
-    Args:
-        mapping: Inputs and output, such as ``BP+AR -> BC``; in the first place as they are.
-        places: Suffixes of the channel names, one for each place where it stands: ``["", "10"]`` puts it at
-            ``BP -> AR`` and ``BP10 -> AR10``.
-        shared: Inputs that have the same name in every place.
-    """
-
-    model_config = STRICT
-
-    mapping: MappingField
-    places: Annotated[tuple[str, ...], Field(min_length=1)] = ("",)
-    shared: tuple[str, ...] = ()
-
-
-class MemberConfig(StandingConfig):
-    """One member, fitted on traces of all its places.
-
-    Args:
-        structure: What is fitted, with its ``kind``.
-        training: How a network is trained.
-        rest: The output at rest, in its unit.
-        candidates: Fits from different seeds, among which the whole chooses.
-        traces: Estimation traces that it is fitted on, the first so many; all by default.
-    """
-
-    structure: StructureField
-    training: TrainingConfig | None = None
-    rest: float
-    candidates: int = Field(default=1, ge=1)
-    traces: int | None = Field(default=None, ge=1)
-
-    @property
-    def slug(self) -> str:
-        """Name of its folder."""
-        return slug(str(self.mapping))
-
-    @model_validator(mode="after")
-    def _check(self) -> MemberConfig:
-        if not isinstance(self.structure, NARX):
-            raise FieldError(
-                f"{self.mapping} is {self.structure.kind}",
-                expected="NARX; 0 neurons make it linear",
-                got=self.structure.kind,
-                remedy="write structure: {kind: NARX, ...}",
-            )
-        try:
-            self.structure.lags(len(self.mapping.inputs))
-            self.training_options(seed=0)
-        except ConfigError as error:
-            raise as_field_error(error) from error
-        return self
-
-    def training_options(self, seed: int) -> Training:
-        """The options of the training, with a seed where none is named.
-
-        Args:
-            seed: The seed.
-
-        Returns:
-            The options.
-        """
-        given = {} if self.training is None else {n: getattr(self.training, n) for n in self.training.model_fields_set}
-        return Training(**{"seed": seed, **given})
-
-
-class KnownConfig(StandingConfig):
-    """A member that is declared and not fitted: a weighted sum of its inputs, held between two bounds.
-
-    Args:
-        gains: The weight of each input, in the output's unit per the input's, or its weights by lag (``{0: 2, 1: -1}``
-            looks one sample ahead); under the output's own name the weight of its last value: 1 sums up, more is a
-            relay with hysteresis.
-        constant: What is added, in the output's unit.
-        low: Least value.
-        high: Greatest value.
-        rest: Value at rest.
-        unit: Of the output; a pure number by default.
-    """
-
-    gains: dict[str, float | Annotated[dict[Annotated[int, Field(ge=0)], float], Field(min_length=1)]]
-    constant: float = 0.0
-    low: float
-    high: float
-    rest: float
-    unit: str = "1"
-
-    @model_validator(mode="after")
-    def _check(self) -> KnownConfig:
-        if set(self.gains) - {self.mapping.output} != set(self.mapping.inputs):
-            raise FieldError(
-                f"the gains of {self.mapping} are not those of its inputs",
-                expected=f"one for each of {', '.join(self.mapping.inputs)}, with or without {self.mapping.output}",
-                got=", ".join(self.gains) or "none",
-                remedy="correct the gains or the mapping",
-            )
-        own = self.gains.get(self.mapping.output, 0.0)
-        if isinstance(own, dict):
-            raise FieldError(
-                f"{self.mapping.output} has weights by lag for its own past",
-                expected="one number, the weight of its last value",
-                got=", ".join(f"{lag}: {weight:g}" for lag, weight in own.items()),
-                remedy="write the weight of its last value",
-            )
-        if not self.low <= self.rest <= self.high or self.low == self.high:
-            raise FieldError(
-                f"the bounds of {self.mapping.output} do not hold its rest",
-                expected="low at most rest, rest at most high, low below high",
-                got=f"low {self.low:g}, rest {self.rest:g}, high {self.high:g}",
-                remedy="correct the bounds",
-            )
-        return self
-
-    @property
-    def weights(self) -> tuple[dict[int, float], ...]:
-        """For each input its weights by lag."""
-        given = (self.gains[name] for name in self.mapping.inputs)
-        return tuple(one if isinstance(one, dict) else {0: one} for one in given)
-
-    @property
-    def memory(self) -> float:
-        """The weight of its own last value."""
-        own = self.gains.get(self.mapping.output, 0.0)
-        return 0.0 if isinstance(own, dict) else own
 
 
 class LimitConfig(BaseModel):
@@ -256,12 +131,16 @@ class AssemblyConfig(BaseModel):
             members would be fitted, and ``together`` trains them on.
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
         limits: Limits of outputs; in its other places a member has those of its first, unless they have their own.
+        one_step: Each candidate fitted one step ahead as well, to see what becomes of it in free run.
         retrain: Members to train again on what the others put out.
         grow: Growing the training data by what the whole is worst at.
         together: Training end to end.
         line: Places between those that are modelled.
         stress: Random sequences on which the whole has to hold.
         published: Published figures by output.
+        published_models: A table of ``reports/published`` with models of single members: where it has one of the same
+            mapping and structure as a candidate, its figures stand beside the candidate's.
+        lessons: What was published on the lessons that the stages put to the test.
         seed: Seed of everything random.
         starts: How often all of it is trained, each time from other seeds; the best on the selection traces is taken.
         committee: Of how many starts the surrogate may be the mean: the best one, and others as long as the mean does
@@ -286,12 +165,15 @@ class AssemblyConfig(BaseModel):
     begin: str | None = None
     rest: dict[str, float | str] = Field(default_factory=dict)
     limits: dict[str, LimitConfig] = Field(default_factory=dict)
+    one_step: OneStepConfig | None = None
     retrain: RetrainConfig | None = None
     grow: GrowConfig | None = None
     together: TogetherConfig | None = None
     line: LineConfig | None = None
     stress: StressConfig | None = None
     published: dict[str, PublishedConfig] = Field(default_factory=dict)
+    published_models: str | None = None
+    lessons: LessonsConfig = LessonsConfig()
     seed: int = Field(default=0, ge=0)
     starts: int = Field(default=1, ge=1)
     committee: int = Field(default=1, ge=1)
@@ -333,6 +215,8 @@ class AssemblyConfig(BaseModel):
             return self
         fitted = {
             "candidates": any(member.candidates > 1 for member in self.members),
+            "alternatives": any(member.alternatives for member in self.members),
+            "one_step": self.one_step is not None,
             "retrain": self.retrain is not None,
             "grow": self.grow is not None,
             "starts": self.starts > 1,

@@ -6,9 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from typing import Any
-
-import numpy as np
 
 from sysid.estimation import CascadeFit
 from sysid.estimation.result import Status
@@ -16,17 +13,15 @@ from sysid.models import Cascade, NARXModel
 from sysid.traces import Trace
 from sysid.workbench import events
 from sysid.workbench.assembly.begun import begun, read_whole
-from sysid.workbench.assembly.config import MemberConfig
+from sysid.workbench.assembly.candidates import Candidates, fit_candidates
 from sysid.workbench.assembly.context import CODE, Context
 from sysid.workbench.assembly.growth import Growth, Round, grow
 from sysid.workbench.assembly.joint_round import JointRound
-from sysid.workbench.assembly.known import known_model
 from sysid.workbench.assembly.material import Material
-from sysid.workbench.assembly.members import Members, assembled, dealt, own_traces, whole_score
+from sysid.workbench.assembly.member_config import MemberConfig
+from sysid.workbench.assembly.members import Members, assembled, dealt, whole_score
 from sysid.workbench.assembly.rounds import RoundDone
 from sysid.workbench.assembly.stages import (
-    choose_together,
-    fit_member,
     model_of,
     reading_more,
     retrain,
@@ -35,6 +30,7 @@ from sysid.workbench.record import is_final
 from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
 
 BEGUN = "as it was begun from"
+ONE_STEP = "each alone, one step ahead"
 ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
 GROWN, TOGETHER = "grown", "trained end to end"
 
@@ -48,6 +44,7 @@ class Course:
         material: What it is trained on.
         notes: Sentences on how it came about, but for the rounds of training end to end.
         stages: The whole after each stage.
+        candidates: The members' candidates, unless the whole was begun from another one.
         growth: What growing the training data brought, where it was asked for.
         rounds: The rounds of training end to end.
     """
@@ -56,6 +53,7 @@ class Course:
     material: Material
     notes: list[str] = field(default_factory=list)
     stages: dict[str, Cascade] = field(default_factory=dict)
+    candidates: list[Candidates] = field(default_factory=list)
     growth: list[Growth] = field(default_factory=list)
     rounds: list[RoundDone] = field(default_factory=list)
 
@@ -75,61 +73,16 @@ class Course:
 
     def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
         """Every member's candidates; the best of each alone, and those that are best together."""
-        candidates, alone, keys = {}, {}, []
-        for member in self.context.config.members:
-            fits = []
-            # Not all of the traces: what is declared beside a member leaves its fit as it was.
-            own = (*own_traces(member, estimation[: member.traces]), *own_traces(member, selection))
-            data = [trace.digest for trace in own]
-            for number in range(member.candidates):
-                seed = self.context.config.seed + 1000 * number
-                fit, key = self.context.fit(
-                    f"{member.slug}-{number}",
-                    f"Fitting {member.mapping}, candidate {number + 1} of {member.candidates}",
-                    {"member": member.model_dump(mode="json", exclude={"candidates"}), "seed": seed, "data": data},
-                    partial(fit_member, member, estimation, selection, seed=seed),
-                )
-                fits.append(model_of(fit))
-                keys.append(key)
-            candidates[member.mapping.output] = fits
-            alone[member.mapping.output] = int(np.argmin([self._alone(member, fit, selection) for fit in fits]))
-        for known in self.context.config.known:
-            candidates[known.mapping.output] = [known_model(known, estimation[0])]
-            alone[known.mapping.output] = 0
-        self.stages[ALONE] = assembled(
-            self.context.config, {name: models[alone[name]] for name, models in candidates.items()}
-        )
-        if max(map(len, candidates.values())) > 1:
-            step = self.context.titled("Choosing the members by the error of the whole")
-            self.context.tell(events.StepStarted(step=step))
-            choice = choose_together(
-                self.context.config,
-                candidates,
-                alone,
-                selection,
-                report=lambda text: self.context.tell(events.StepProgress(step=step, fraction=None, detail=text)),
-            )
-            self.context.tell(
-                events.StepDone(step=step, stored=False, detail=f"{choice.tried} wholes, best {choice.score:.3g}")
-            )
-            changed = [name for name in alone if choice.members[name] != alone[name]]
-            self.notes.append(
-                f"Of {choice.tried} wholes tried, the best has another {', '.join(changed)} than the best alone."
-                if changed
-                else f"Of {choice.tried} wholes tried, none beats the one of the members that are best alone."
-            )
-            alone = choice.members
-            self.stages[CHOSEN] = assembled(
-                self.context.config, {name: models[alone[name]] for name, models in candidates.items()}
-            )
-        return {name: models[alone[name]] for name, models in candidates.items()}, digest(strict([keys, alone]))
-
-    def _alone(self, member: MemberConfig, model: Any, selection: Sequence[Trace]) -> float:
-        errors = [
-            float(np.mean((model.simulate(t.columns(model.mapping.inputs)) - t[model.mapping.output]) ** 2))
-            for t in own_traces(member, selection)
-        ]
-        return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+        config = self.context.config
+        found = fit_candidates(self.context, estimation, selection)
+        self.candidates.append(found)
+        if found.one_step is not None:
+            self.stages[ONE_STEP] = assembled(config, found.one_step)
+        self.stages[ALONE] = assembled(config, found.models(found.alone))
+        if found.choice is not None:
+            self.notes.append(found.sentence)
+            self.stages[CHOSEN] = assembled(config, found.models(found.chosen))
+        return found.models(found.chosen), found.key
 
     def _retrained(
         self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]

@@ -10,12 +10,15 @@ import numpy as np
 
 from sysid.models import Cascade
 from sysid.reporting.numbers import number, quantity, seconds
+from sysid.reporting.published import read_published
 from sysid.reporting.thinning import thin
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.growth import Growth
+from sysid.workbench.assembly.lessons import Lesson, lessons_point, lessons_table
 from sysid.workbench.assembly.limit_check import LimitCheck
 from sysid.workbench.assembly.line import LineScores
+from sysid.workbench.assembly.member_scores import MemberScores, member_tables
 from sysid.workbench.assembly.rounds import RoundDone, rounds_table
 from sysid.workbench.assembly.stress import Stress
 from sysid.workbench.assembly.views import (
@@ -63,6 +66,8 @@ class Outcome:
         growth: What growing the training data brought, if it was asked for.
         line: How the places do between those that are modelled, if they were asked for.
         exported: The bundle, if one was asked for.
+        members: The members' candidates by themselves, where there are several or they were fitted one step ahead too.
+        lessons: What the stages say of lessons of modelling by parts.
     """
 
     whole: Cascade
@@ -79,6 +84,8 @@ class Outcome:
     growth: Sequence[Growth] = ()
     line: LineScores | None = None
     exported: Bundle | None = None
+    members: Sequence[MemberScores] = ()
+    lessons: Sequence[Lesson] = ()
 
 
 def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
@@ -124,6 +131,10 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
 def _tables(config: AssemblyConfig, found: Outcome) -> list[dict[str, Any]]:
     """The stages first, then how they came about, and what else the whole was put to."""
     tables = [_stage_table(config, name, found) for name in config.outputs]
+    if found.lessons:
+        tables.append(lessons_table(found.lessons))
+    published = None if config.published_models is None else read_published(config.published_models)
+    tables += [table for one in found.members for table in member_tables(one, published)]
     if found.rounds:
         tables.append(rounds_table(found.rounds))
     if found.line is not None:
@@ -167,6 +178,7 @@ def _points(config: AssemblyConfig, found: Outcome) -> list[tuple[str, str]]:
             f"A free run of {quantity(lengths[slow], 's')} ({slow}) takes {seconds(found.timing[slow])} on one core.",
         )
     )
+    points += [lessons_point(found.lessons)] if found.lessons else []
     points += [line_point(found.line)] if found.line else []
     stressed = found.stressed
     if stressed is not None:

@@ -21,8 +21,10 @@ from sysid.workbench import events
 from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.document import SELECTION, Outcome, document
+from sysid.workbench.assembly.lessons import lessons_of
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.material import Material
+from sysid.workbench.assembly.member_scores import score_candidates
 from sysid.workbench.assembly.members import whole_score, written
 from sysid.workbench.assembly.starts import Trained
 from sysid.workbench.assembly.stress import Stress, stress
@@ -73,12 +75,15 @@ class Finish:
         stressed, worst = self._stressed(whole)
         line = self._line(whole)
         exported = self._export(whole, cases, evaluate_cascade(whole, cases), material)
+        candidates = self.trained.candidates
+        members = [] if candidates is None else score_candidates(candidates, tuple(cases))
         said = document(
             config,
             Outcome(
                 whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.trained.notes,
                 rounds=self.trained.rounds, timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst,
                 line=line, growth=self.trained.growth, exported=exported, limits=material.limits,
+                members=members, lessons=lessons_of(scores, members, cases, config.lessons),
             ),
         )  # fmt: skip
         results = JudgementResults(

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from sysid.models import Cascade, NARXModel
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.member_config import MemberConfig
 from sysid.workbench.assembly.members import Members, assembled, whole_score
 from sysid.workbench.assembly.stage_config import GrowConfig
 

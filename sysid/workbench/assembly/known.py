@@ -28,7 +28,7 @@ import numpy as np
 
 from sysid.models import NARX, Cascade, NARXModel, Scaling
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.config import KnownConfig
+from sysid.workbench.assembly.member_config import KnownConfig
 from sysid.workbench.assembly.members import bounds_of, placed, placed_outputs
 
 

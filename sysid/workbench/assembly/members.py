@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from sysid.models import Cascade, Ends, Limit, Mapping, NARXModel
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig, KnownConfig, MemberConfig, StandingConfig
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.member_config import KnownConfig, MemberConfig, StandingConfig
 
 _T = TypeVar("_T")
 

@@ -6,9 +6,10 @@ import numpy as np
 
 from sysid.models import NARX, NARXModel, Scaling, parameter_count
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.everywhere import Everywhere
 from sysid.workbench.assembly.known import known_model
+from sysid.workbench.assembly.member_config import MemberConfig
 from sysid.workbench.assembly.members import assembled
 from sysid.workbench.assembly.stages import reading_more
 

@@ -9,6 +9,7 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.models import Cascade, cascade_from_dict
 from sysid.reporting.judgement_report import JudgementResults
+from sysid.reporting.published import read_published
 from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
@@ -81,6 +82,8 @@ def _run(context: Context) -> tuple[JudgementResults, Path]:
     """Every step, in order; the results and the page."""
     context.joined.keep(context.store.path)
     write_json(context.store.path / "environment.json", environment())
+    if context.config.published_models is not None:
+        read_published(context.config.published_models)  # a wrong name is said now, not when all is trained
     cases, material = context.load(context.config.data), Material.of(context)
     finish = Finish(context=context, trained=train(context, material))
     results = finish.results(cases, material)

@@ -1,4 +1,4 @@
-"""What a pipeline asks of each stage of an assembly's training: retraining, growing, training end to end."""
+"""What a pipeline asks of each stage of an assembly's training: one step ahead, retraining, growing, end to end."""
 
 from __future__ import annotations
 
@@ -9,6 +9,38 @@ from pydantic import BaseModel, Field, model_validator
 from sysid.estimation import JointTraining
 from sysid.workbench.fields import STRICT, JointConfig, LagsField
 from sysid.yaml_files import FieldError
+
+
+class OneStepConfig(BaseModel):
+    """Each candidate fitted one step ahead as well: with the same lags and neurons, on measured past output.
+
+    Args:
+        max_iterations: Of each training.
+        starts: Random starts of each training.
+    """
+
+    model_config = STRICT
+
+    max_iterations: int = Field(default=200, ge=1)
+    starts: int = Field(default=2, ge=1)
+
+
+class LessonsConfig(BaseModel):
+    """What was published on each of the lessons that the stages of an assembly put to the test; words for the report.
+
+    Args:
+        closing: On a network that was fitted one step ahead, in free run.
+        together: On members that are the best alone, as a whole.
+        retraining: On members that are trained again on what the others put out.
+        end_to_end: On a whole that is trained as one.
+    """
+
+    model_config = STRICT
+
+    closing: str = ""
+    together: str = ""
+    retraining: str = ""
+    end_to_end: str = ""
 
 
 class RetrainConfig(BaseModel):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +17,11 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, fit_narx
 from sysid.estimation.growing import grown, widened
 from sysid.estimation.initialise import Layout
-from sysid.estimation.result import Status
+from sysid.estimation.result import Loop, Status
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig, MemberConfig
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.member_config import MemberConfig
 from sysid.workbench.assembly.members import (
     Members,
     assembled,
@@ -27,6 +29,8 @@ from sysid.workbench.assembly.members import (
     simulated_inputs,
     whole_score,
 )
+from sysid.workbench.assembly.stage_config import OneStepConfig
+from sysid.workbench.fields import TrainingConfig
 
 Report = Callable[[FitProgress], None]
 SWEEPS = 3
@@ -73,6 +77,36 @@ def fit_member(
         initial=initial,
         on_progress=report,
     )
+
+
+def fit_one_step(
+    member: MemberConfig,
+    asked: OneStepConfig,
+    traces: Sequence[Trace],
+    selection: Sequence[Trace],
+    report: Report,
+    *,
+    seed: int,
+) -> FitResult:
+    """Fit one member alone, one step ahead.
+
+    Args:
+        member: The member.
+        asked: How.
+        traces: Traces of the whole to fit.
+        selection: Traces of the whole that choose between its starts, by their error one step ahead.
+        report: Told after every iteration.
+        seed: Of its first start.
+
+    Returns:
+        The fit, over the names of its first place.
+    """
+    options: dict[str, Any] = {"loop": Loop.OPEN, "max_iterations": asked.max_iterations, "starts": asked.starts}
+    given = member.training
+    if given is not None:
+        options |= {name: getattr(given, name) for name in ("workers", "stride") if name in given.model_fields_set}
+    training = TrainingConfig(**options)
+    return fit_member(member.model_copy(update={"training": training}), traces, selection, report, seed=seed)
 
 
 def model_of(fit: FitResult) -> NARXModel:
@@ -165,6 +199,7 @@ def retrain(
         The fit.
     """
     name = member.mapping.output
+    member = member.of_structure(models[name].network)  # of its candidates' structures the one that was chosen
     others = assembled(config, models, without=name)
     start = FitResult(
         model=models[name], status=Status.MAX_ITERATIONS, loop=member.training_options(0).loop, history={},

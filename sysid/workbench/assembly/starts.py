@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sysid.models import Cascade, mean_of
 from sysid.traces import Trace
 from sysid.workbench import events
+from sysid.workbench.assembly.candidates import Candidates
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.course import Course
 from sysid.workbench.assembly.growth import Growth
@@ -36,12 +37,15 @@ class Trained:
     Args:
         stages: Wholes by what they are called: of one start its stages, of several each one's best, and their mean.
         notes: Sentences on how they came about, but for the rounds of training end to end.
+        candidates: The members' candidates; of several starts those of the best one; ``None`` of a whole that was begun
+            from another one.
         growth: What growing the training data brought, where it was asked for.
         rounds: The rounds of training end to end; of several starts those of the chosen ones.
     """
 
     stages: dict[str, Cascade]
     notes: tuple[str, ...]
+    candidates: Candidates | None
     growth: tuple[Growth, ...]
     rounds: tuple[RoundDone, ...]
 
@@ -63,8 +67,9 @@ def train(context: Context, material: Material) -> Trained:
     if len(courses) == 1:
         (only,) = courses
         return Trained(
-            stages=only.stages, notes=tuple(only.notes), growth=tuple(only.growth), rounds=tuple(only.rounds)
-        )
+            stages=only.stages, notes=tuple(only.notes), candidates=_candidates(only), growth=tuple(only.growth),
+            rounds=tuple(only.rounds),
+        )  # fmt: skip
     return _the_best_of(courses, context, material)
 
 
@@ -95,7 +100,14 @@ def _the_best_of(courses: Sequence[Course], context: Context, material: Material
         f"Start {index + 1}, {note[:1].lower()}{note[1:]}" for index in sorted(chosen) for note in courses[index].notes
     ]
     rounds = tuple(one for index in sorted(chosen) for one in courses[index].rounds)
-    return Trained(stages=stages, notes=tuple(notes), growth=tuple(courses[chosen[0]].growth), rounds=rounds)
+    first = courses[chosen[0]]
+    return Trained(
+        stages=stages, notes=tuple(notes), candidates=_candidates(first), growth=tuple(first.growth), rounds=rounds
+    )
+
+
+def _candidates(course: Course) -> Candidates | None:
+    return course.candidates[0] if course.candidates else None
 
 
 def committee(wholes: Sequence[Runs], traces: Sequence[Trace], outputs: Sequence[str], most: int) -> list[int]:

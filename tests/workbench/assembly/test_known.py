@@ -13,8 +13,8 @@ from numpy.testing import assert_allclose
 from sysid.errors import ConfigError
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.config import KnownConfig
 from sysid.workbench.assembly.known import known_model, with_known
+from sysid.workbench.assembly.member_config import KnownConfig
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.kinds import RunRequest
 from sysid.yaml_files import check, parse_yaml

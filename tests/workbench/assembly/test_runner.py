@@ -37,7 +37,7 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
     assert results is not None
     stages = [subject.name for subject in results.subjects]
     assert stages == ["each alone", "chosen together", "retrained", "trained end to end"]
-    upper, lower, rounds, stress, timing = results.judgement.tables
+    upper, lower, lessons, alone, rounds, stress, timing = results.judgement.tables
     assert [row[0] for row in lower.rows if str(row[0]).removesuffix(" (chosen)") in stages] == [
         row[0] for row in upper.rows
     ]
@@ -45,6 +45,12 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
         ["Table 1", None, None, None, 0.4, None],
         ["aimed at: 0.5 of it", None, None, None, 0.2, None],
     ]
+    assert [row[0] for row in lessons.rows if row[0]] == [
+        "The members that are best alone are not the best together",
+        "Training members again on what the others put out helps",
+        "Training the whole as one goes further than its parts",
+    ]
+    assert alone.caption.startswith("pump+lower -> upper by itself")
     assert [row[0] for row in rounds.rows] == ["1"]
     assert any("diverged" in str(row[0]) for row in stress.rows)
     assert len(timing.rows) == 4
