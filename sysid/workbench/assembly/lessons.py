@@ -198,4 +198,4 @@ def lessons_point(lessons: Sequence[Lesson]) -> tuple[str, str]:
     Returns:
         Keyword and sentence.
     """
-    return "Lessons", f"{'; '.join(f'{one.claim[0].lower()}{one.claim[1:]}: {one.verdict}' for one in lessons)}."
+    return "Lessons", " ".join(f"{one.claim}: {one.verdict}." for one in lessons)

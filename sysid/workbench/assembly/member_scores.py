@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import statistics
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models import NARXModel
-from sysid.reporting.published import PublishedFigure, PublishedTable
+from sysid.reporting.published import PublishedTable
 from sysid.traces import Trace
 from sysid.workbench.assembly.candidates import Candidate, Candidates
 from sysid.workbench.assembly.members import in_place
 
+REPEATS = 5
+"""Free runs that are timed."""
 Errors = Mapping[str, float]
 """Mean squared error by case, in the output's unit squared."""
 
@@ -28,6 +32,7 @@ class CandidateScores:
         best: Whether it is the best by itself, on the selection traces.
         chosen: Whether the whole has it.
         free_run: Errors of the free run.
+        run_time: Seconds of the free run by case, compiled, on one core.
         one_step: Errors one step ahead of the same structure fitted so; ``None`` where it was not.
         closed: Errors of that fit's free run.
     """
@@ -36,6 +41,7 @@ class CandidateScores:
     best: bool
     chosen: bool
     free_run: Errors
+    run_time: Mapping[str, float]
     one_step: Errors | None
     closed: Errors | None
 
@@ -60,6 +66,11 @@ class MemberScores:
     mapping: str
     unit: str
     candidates: tuple[CandidateScores, ...]
+
+    @property
+    def cases(self) -> tuple[str, ...]:
+        """The scored cases."""
+        return tuple(self.candidates[0].free_run)
 
     @property
     def best(self) -> CandidateScores:
@@ -95,6 +106,7 @@ def score_candidates(found: Candidates, cases: Sequence[Trace]) -> list[MemberSc
                         best=index == found.alone[name],
                         chosen=index == found.chosen[name],
                         free_run=_errors(fit.model, by_case, _free_run),
+                        run_time={case: _seconds(fit.model, trace) for case, trace in by_case.items()},
                         one_step=None if fit.one_step is None else _errors(fit.one_step, by_case, _one_step),
                         closed=None if fit.one_step is None else _errors(fit.one_step, by_case, _free_run),
                     )
@@ -123,6 +135,16 @@ def _errors(
     return found
 
 
+def _seconds(model: NARXModel, trace: Trace) -> float:
+    """Median over some free runs after one that is not counted."""
+    taken = []
+    for _ in range(1 + REPEATS):
+        began = time.perf_counter()
+        _free_run(model, trace)
+        taken.append(time.perf_counter() - began)
+    return statistics.median(taken[1:])
+
+
 def member_tables(scored: MemberScores, published: PublishedTable | None) -> list[dict[str, Any]]:
     """A member's candidates beside each other, and beside published models of the same structure.
 
@@ -131,38 +153,66 @@ def member_tables(scored: MemberScores, published: PublishedTable | None) -> lis
         published: Published models.
 
     Returns:
-        One table of free runs, and one of fits one step ahead where there are such.
+        One table of free runs; of fits one step ahead where there are such, and of run times where such are published.
     """
-    free, other = list[list[Any]](), list[list[Any]]()
-    for index, one in enumerate(scored.candidates):
-        label = one.candidate.member.structure.label
-        last = all(label != later.candidate.member.structure.label for later in scored.candidates[index + 1 :])
-        ask = _Asked(scored, published if last else None, label, tuple(one.free_run))
-        free += [[one.name, *one.free_run.values(), one.candidate.error], *ask.rows("free_run", "closed", [None])]
-        if one.one_step is not None and one.closed is not None:
-            bare = f"{label}, seed {one.candidate.seed}"
-            other += [[f"{bare}: one step ahead", *one.one_step.values()], *ask.rows("one_step", "open", [])]
-            other += [[f"{bare}: in free run", *one.closed.values()], *ask.rows("free_run", "open", [])]
-    cases = [(case, "") for case in scored.candidates[0].free_run]
-    tables = [
-        {
-            "caption": f"{scored.mapping} by itself, behind measured inputs: mean squared error of the free run "
-            f"[{scored.unit}²]",
-            "head": [("Candidate", ""), *cases, ("Selection", "geometric mean")],
-            "rows": free,
-            "note": "The selection traces alone say which is the best, and which the whole has.",
-        }
-    ]
-    if other:
-        tables.append(
-            {
-                "caption": f"{scored.mapping} by itself, fitted one step ahead: mean squared error [{scored.unit}²]",
-                "head": [("Candidate", ""), *cases],
-                "rows": other,
-                "note": "One step ahead the past output is the measured one, in free run the network's own.",
-            }
-        )
-    return tables
+    asked = [_Asked(scored, published, one.candidate.member.structure.label) for one in scored.candidates]
+    # What is published of a structure stands behind the last of its seeds.
+    last = [all(one.label != later.label for later in asked[index + 1 :]) for index, one in enumerate(asked)]
+    rows = list(zip(scored.candidates, asked, last, strict=True))
+    found = [_free_table(scored, rows), _one_step_table(scored, rows), _time_table(scored, rows)]
+    return [table for table in found if table is not None]
+
+
+def _free_table(scored: MemberScores, rows: Rows) -> dict[str, Any]:
+    said = list[list[Any]]()
+    for one, asked, last in rows:
+        said.append([one.name, *one.free_run.values(), one.candidate.error])
+        said += asked.errors("free_run", "closed", [None]) if last else []
+    return {
+        "caption": f"{scored.mapping} by itself, behind measured inputs: mean squared error of the free run "
+        f"[{scored.unit}²]",
+        "head": [("Candidate", ""), *((case, "") for case in scored.cases), ("Selection", "geometric mean")],
+        "rows": said,
+        "note": "The selection traces alone say which is the best, and which the whole has.",
+    }
+
+
+def _one_step_table(scored: MemberScores, rows: Rows) -> dict[str, Any] | None:
+    said = list[list[Any]]()
+    for one, asked, last in rows:
+        for how, errors, run in (
+            ("one step ahead", one.one_step, "one_step"),
+            ("in free run", one.closed, "free_run"),
+        ):
+            if errors is not None:
+                said.append([f"{asked.label}, seed {one.candidate.seed}: {how}", *errors.values()])
+                said += asked.errors(run, "open", []) if last else []
+    if not said:
+        return None
+    return {
+        "caption": f"{scored.mapping} by itself, fitted one step ahead: mean squared error [{scored.unit}²]",
+        "head": [("Candidate", ""), *((case, "") for case in scored.cases)],
+        "rows": said,
+        "note": "One step ahead the past output is the measured one, in free run the network's own.",
+    }
+
+
+def _time_table(scored: MemberScores, rows: Rows) -> dict[str, Any] | None:
+    said, published = list[list[Any]](), list[list[Any]]()
+    for one, asked, last in rows:
+        if last:
+            beside = asked.run_times()
+            published += beside
+            said += [[asked.label, *(1e3 * taken for taken in one.run_time.values())], *beside]
+    if not published:
+        return None
+    return {
+        "caption": f"{scored.mapping} by itself: run time of the free run [ms]",
+        "head": [("Structure", ""), *((case, "") for case in scored.cases)],
+        "rows": said,
+        "note": f"Compiled, on one core; median of {REPEATS} runs after one that is not counted. Published ones are of "
+        "another machine.",
+    }
 
 
 @dataclass(frozen=True)
@@ -172,26 +222,34 @@ class _Asked:
     scored: MemberScores
     published: PublishedTable | None
     label: str
-    cases: tuple[str, ...]
 
-    def rows(self, run: str, loop: str, more: list[Any]) -> list[list[Any]]:
-        """The row of what was published of such a model, or none."""
-        found = {case: figure for case in self.cases if (figure := self._figure(case, run, loop)) is not None}
+    def errors(self, run: str, loop: str, more: list[Any]) -> list[list[Any]]:
+        """The row of what was published of such a model's errors, or none."""
+        return self._row("mse", f"{self.scored.unit}^2", run, loop, more=more)
+
+    def run_times(self) -> list[list[Any]]:
+        """The row of its published run times in milliseconds, or none."""
+        return self._row("run_time", "s", "free_run", "closed", scale=1e3)
+
+    def _row(
+        self, quantity: str, unit: str, run: str, loop: str, *, scale: float = 1.0, more: Sequence[Any] = ()
+    ) -> list[list[Any]]:
+        if self.published is None:
+            return []
+        found = {}
+        for case in self.scored.cases:
+            figure = self.published.find(
+                mapping=self.scored.mapping, quantity=quantity, run=run, loop=loop, case=case, structure=self.label,
+                unit=unit,
+            )  # fmt: skip
+            if figure is not None:
+                found[case] = figure
         if not found:
             return []
         first = next(iter(found.values()))
-        values = [found[case].value if case in found else None for case in self.cases]
+        values = [scale * found[case].value if case in found else None for case in self.scored.cases]
         return [[f"{first.source}: {first.label}", *values, *more]]
 
-    def _figure(self, case: str, run: str, loop: str) -> PublishedFigure | None:
-        if self.published is None:
-            return None
-        return self.published.find(
-            mapping=self.scored.mapping,
-            quantity="mse",
-            run=run,
-            loop=loop,
-            case=case,
-            structure=self.label,
-            unit=f"{self.scored.unit}^2",
-        )
+
+Rows = Sequence[tuple[CandidateScores, _Asked, bool]]
+"""Each candidate, what was published of its structure, and whether it is the last one of it."""

@@ -46,6 +46,7 @@ source,mapping,structure,variant,loop,run,case,signal,quantity,value,unit,yardst
 Table 2,upper -> lower,NARX 2/2/2,,closed,free_run,V,,mse,0.25,cm^2,,
 Table 3,upper -> lower,NARX 2/2/2,,open,one_step,V,,mse,0.001,cm^2,,
 Table 4,upper -> lower,NARX 2/2/2,,open,free_run,V,,mse,7.5,cm^2,,
+Table 5,upper -> lower,NARX 2/2/2,,closed,free_run,V,,run_time,0.5,s,,
 """
 
 
@@ -116,6 +117,10 @@ def test_published_models_stand_beside_candidates_of_their_structure(workspace: 
     ]  # fmt: skip
     rows = found["upper -> lower by itself, fitted one step ahead"].rows
     assert [row[0] for row in rows if "Table" in str(row[0])] == ["Table 3: NARX 2/2/2", "Table 4: NARX 2/2/2"]
+    structures = found["upper -> lower by itself"].rows
+    assert [row[0] for row in structures] == ["NARX 1/1/3", "NARX 2/2/2", "Table 5: NARX 2/2/2"]
+    assert structures[-1][4] == 500.0, "in milliseconds, as ours"
+    assert not any("pump+lower -> upper by itself: run time" in name for name in found), "none is published of it"
 
 
 def test_a_wrong_name_of_published_models_is_said_before_anything_is_fitted(workspace: Path) -> None:

@@ -83,7 +83,7 @@ def test_a_lesson_holds_as_far_as_its_comparisons_do(pairs: list[tuple[float, fl
     parts = tuple(Comparison(what="ab"[i], before=b, after=a) for i, (b, a) in enumerate(pairs))
     lesson = Lesson(claim="It does", before="x", after="y", comparisons=parts, published="Table 1")
     assert lesson.verdict == verdict
-    assert lessons_point([lesson]) == ("Lessons", f"it does: {verdict}.")
+    assert lessons_point([lesson]) == ("Lessons", f"It does: {verdict}.")
 
 
 def test_the_table_has_figures_and_says_what_diverges():
