@@ -143,6 +143,28 @@ class PublishedTable:
                 return figure
         return None
 
+    def by_variant(
+        self, *, mapping: str, quantity: str, run: str, signal: str, unit: str
+    ) -> dict[str, dict[str, PublishedFigure]]:
+        """Every published model of a mapping.
+
+        Args:
+            mapping: As the table has it; blanks do not matter.
+            quantity: What is looked for, such as ``mse``.
+            run: ``one_step`` or ``free_run``.
+            signal: Which output, where a model has several.
+            unit: Unit of the figures.
+
+        Returns:
+            By where a model is printed and what it is called there (``Table 7.5: assy_1``), its figures by case.
+        """
+        found: dict[str, dict[str, PublishedFigure]] = {}
+        for one in self.figures:
+            same = (one.quantity, one.run, one.signal, one.unit) == (quantity, run, signal, unit)
+            if same and _bare(one.mapping) == _bare(mapping):
+                found.setdefault(f"{one.source}: {one.label}", {}).setdefault(one.case, one)
+        return found
+
 
 def published_names(*, workspace: Path | None = None) -> tuple[str, ...]:
     """Names of the reference tables that can be cited.

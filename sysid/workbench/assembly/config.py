@@ -140,6 +140,8 @@ class AssemblyConfig(BaseModel):
         published: Published figures by output.
         published_models: A table of ``reports/published`` with models of single members: where it has one of the same
             mapping and structure as a candidate, its figures stand beside the candidate's.
+        published_whole: What that table calls the whole, such as ``STP -> BP -> BC``: all that it has of such wholes
+            stands beside the stages.
         lessons: What was published on the lessons that the stages put to the test.
         seed: Seed of everything random.
         starts: How often all of it is trained, each time from other seeds; the best on the selection traces is taken.
@@ -173,6 +175,7 @@ class AssemblyConfig(BaseModel):
     stress: StressConfig | None = None
     published: dict[str, PublishedConfig] = Field(default_factory=dict)
     published_models: str | None = None
+    published_whole: str | None = None
     lessons: LessonsConfig = LessonsConfig()
     seed: int = Field(default=0, ge=0)
     starts: int = Field(default=1, ge=1)
@@ -206,6 +209,17 @@ class AssemblyConfig(BaseModel):
                 expected="line, or committee",
                 got=f"line, and committee: {self.committee}",
                 remedy="leave committee out: the best start is taken",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_published(self) -> AssemblyConfig:
+        if self.published_whole is not None and self.published_models is None:
+            raise FieldError(
+                "published_whole names what a table calls the whole, and no table is named",
+                expected="published_models: a table of reports/published",
+                got=f"published_whole: {self.published_whole}, and no published_models",
+                remedy="name the table, or leave published_whole out",
             )
         return self
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from sysid.models import Cascade
 from sysid.reporting.numbers import number, quantity, seconds
-from sysid.reporting.published import read_published
+from sysid.reporting.published import PublishedTable, read_published
 from sysid.reporting.thinning import thin
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
@@ -130,10 +130,10 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
 
 def _tables(config: AssemblyConfig, found: Outcome) -> list[dict[str, Any]]:
     """The stages first, then how they came about, and what else the whole was put to."""
-    tables = [_stage_table(config, name, found) for name in config.outputs]
+    published = None if config.published_models is None else read_published(config.published_models)
+    tables = [_stage_table(config, name, found, published) for name in config.outputs]
     if found.lessons:
         tables.append(lessons_table(found.lessons))
-    published = None if config.published_models is None else read_published(config.published_models)
     tables += [table for one in found.members for table in member_tables(one, published)]
     if found.rounds:
         tables.append(rounds_table(found.rounds))
@@ -221,7 +221,9 @@ def _beside(output: str, by_case: Mapping[str, float], config: AssemblyConfig) -
     return f"{output} at or below {published.source} on {below} of {len(ratios)} cases{aim}"
 
 
-def _stage_table(config: AssemblyConfig, output: str, found: Outcome) -> dict[str, Any]:
+def _stage_table(
+    config: AssemblyConfig, output: str, found: Outcome, table: PublishedTable | None = None
+) -> dict[str, Any]:
     cases = [trace.name for trace in found.cases]
     rows: list[list[Any]] = [
         [
@@ -236,6 +238,14 @@ def _stage_table(config: AssemblyConfig, output: str, found: Outcome) -> dict[st
         rows.append([published.source, *(published.mse.get(case) for case in cases), None])
         aimed = [_share(published.mse.get(case), published.target) for case in cases]
         rows.append([f"aimed at: {published.target:g} of it", *aimed, None])
+    if table is not None and config.published_whole is not None:
+        unit = f"{found.cases[0].channel(output).unit}^2"
+        wholes = table.by_variant(
+            mapping=config.published_whole, quantity="mse", run="free_run", signal=output, unit=unit
+        )
+        rows += [
+            [said, *(by[case].value if case in by else None for case in cases), None] for said, by in wholes.items()
+        ]
     return {
         "caption": f"{output}: mean squared error of the free run of the whole [{_squared(output, found)}]",
         "head": [["Stage", ""], *([case, ""] for case in cases), ["Selection", "geometric mean"]],

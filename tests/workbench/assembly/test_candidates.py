@@ -46,6 +46,8 @@ source,mapping,structure,variant,loop,run,case,signal,quantity,value,unit,yardst
 Table 2,upper -> lower,NARX 2/2/2,,closed,free_run,V,,mse,0.25,cm^2,,
 Table 3,upper -> lower,NARX 2/2/2,,open,one_step,V,,mse,0.001,cm^2,,
 Table 4,upper -> lower,NARX 2/2/2,,open,free_run,V,,mse,7.5,cm^2,,
+Table 6,pump -> upper -> lower,,first,closed,free_run,V,lower,mse,0.75,cm^2,,
+Table 6,pump -> upper -> lower,,second,closed,free_run,V,lower,mse,0.5,cm^2,,
 Table 5,upper -> lower,NARX 2/2/2,,closed,free_run,V,,run_time,0.5,s,,
 """
 
@@ -111,12 +113,17 @@ def test_published_models_stand_beside_candidates_of_their_structure(workspace: 
     (workspace / "reports" / "published").mkdir(parents=True)
     (workspace / "reports" / "published" / "tanks.yaml").write_text(PUBLISHED, encoding="utf-8")
     (workspace / "reports" / "published" / "tanks.csv").write_text(FIGURES, encoding="utf-8")
-    found = tables(run(workspace, f"{SEVERAL}{ONE_STEP}published_models: tanks\n"))
+    whole = "published_models: tanks\npublished_whole: pump -> upper->lower\n"
+    found = tables(run(workspace, f"{SEVERAL}{ONE_STEP}{whole}"))
     assert found["upper -> lower by itself, behind measured inputs"].rows[-1] == [
         "Table 2: NARX 2/2/2", None, None, None, 0.25, None,
     ]  # fmt: skip
     rows = found["upper -> lower by itself, fitted one step ahead"].rows
     assert [row[0] for row in rows if "Table" in str(row[0])] == ["Table 3: NARX 2/2/2", "Table 4: NARX 2/2/2"]
+    assert found["lower"].rows[-2:] == [
+        ["Table 6: first", None, None, None, 0.75, None],
+        ["Table 6: second", None, None, None, 0.5, None],
+    ]
     structures = found["upper -> lower by itself"].rows
     assert [row[0] for row in structures] == ["NARX 1/1/3", "NARX 2/2/2", "Table 5: NARX 2/2/2"]
     assert structures[-1][4] == 500.0, "in milliseconds, as ours"
@@ -127,6 +134,11 @@ def test_a_wrong_name_of_published_models_is_said_before_anything_is_fitted(work
     with pytest.raises(ConfigError, match="no table of published figures is called nobodys"):
         run(workspace, f"{SEVERAL}published_models: nobodys\n")
     assert not (workspace / "runs" / "tanks" / "fits").exists()
+
+
+def test_a_published_whole_needs_the_table_that_has_it(workspace: Path) -> None:
+    with pytest.raises(ConfigError, match="no table is named"):
+        run(workspace, f"{SEVERAL}published_whole: pump -> upper -> lower\n")
 
 
 def test_a_member_of_another_structure_than_its_first_is_retrained_as_it_is(workspace: Path) -> None:
