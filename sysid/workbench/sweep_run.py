@@ -22,7 +22,7 @@ from sysid.workbench.sweep import publish, strategy
 from sysid.workbench.sweep_config import WINNER, SweepConfig
 from sysid.workbench.sweep_driver import Driver
 from sysid.workbench.sweep_space import Space, parse_space
-from sysid.workbench.sweep_store import TrialStore
+from sysid.workbench.sweep_store import TRIALS, TrialStore
 from sysid.workbench.sweep_trial import Bench, train
 from sysid.workbench.sweep_workers import AbstractWorkers, LocalWorkers
 from sysid.yaml_files import check, read_yaml
@@ -197,7 +197,7 @@ class _Run:
             traces=data.traces,
             selection=data.selection,
         )
-        trials = TrialStore(path=self.store.path / "trials")
+        trials = TrialStore(path=self.store.path / TRIALS)
         if self.fresh:
             shutil.rmtree(trials.path, ignore_errors=True)
         n = self.config.method.trials or len(space.points())

@@ -11,6 +11,9 @@ from typing import Any
 
 from sysid.workbench.store import read_json, write_json
 
+TRIALS = "trials"
+"""In the folder of a sweep: its trials."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrialStore:

@@ -9,15 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from sysid.models import NARXModel
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult
+from sysid.models import Mapping, NARXModel
+from sysid.reporting.sweep_record import read_sweep
 from sysid.traces import Trace
 from sysid.workbench import events
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.known import known_model
-from sysid.workbench.assembly.member_config import MemberConfig
+from sysid.workbench.assembly.member_config import MemberConfig, SweepSource
 from sysid.workbench.assembly.members import Members, own_traces
 from sysid.workbench.assembly.stages import Choice, choose_together, fit_member, fit_one_step, model_of
 from sysid.workbench.store import digest, strict
+from sysid.workbench.sweep_store import TRIALS, TrialStore
 
 SEEDS_OF_A_CANDIDATE = 1000
 """How far the seeds of one candidate are from the next one's of the same structure."""
@@ -108,15 +112,13 @@ def fit_candidates(context: Context, estimation: Sequence[Trace], selection: Seq
         The candidates.
     """
     fits, keys = {}, list[str]()
-    for member in context.config.members:
+    asked = [(member, _asked(context, member)) for member in context.config.members]  # what cannot be had is said first
+    for member, wanted in asked:
         own = []
-        for place, variant in enumerate(member.variants):
-            for number in range(variant.candidates):
-                index = place * variant.candidates + number
-                seed = context.config.seed + SEEDS_OF_A_CANDIDATE * number
-                candidate, key = _fitted(context, variant, estimation, selection, index=index, seed=seed)
-                own.append(candidate)
-                keys.append(key)
+        for index, one in enumerate(wanted):
+            candidate, key = _fitted(context, one, index, estimation, selection)
+            own.append(candidate)
+            keys.append(key)
         fits[member.mapping.output] = tuple(own)
     known = {one.mapping.output: known_model(one, estimation[0]) for one in context.config.known}
     alone = {name: int(np.argmin([one.error for one in own])) for name, own in fits.items()}
@@ -125,37 +127,83 @@ def fit_candidates(context: Context, estimation: Sequence[Trace], selection: Seq
     return Candidates(fits=fits, known=known, alone=alone, choice=choice, key=key)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Asked:
+    """A candidate that is to be had: fitted from a seed, or given as a sweep has it."""
+
+    member: MemberConfig
+    seed: int
+    given: FitResult | None = None
+
+
+def _asked(context: Context, member: MemberConfig) -> list[_Asked]:
+    """Every candidate of a member: of each structure from each seed, and the best of its sweep."""
+    own = [
+        _Asked(member=variant, seed=context.config.seed + SEEDS_OF_A_CANDIDATE * number)
+        for variant in member.variants
+        for number in range(member.candidates)
+    ]
+    return own if member.sweep is None else [*own, *_swept(context, member, member.sweep)]
+
+
+def _swept(context: Context, member: MemberConfig, source: SweepSource) -> list[_Asked]:
+    """The best fits of a sweep, as they are."""
+    folder = (context.beside / source.run).resolve()
+    record, trials = read_sweep(folder), TrialStore(path=folder / TRIALS)
+    if Mapping.parse(record.mapping) != member.mapping:
+        raise ConfigError(
+            "the sweep is of another mapping than the member",
+            where=folder,
+            expected=str(member.mapping),
+            got=record.mapping,
+            remedy="name a sweep of the member's mapping",
+        )
+    found = list[_Asked]()
+    for trial in sorted(record.tried_in_full, key=lambda one: (record.choice(one), one.number)):
+        stored = trials.read(trial.key)
+        fit = None if stored is None else FitResult.from_dict(stored["fit"])
+        if fit is not None and isinstance(fit.model, NARXModel):
+            found.append(_Asked(member=member.of_structure(fit.model.network), seed=fit.seed or 0, given=fit))
+    if not found:
+        raise ConfigError(
+            "the sweep has no network to take",
+            where=folder,
+            expected=f"fits of {member.mapping} that were trained to the end, in {TRIALS}",
+            got=f"{len(record.trials)} trials",
+            remedy="run the sweep again: sysid sweep NAME",
+        )
+    return found[: source.keep]
+
+
 def _fitted(
-    context: Context,
-    member: MemberConfig,
-    estimation: Sequence[Trace],
-    selection: Sequence[Trace],
-    *,
-    index: int,
-    seed: int,
+    context: Context, asked: _Asked, index: int, estimation: Sequence[Trace], selection: Sequence[Trace]
 ) -> tuple[Candidate, str]:
     """One candidate, and the digest of what it depends on."""
+    member, seed, given = asked.member, asked.seed, asked.given
     # Not all of the traces: what is declared beside a member leaves its fit as it was.
     own = (*own_traces(member, estimation[: member.traces]), *own_traces(member, selection))
     terms: dict[str, Any] = {
-        "member": member.model_dump(mode="json", exclude={"candidates", "alternatives"}),
+        "member": member.model_dump(mode="json", exclude={"candidates", "alternatives", "sweep"}),
         "seed": seed,
         "data": [trace.digest for trace in own],
     }
     title = f"{member.mapping}, candidate {index + 1}, {member.structure.label}"
-    fit, key = context.fit(
-        f"{member.slug}-{index}",
-        f"Fitting {title}",
-        terms,
-        partial(fit_member, member, estimation, selection, seed=seed),
-    )
-    asked, one_step = context.config.one_step, None
-    if asked is not None:
+    if given is None:
+        fit, key = context.fit(
+            f"{member.slug}-{index}",
+            f"Fitting {title}",
+            terms,
+            partial(fit_member, member, estimation, selection, seed=seed),
+        )
+    else:
+        fit, key = given, digest(strict(given.model.to_dict()))
+    ahead, one_step = context.config.one_step, None
+    if ahead is not None:
         open_loop, _ = context.fit(
             f"{member.slug}-{index}-one-step",
             f"Fitting {title}, one step ahead",
-            terms | {"one_step": asked.model_dump(mode="json")},
-            partial(fit_one_step, member, asked, estimation, selection, seed=seed),
+            terms | {"one_step": ahead.model_dump(mode="json")},
+            partial(fit_one_step, member, ahead, estimation, selection, seed=seed),
         )
         one_step = model_of(open_loop)
     model = model_of(fit)

@@ -229,6 +229,7 @@ class AssemblyConfig(BaseModel):
             return self
         fitted = {
             "candidates": any(member.candidates > 1 for member in self.members),
+            "sweep": any(member.sweep for member in self.members),
             "alternatives": any(member.alternatives for member in self.members),
             "one_step": self.one_step is not None,
             "retrain": self.retrain is not None,

@@ -31,6 +31,20 @@ class StandingConfig(BaseModel):
     shared: tuple[str, ...] = ()
 
 
+class SweepSource(BaseModel):
+    """A sweep whose best fits are candidates, as they are.
+
+    Args:
+        run: Its run folder, seen from the folder of the YAML.
+        keep: So many of the fits that it trained to the end, the best by the figure that chose in it.
+    """
+
+    model_config = STRICT
+
+    run: str
+    keep: int = Field(default=10, ge=1)
+
+
 class MemberConfig(StandingConfig):
     """One member, fitted on traces of all its places.
 
@@ -39,7 +53,8 @@ class MemberConfig(StandingConfig):
         alternatives: Other structures that are fitted too, among which the whole chooses as well.
         training: How a network is trained.
         rest: The output at rest, in its unit.
-        candidates: Fits of each structure from different seeds, among which the whole chooses.
+        candidates: Fits of each structure from different seeds, among which the whole chooses; 0 for a sweep's alone.
+        sweep: A sweep of this mapping, whose best fits the whole chooses among as well.
         traces: Estimation traces that it is fitted on, the first so many; all by default.
     """
 
@@ -47,7 +62,8 @@ class MemberConfig(StandingConfig):
     alternatives: tuple[StructureField, ...] = ()
     training: TrainingConfig | None = None
     rest: float
-    candidates: int = Field(default=1, ge=1)
+    candidates: int = Field(default=1, ge=0)
+    sweep: SweepSource | None = None
     traces: int | None = Field(default=None, ge=1)
 
     @property
@@ -70,6 +86,13 @@ class MemberConfig(StandingConfig):
                 self.training_options(seed=0)
             except ConfigError as error:
                 raise as_field_error(error) from error
+        if self.candidates == 0 and self.sweep is None:
+            raise FieldError(
+                f"{self.mapping} has no candidates",
+                expected="candidates from 1 on, or a sweep to take them from",
+                got="candidates: 0, and no sweep",
+                remedy="name a sweep, or leave candidates out",
+            )
         return self
 
     @property
@@ -87,7 +110,7 @@ class MemberConfig(StandingConfig):
         Returns:
             The member.
         """
-        return self.model_copy(update={"structure": structure, "alternatives": ()})
+        return self.model_copy(update={"structure": structure, "alternatives": (), "sweep": None})
 
     def training_options(self, seed: int) -> Training:
         """The options of the training, with a seed where none is named.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ from sysid.errors import ConfigError
 from sysid.ingest import load_dataset
 from sysid.reporting.judgement import TableRecord
 from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.sweep_record import SweepRecord
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.record import read_fit
+from sysid.workbench.sweep_run import read_sweep_file, run_sweep
 from tests.workbench.assembly.conftest import PIPELINE
 
 BASE = (
@@ -161,3 +164,58 @@ def test_an_alternative_that_is_no_network_is_refused(workspace: Path) -> None:
     )
     with pytest.raises(ConfigError, match="is ARX"):
         run(workspace, text)
+
+
+SWEEP = """\
+kind: sweep
+name: few
+data: tanks
+mapping: upper -> lower
+start: rest
+rest: {lower: 0}
+structure: {kind: NARX, input_delays: 1, output_delays: {from: 1, to: 2}, neurons: {from: 1, to: 2}}
+training: {loop: closed, max_iterations: 10}
+method: grid
+objectives: [free_run_mse]
+choose: {by: free_run_mse, on: estimation}
+workers: 1
+export: null
+"""
+FROM_SWEEP = BASE.replace(LOWER, f"{LOWER}    candidates: 0\n    sweep: {{run: ../runs/few, keep: 3}}\n")
+
+
+def sweep(workspace: Path, text: str) -> SweepRecord:
+    """The record of a sweep that was run."""
+    file = workspace / "pipelines" / "few.yaml"
+    file.write_text(text, encoding="utf-8")
+    return run_sweep(read_sweep_file(file), workspace / "runs" / "few", command="sysid sweep few").record
+
+
+def test_candidates_are_the_best_of_a_sweep(workspace: Path) -> None:
+    record = sweep(workspace, SWEEP)
+    best = sorted(record.tried_in_full, key=record.choice)[:3]
+    folder = run(workspace, FROM_SWEEP + ONE_STEP)
+    rows = tables(folder)["upper -> lower by itself, behind measured inputs"].rows
+    assert [str(row[0]).split(",")[0] for row in rows] == [one.label for one in best]
+    # They are taken as they are: the same error on the same case.
+    for row, trial in zip(rows, best, strict=True):
+        assert row[4] == pytest.approx(trial.cases["V"].free_run_mse, rel=1e-9)
+    assert not (folder / "fits" / "upper-lower-0" / "fit.json").exists()
+    assert (folder / "fits" / "upper-lower-2-one-step" / "fit.json").is_file()
+
+
+def test_a_sweep_that_cannot_be_used_is_refused(workspace: Path) -> None:
+    with pytest.raises(ConfigError, match="the record of the sweep cannot be read"):
+        run(workspace, FROM_SWEEP)
+    sweep(workspace, SWEEP.replace("upper -> lower", "pump -> lower"))
+    with pytest.raises(ConfigError, match="of another mapping than the member"):
+        run(workspace, FROM_SWEEP)
+    shutil.rmtree(workspace / "runs" / "few" / "trials")
+    with pytest.raises(ConfigError, match="has no network to take"):
+        run(workspace, FROM_SWEEP.replace("upper -> lower", "pump -> lower"))
+    assert not (workspace / "runs" / "tanks" / "fits").exists(), "it is said before anything is fitted"
+
+
+def test_a_member_without_any_candidate_is_refused(workspace: Path) -> None:
+    with pytest.raises(ConfigError, match="has no candidates"):
+        run(workspace, BASE.replace(LOWER, f"{LOWER}    candidates: 0\n"))
