@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from sysid.validation import CaseResult
 
 
+MAX_METRICS = 1000
+"""Metrics that MLflow takes in one batch (``mlflow.utils.validation.MAX_METRICS_PER_BATCH``)."""
 COLOUR_TAG = "mlflow.runColor"
 """Tag of a run with its colour in charts; without it MLflow may give two fits the same."""
 
@@ -195,6 +197,19 @@ def _picture(ready: FitReady, case: CaseResult) -> NDArray[np.uint8]:
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[:, :, :3])
+
+
+def batches(values: Sequence[Any]) -> Iterator[Sequence[Any]]:
+    """Metrics in as many calls as the store needs.
+
+    Args:
+        values: The metrics.
+
+    Yields:
+        At most as many as it takes in one batch.
+    """
+    for first in range(0, len(values), MAX_METRICS):
+        yield values[first : first + MAX_METRICS]
 
 
 def key(name: str) -> str:

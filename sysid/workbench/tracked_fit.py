@@ -13,9 +13,6 @@ from typing import Any
 from sysid.workbench import tracked
 from sysid.workbench.events import FitReady, RunStarted
 
-MAX_METRICS = 1000
-"""Metrics that MLflow takes in one batch (``mlflow.utils.validation.MAX_METRICS_PER_BATCH``)."""
-
 PARAM_LIMIT = 6000
 """Characters that MLflow takes in a parameter (``mlflow.utils.validation.MAX_PARAM_VAL_LENGTH``)."""
 
@@ -97,9 +94,8 @@ def log_values(client: Any, run_id: str, ready: FitReady, run: RunStarted, entit
     values = [entities.metric(name, value, now, 0) for name, value in tracked.metrics(ready).items()]
     values += [entities.metric("learning_curve_mse", mse, now, step) for step, mse in tracked.learning_curve(ready)]
     params = [entities.param(name, value[:PARAM_LIMIT]) for name, value in tracked.parameters(ready, run).items()]
-    for first in range(0, len(values), MAX_METRICS):
-        batch = values[first : first + MAX_METRICS]
-        client.log_batch(run_id, metrics=batch, params=params if first == 0 else ())
+    for number, batch in enumerate(tracked.batches(values)):
+        client.log_batch(run_id, metrics=batch, params=() if number else params)
 
 
 def log_pictures(client: Any, run_id: str, ready: FitReady) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ from sysid.errors import ConfigError
 from sysid.models import Cascade, cascade_from_dict
 from sysid.reporting.judgement_report import JudgementResults
 from sysid.reporting.published import read_published
-from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.extending import read_joined
@@ -20,6 +18,7 @@ from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.starts import train
 from sysid.workbench.environment import environment
 from sysid.workbench.kinds import RunRequest
+from sysid.workbench.naming import nearby
 from sysid.workbench.store import RunFolder, read_json, write_json
 from sysid.yaml_files import check
 
@@ -36,23 +35,13 @@ def run_assembly(request: RunRequest) -> int:
     Raises:
         UserError: If the pipeline or its data cannot be used.
     """
-    from sysid.workbench.audience import console
-    from sysid.workbench.screen import LogFile, Screen
-    from sysid.workbench.tracker import Tracker
+    from sysid.workbench.audience import Audience, typed_command
 
     joined = read_joined(request.path)
     config = check(AssemblyConfig, joined.data, where=joined.origins)
     folder = (request.out or Path("runs") / config.name).resolve()
-    command = shlex.join(["sysid", "run", request.typed, *(["--out", str(request.out)] if request.out else [])])
-    target = console()
-    screen, log = Screen(target), LogFile()
-    log.write_to(folder, command)
-
-    def warn(text: str) -> None:
-        for watch in (screen, log):
-            watch(events.Warned(text=text))
-
-    tracker = Tracker.of_workspace(Path.cwd(), warn) if request.tracking else None
+    command, audience = typed_command("run", request.typed, request.out), Audience.of(tracking=request.tracking)
+    audience.log.write_to(folder, command)
     context = Context(
         config=config,
         joined=joined,
@@ -60,22 +49,16 @@ def run_assembly(request: RunRequest) -> int:
         store=RunFolder(path=folder),
         command=command,
         fresh=request.fresh,
-        watchers=(screen, log, *([tracker] if tracker else [])),
+        watchers=audience.watchers,
     )
     try:
         with context.store.locked():
             results, page = _run(context)
     finally:
-        screen.close()
-    target.print()
-    target.print(results.judgement.headline, soft_wrap=True)
-    target.print(f"Report:  {page}\nResults: {context.store.results}", soft_wrap=True)
-    if tracker is not None and tracker.failures:
-        target.print(
-            "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
-        )
-        return 1
-    return 0
+        audience.screen.close()
+    audience.target.print()
+    audience.target.print(results.judgement.headline, soft_wrap=True)
+    return audience.end({"Report": nearby(page), "Results": nearby(context.store.results)})
 
 
 def _run(context: Context) -> tuple[JudgementResults, Path]:

@@ -7,10 +7,7 @@ from typing import Any
 
 from sysid.workbench.events import JudgementReady
 from sysid.workbench.naming import slug
-from sysid.workbench.tracked import key
-
-MAX_METRICS = 1000
-"""Metrics that a store takes in one batch."""
+from sysid.workbench.tracked import batches, key
 
 
 def log_judgement(client: Any, ready: JudgementReady, *, key_tag: str, experiment: str, metric: Any) -> None:
@@ -64,8 +61,8 @@ def _log(client: Any, run_id: str, ready: JudgementReady, metric: Any) -> None:
         metric(f"{slug(ready.pipeline)}/{'/'.join(key(part) for part in name.split('/'))}", value, now, 0)
         for name, value in ready.metrics.items()
     ]
-    for first in range(0, len(values), MAX_METRICS):
-        client.log_batch(run_id, metrics=values[first : first + MAX_METRICS])
+    for batch in batches(values):
+        client.log_batch(run_id, metrics=batch)
     place = f"judgements/{slug(ready.pipeline)}"
     client.log_artifact(run_id, str(ready.page), place)
     client.log_artifact(run_id, str(ready.document), place)
