@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -49,6 +49,7 @@ class LineRecord(_Record):
     y: list[float]
     target: bool = Field(default=False, description="Whether it is what the others are held against.")
     marks: bool = Field(default=False, description="Marks without a line.")
+    points: bool = Field(default=False, description="A line with a mark at each of its points.")
 
 
 class ChartRecord(_Record):
@@ -58,7 +59,7 @@ class ChartRecord(_Record):
     caption: str
     x: str = Field(description="What the x axis is, with its unit.")
     y: str = Field(description="What the y axis is, with its unit.")
-    logarithmic: bool = Field(default=False, description="Both axes.")
+    logarithmic: bool | Literal["x"] = Field(default=False, description="Both axes, or the x axis alone.")
     lines: list[LineRecord]
 
 
@@ -178,6 +179,7 @@ def _figure(chart: ChartRecord) -> Figure:
             _draw(axes, line, index)
         if chart.logarithmic:
             axes.set_xscale("log")
+        if chart.logarithmic is True:
             axes.set_yscale("log")
         axes.set_xlabel(chart.x)
         axes.set_ylabel(chart.y)
@@ -194,4 +196,4 @@ def _draw(axes: Axes, line: LineRecord, index: int) -> None:
         colour, mark = PALETTE[index % len(PALETTE)], MARKERS[index % len(MARKERS)]
         axes.plot(x, y, color=colour, marker=mark, linestyle="none", markersize=5, label=line.name)
     else:
-        axes.plot(x, y, **(series_style(index) | {"marker": ""}), label=line.name)
+        axes.plot(x, y, **(series_style(index) | ({} if line.points else {"marker": ""})), label=line.name)

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 
 from sysid.errors import ConfigError
+from sysid.reporting import judgement
 from sysid.reporting.judgement import FOLDER, judgement_sections, parse_judgement, read_judgements
 from sysid.reporting.judgement_report import (
     JudgementResults,
@@ -57,6 +59,38 @@ def test_a_section_begins_with_what_matters() -> None:
     assert table.rows[0][0].header
     assert table.rows[0][1].value == 1.25
     assert table.rows[1][1].text == ""
+
+
+@pytest.mark.parametrize(
+    ("logarithmic", "scales"),
+    [(False, ("linear", "linear")), ("x", ("log", "linear")), (True, ("log", "log"))],
+)
+def test_a_chart_has_logarithmic_axes_as_far_as_it_asks_and_marks_where_a_line_does(
+    logarithmic: bool | str, scales: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Figure] = []
+
+    def picture(figure: Figure, *words: str) -> Picture:
+        drawn.append(figure)
+        return made(figure, *words)
+
+    made = judgement.picture
+    monkeypatch.setattr(judgement, "picture", picture)
+    lines = [
+        {"name": name, "x": [1.0, 9.0], "y": [2.0, 1.0], **more} for name, more in (("a", {}), ("b", {"points": True}))
+    ]
+    judgement_sections(
+        [
+            parse_judgement(
+                SAID | {"charts": [SAID["charts"][0] | {"logarithmic": logarithmic, "lines": lines}]}, where="here"
+            )
+        ]
+    )
+    (axes,) = drawn[0].axes
+    assert (axes.get_xscale(), axes.get_yscale()) == scales
+    plain, marked = axes.get_lines()
+    assert plain.get_marker() in ("", "None")
+    assert marked.get_marker() not in ("", "None")
 
 
 def test_a_count_is_printed_as_it_is_and_a_number_in_three_digits() -> None:

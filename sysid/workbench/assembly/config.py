@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sysid.workbench.assembly.extending import extending_schema
 from sysid.workbench.assembly.member_config import KnownConfig, MemberConfig, StandingConfig
+from sysid.workbench.assembly.proof_config import LineConfig, PublishedConfig, StressConfig
 from sysid.workbench.assembly.stage_config import (
     GrowConfig,
     LessonsConfig,
     OneStepConfig,
     RetrainConfig,
     TogetherConfig,
+    check_rounds,
+    names_in,
 )
 from sysid.workbench.config import ExportConfig
 from sysid.workbench.fields import STRICT
@@ -28,85 +30,6 @@ class LimitConfig(BaseModel):
 
     low: float | str | None = None
     high: float | str | None = None
-
-
-class StressConfig(BaseModel):
-    """Random sequences of the reference, on which the whole has to hold.
-
-    Args:
-        data: Data set with the sequences.
-        output: Output that is judged.
-        within: Root mean square error in its unit that a sequence should stay under.
-        states: Name of an annotator, for errors state by state.
-    """
-
-    model_config = STRICT
-
-    data: str
-    output: str
-    within: float = Field(gt=0.0)
-    states: str | None = None
-
-
-class LineConfig(BaseModel):
-    """Places between those that are modelled: a channel is interpolated to them, and the members stand there too.
-
-    Args:
-        channel: What the members at a place read, by its name in the first place.
-        knots: Position of each place that is modelled, increasing, by the channel's name there.
-        outputs: What is had at every place, by the names in the first place.
-        data: Data set with the reference at places: the output at place 17 is the output's name with 17 behind it.
-        judged: Outputs that are scored there; all by default.
-    """
-
-    model_config = STRICT
-
-    channel: str
-    knots: dict[str, float] = Field(min_length=2)
-    outputs: tuple[str, ...] = Field(min_length=1)
-    data: str
-    judged: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _check(self) -> LineConfig:
-        positions = list(self.knots.values())
-        if any(after <= before for before, after in pairwise(positions)):
-            raise FieldError(
-                "the knots are no line",
-                expected="increasing positions",
-                got=", ".join(f"{name}: {position:g}" for name, position in self.knots.items()),
-                remedy="give the knots in the order in which they stand",
-            )
-        strangers = [name for name in self.judged if name not in self.outputs]
-        if strangers:
-            raise FieldError(
-                f"judged names {', '.join(strangers)}, which is not had at a place",
-                expected=f"some of {', '.join(self.outputs)}",
-                got=", ".join(self.judged),
-                remedy="add it to the outputs",
-            )
-        return self
-
-    @property
-    def scored(self) -> tuple[str, ...]:
-        """Outputs that are scored at places."""
-        return self.judged or self.outputs
-
-
-class PublishedConfig(BaseModel):
-    """Published figures of an output, beside ours.
-
-    Args:
-        source: Where they stand.
-        mse: By case, in the output's unit squared.
-        target: Share of the published figure that is aimed at.
-    """
-
-    model_config = STRICT
-
-    source: str
-    mse: dict[str, float]
-    target: float = Field(default=1.0, gt=0.0)
 
 
 class AssemblyConfig(BaseModel):
@@ -128,13 +51,13 @@ class AssemblyConfig(BaseModel):
         members: The members.
         known: Members that are declared, not fitted; members may read them, and they the members.
         begin: Bundle of a trained whole to go on from, seen from the folder of the YAML: its networks stand where the
-            members would be fitted, and ``together`` trains them on.
+            members would be fitted, and ``together`` trains them on, and ``grow``.
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
         limits: Limits of outputs; in its other places a member has those of its first, unless they have their own.
         one_step: Each candidate fitted one step ahead as well, to see what becomes of it in free run.
         retrain: Members to train again on what the others put out.
-        grow: Growing the training data by what the whole is worst at.
         together: Training end to end.
+        grow: Growing its data by what the whole is worst at.
         line: Places between those that are modelled.
         stress: Random sequences on which the whole has to hold.
         published: Published figures by output.
@@ -169,8 +92,8 @@ class AssemblyConfig(BaseModel):
     limits: dict[str, LimitConfig] = Field(default_factory=dict)
     one_step: OneStepConfig | None = None
     retrain: RetrainConfig | None = None
-    grow: GrowConfig | None = None
     together: TogetherConfig | None = None
+    grow: GrowConfig | None = None
     line: LineConfig | None = None
     stress: StressConfig | None = None
     published: dict[str, PublishedConfig] = Field(default_factory=dict)
@@ -186,6 +109,16 @@ class AssemblyConfig(BaseModel):
     def standing(self) -> tuple[StandingConfig, ...]:
         """All members, the fitted ones first."""
         return (*self.members, *self.known)
+
+    @property
+    def joint(self) -> tuple[TogetherConfig, ...]:
+        """The rounds of training end to end, without those of growth."""
+        return self.together.rounds if self.together else ()
+
+    @property
+    def growing(self) -> tuple[TogetherConfig, ...]:
+        """The rounds of training end to end that each round of growth goes through."""
+        return self.joint[-1].followed_by(self.grow.train) if self.grow and self.joint else ()
 
     @property
     def wanted(self) -> tuple[str, ...]:
@@ -233,7 +166,6 @@ class AssemblyConfig(BaseModel):
             "alternatives": any(member.alternatives for member in self.members),
             "one_step": self.one_step is not None,
             "retrain": self.retrain is not None,
-            "grow": self.grow is not None,
             "starts": self.starts > 1,
         }
         if asked := [name for name, yes in fitted.items() if yes]:
@@ -244,6 +176,41 @@ class AssemblyConfig(BaseModel):
                 remedy=f"leave out {', '.join(asked)}, or begin",
             )
         return self
+
+    @model_validator(mode="after")
+    def _check_grow(self) -> AssemblyConfig:
+        if self.grow is None:
+            return self
+        if self.together is None:
+            raise FieldError(
+                "growth without training end to end",
+                expected="together, whose last round is what growth goes on from",
+                got="grow alone",
+                remedy="add together, or leave grow out",
+            )
+        check_rounds(self.growing)
+        if (used := self._data).get(self.grow.data):
+            raise FieldError(
+                f"the pool to grow by is used otherwise: {self.grow.data} is under {used[self.grow.data]}",
+                expected="a data set that nothing else trains on, chooses by or scores",
+                got=f"grow, data: {self.grow.data}",
+                remedy="name another pool",
+            )
+        return self
+
+    @property
+    def _data(self) -> dict[str, str]:
+        """Every data set but the pool, and which field names it."""
+        training = (self.training,) if isinstance(self.training, str) else self.training
+        also = self.together.data if self.together else ()
+        beside = {"stress, data": self.stress, "line, data": self.line}
+        return {
+            self.data: "data",
+            **{one.data: field for field, one in beside.items() if one},
+            **({self.selection: "selection"} if self.selection else {}),
+            **dict.fromkeys(training, "training"),
+            **dict.fromkeys(also, "together, also"),
+        }
 
     @model_validator(mode="after")
     def _check_outputs(self) -> AssemblyConfig:
@@ -262,17 +229,13 @@ class AssemblyConfig(BaseModel):
             "limits": tuple(self.limits),
             "published": tuple(self.published),
             "stress": (self.stress.output,) if self.stress else (),
-            "together, targets": self.together.judged if self.together else (),
-            "together, reads": self.together.circles if self.together else (),
-            "together, measured": self.together.spared if self.together else (),
             "grow, outputs": self.grow.outputs if self.grow else (),
             "line": (self.line.channel, *self.line.knots, *self.line.outputs) if self.line else (),
         }
-        named = {
-            "retrain, members": self.retrain.members if self.retrain else (),
-            "grow, members": self.grow.members if self.grow else (),
-            "together, members": self.together.trained if self.together else (),
-        }
+        named = {"retrain, members": self.retrain.members if self.retrain else ()}
+        for stage, rounds in (("together", self.joint), ("grow, train", self.growing)):
+            for field, names in names_in(rounds).items():
+                (named if field == "members" else asked)[f"{stage}, {field}"] = names
         for known, places in ((written, asked), (bases, named)):
             for where, names in places.items():
                 strangers = [name for name in names if name not in known]

@@ -1,4 +1,4 @@
-"""The course of an assembly's training: alone, chosen together, retrained, grown, end to end; every fit kept."""
+"""The course of an assembly's training: alone, chosen together, retrained, end to end, grown; every fit kept."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from itertools import chain
 
 from sysid.estimation import CascadeFit
 from sysid.estimation.result import Status
-from sysid.models import Cascade, NARXModel
+from sysid.models import Cascade
 from sysid.traces import Trace
 from sysid.workbench import events
 from sysid.workbench.assembly.begun import begun, read_whole
 from sysid.workbench.assembly.candidates import Candidates, fit_candidates
 from sysid.workbench.assembly.context import CODE, Context
-from sysid.workbench.assembly.growth import Growth, Round, grow
+from sysid.workbench.assembly.growth import GROWN, Growth, Round, grow
 from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.material import Material
-from sysid.workbench.assembly.member_config import MemberConfig
 from sysid.workbench.assembly.members import Members, assembled, dealt, whole_score
 from sysid.workbench.assembly.rounds import RoundDone
+from sysid.workbench.assembly.stage_config import TogetherConfig
 from sysid.workbench.assembly.stages import (
     model_of,
     reading_more,
@@ -32,7 +32,7 @@ from sysid.workbench.store import code_digest, digest, read_json, strict, write_
 BEGUN = "as it was begun from"
 ONE_STEP = "each alone, one step ahead"
 ALONE, CHOSEN, RETRAINED = "each alone", "chosen together", "retrained"
-GROWN, TOGETHER = "grown", "trained end to end"
+TOGETHER = "trained end to end"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +46,7 @@ class Course:
         stages: The whole after each stage.
         candidates: The members' candidates, unless the whole was begun from another one.
         growth: What growing the training data brought, where it was asked for.
-        rounds: The rounds of training end to end.
+        rounds: The rounds of training end to end, those of growth among them.
     """
 
     context: Context
@@ -63,13 +63,11 @@ class Course:
         if self.context.config.begin is not None:
             given, said = read_whole(self.context.beside / self.context.config.begin)
             self.notes.append(said)
-            self.stages[BEGUN] = begun(self.context.config, given, estimation[0])
-            self._together(self.stages[BEGUN], estimation, selection)
-            return
-        models, key = self._members(estimation, selection)
-        models, key = self._retrained(models, key, estimation, selection)
-        models, key, added = self._grown(models, key, estimation, selection)
-        self._together(assembled(self.context.config, models), (*estimation, *added), selection)
+            self.stages[BEGUN] = whole = begun(self.context.config, given, estimation[0])
+        else:
+            models, key = self._members(estimation, selection)
+            whole = assembled(self.context.config, self._retrained(models, key, estimation, selection))
+        self._grown(self._together(whole))
 
     def _members(self, estimation: Sequence[Trace], selection: Sequence[Trace]) -> tuple[Members, str]:
         """Every member's candidates; the best of each alone, and those that are best together."""
@@ -84,12 +82,10 @@ class Course:
             self.stages[CHOSEN] = assembled(config, found.models(found.chosen))
         return found.models(found.chosen), found.key
 
-    def _retrained(
-        self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]
-    ) -> tuple[Members, str]:
+    def _retrained(self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]) -> Members:
         asked = self.context.config.retrain
         if asked is None:
-            return models, key
+            return models
         outputs = self.context.config.choose_on or self.context.config.outputs
         best = whole_score(assembled(self.context.config, models), selection, outputs)
         members = {member.mapping.output: member for member in self.context.config.members}
@@ -125,72 +121,83 @@ class Course:
                 if score < best:
                     models, best = changed, score
         self.stages[RETRAINED] = assembled(self.context.config, models)
-        return models, key
+        return models
 
-    def _grown(
-        self, models: Members, key: str, estimation: Sequence[Trace], selection: Sequence[Trace]
-    ) -> tuple[Members, str, tuple[Trace, ...]]:
-        """The members of the best round, and the sequences that had been added by then."""
-        asked = self.context.config.grow
+    def _together(self, whole: Cascade) -> Cascade:
+        """Every round of training end to end, each from where the one before ended."""
+        for number, one in enumerate(self.context.config.joint, start=1):
+            suffix = "" if number == 1 else f", round {number}"
+            whole, _ = self._trained(
+                one,
+                reading_more(whole, one.reads),
+                self._estimation(one)[: one.traces],
+                name="together" if number == 1 else f"together-{number}",
+                title=f"Training end to end{suffix}",
+                called=str(number),
+            )
+            self.stages[f"{TOGETHER}{suffix}"] = whole
+        return whole
+
+    def _grown(self, whole: Cascade) -> None:
+        """Rounds of training end to end on what the whole is worst at, each a stage of its own."""
+        asked, rounds = self.context.config.grow, self.context.config.growing
         if asked is None or self.material.pool is None:
-            return models, key, ()
+            return
+        outputs = self.context.config.choose_on or self.context.config.outputs
+        last = self.context.config.joint[-1]
         sources, held_out = self.material.pool
 
-        def fit(
-            member: MemberConfig, now: Members, traces: Sequence[Trace], number: int, before: str
-        ) -> tuple[NARXModel, str]:
-            found, own = self.context.fit(
-                f"{member.slug}-grown-{number}",
-                f"Training {member.mapping} on {len(traces)} traces, round {number}",
-                {
-                    "before": before, "member": member.mapping.output, "iterations": asked.max_iterations,
-                    "whole": assembled(self.context.config, now).to_dict(),
-                    "data": [trace.digest for trace in traces],
-                },
-                partial(
-                    retrain, self.context.config, member, now, estimation=traces, selection=selection,
-                    max_iterations=asked.max_iterations,
-                ),
-            )  # fmt: skip
-            return model_of(found), own
-
-        def report(done: Round) -> None:
-            step = self.context.titled(
-                f"Looking for the sequences that the whole is worst at, after round {done.number}"
-            )
-            detail = f"{100.0 * done.look.within:.3g} % within, 99 % under {done.look.rare:.3g}, {done.samples} samples"
-            self.context.tell(events.StepStarted(step=step))
-            self.context.tell(events.StepDone(step=step, stored=False, detail=detail))
+        def train(now: Cascade, traces: Sequence[Trace], number: int) -> tuple[Cascade, float]:
+            took = 0.0
+            for part, one in enumerate(rounds, start=1):
+                suffix = f".{part}" if len(rounds) > 1 else ""
+                now, seconds = self._trained(
+                    one.model_copy(update={"traces": None}),  # what was added is never cut off
+                    now,
+                    traces,
+                    name=f"grown-{number}{suffix.replace('.', '-')}",
+                    title=f"Growing, round {number}{suffix}, on {len(traces)} traces",
+                    called=f"{number}{suffix} of growth",
+                )
+                took += seconds
+            self.stages[f"{GROWN}, round {number}"] = now
+            return now, took
 
         grown = grow(
-            self.context.config, models, key, fit, estimation=estimation, selection=selection, pool=sources,
-            held_out=held_out, report=report,
+            asked, whole, train, begins=list(self.stages)[-1], estimation=self._estimation(last)[: last.traces],
+            pool=sources, held_out=held_out, report=self._looked,
+            score=lambda one: whole_score(one, self.material.choosing, outputs),
         )  # fmt: skip
         self.growth.append(grown)
         self.notes.append(grown.sentence)
-        self.stages[GROWN] = assembled(self.context.config, grown.models)
-        return grown.models, grown.key, tuple(trace for trace in sources if trace.name in grown.added)
 
-    def _together(self, whole: Cascade, estimation: Sequence[Trace], selection: Sequence[Trace]) -> None:
-        """Every round of training end to end, each from where the one before ended."""
-        also = self.material.also
-        asked = self.context.config.together
-        rounds = asked.rounds if asked else ()
-        for number, one in enumerate(rounds, start=1):
-            suffix = "" if number == 1 else f", round {number}"
-            whole = reading_more(whole, one.reads)
-            traces = dealt([estimation, *(also[name][0] for name in one.also)])
-            chosen_by = [*selection, *chain.from_iterable(also[name][1] for name in one.also)]
-            ready = JointRound.of(self.context.config, one, whole, estimation=traces, selection=chosen_by)
-            asked_for = one.model_dump(mode="json", exclude={"again", "also"})  # their traces are among the round's
-            key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
-            name = self.context.named("together" if number == 1 else f"together-{number}")
-            fit = self._round(name, self.context.titled(f"Training end to end{suffix}"), key, ready)
-            start = None if self.context.config.starts == 1 else self.context.start
-            self.rounds.append(RoundDone.of(self.context.config, one, ready, fit, number=number, start=start))
-            if fit.status is Status.UNSTABLE:  # a word in a table is not enough for this
-                self.notes.append(fit.status.value if len(rounds) == 1 else f"Round {number}: {fit.status.value}")
-            self.stages[f"{TOGETHER}{suffix}"] = whole = fit.model
+    def _looked(self, done: Round) -> None:
+        """Tell what the pool's other sequences say after a round of growth."""
+        step = self.context.titled(f"Looking at sequences that train nothing, after round {done.number} of growth")
+        detail = f"{100.0 * done.look.within:.3g} % within, 99 % under {done.look.rare:.3g}, {done.samples} samples"
+        self.context.tell(events.StepStarted(step=step))
+        self.context.tell(events.StepDone(step=step, stored=False, detail=detail))
+
+    def _estimation(self, one: TogetherConfig) -> list[Trace]:
+        """All traces that a round may be fitted to."""
+        return dealt([self.material.estimation, *(self.material.also[name][0] for name in one.also)])
+
+    def _trained(
+        self, one: TogetherConfig, whole: Cascade, traces: Sequence[Trace], *, name: str, title: str, called: str
+    ) -> tuple[Cascade, float]:
+        """The whole after a round of training end to end, and the seconds that took; the table has a row more."""
+        config = self.context.config
+        also = chain.from_iterable(self.material.also[data][1] for data in one.also)
+        ready = JointRound.of(config, one, whole, estimation=traces, selection=[*self.material.selection, *also])
+        asked_for = one.model_dump(mode="json", exclude={"again", "also"})  # their traces are among the round's
+        key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
+        fit = self._round(self.context.named(name), self.context.titled(title), key, ready)
+        start = None if config.starts == 1 else self.context.start
+        self.rounds.append(RoundDone.of(config, one, ready, fit, name=called, start=start))
+        if fit.status is Status.UNSTABLE:  # a word in a table is not enough for this
+            only = len(config.joint) == 1 and not config.growing
+            self.notes.append(fit.status.value if only else f"Round {called}: {fit.status.value}")
+        return fit.model, fit.train_time_s
 
     def _round(self, name: str, step: str, key: str, ready: JointRound) -> CascadeFit:
         """One round, stored under what it depends on."""

@@ -23,7 +23,7 @@ from sysid.workbench.assembly.rounds import RoundDone, rounds_table
 from sysid.workbench.assembly.stress import Stress
 from sysid.workbench.assembly.views import (
     export_table,
-    growth_chart,
+    growth_charts,
     growth_table,
     limits_table,
     line_chart,
@@ -113,9 +113,9 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
         ],
         "tables": _tables(config, found),
         "charts": [
+            *(chart for one in found.growth for chart in growth_charts(one)),
             *(_chart(whole, trace, name) for name in config.outputs for trace in found.cases),
             *([] if found.line is None else [line_chart(found.line, name) for name in found.line.mse]),
-            *map(growth_chart, found.growth),
             *([] if found.stressed is None else [_chart(whole, one, found.stressed.output) for one in found.worst]),
         ],
         "scores": [_score(config, name, found) for name in config.outputs],
@@ -132,6 +132,7 @@ def _tables(config: AssemblyConfig, found: Outcome) -> list[dict[str, Any]]:
     """The stages first, then how they came about, and what else the whole was put to."""
     published = None if config.published_models is None else read_published(config.published_models)
     tables = [_stage_table(config, name, found, published) for name in config.outputs]
+    tables += [growth_table(one, found.chosen) for one in found.growth]
     if found.lessons:
         tables.append(lessons_table(found.lessons))
     tables += [table for one in found.members for table in member_tables(one, published)]
@@ -141,7 +142,6 @@ def _tables(config: AssemblyConfig, found: Outcome) -> list[dict[str, Any]]:
         tables += [line_table(found.line, output) for output in found.line.mse]
     if found.stressed is not None:
         tables += stress_tables(found.stressed)
-    tables += [growth_table(one) for one in found.growth]
     tables.append(_time_table(found.timing, found.cases))
     if found.limits.passed:
         tables.append(limits_table(found.limits))

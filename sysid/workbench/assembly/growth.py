@@ -1,8 +1,9 @@
 """Grown by finding where the whole is worst: train, look, add the worst sequences to the training, train again.
 
 The sequences come from a pool that is scored nowhere else. Its cases with ``role: estimation`` are what is added from;
-those with ``role: selection`` are never trained on, and say after each round what the added data brought. Members begin
-each round where the round before has left them, so that a round costs a small part of the first training.
+those with ``role: selection`` are never trained on, and say after each round what the added data brought. The whole
+begins each round, which trains it end to end, where the round before has left it. Which of the states on the way is
+taken is not decided here: each is a stage of the report, and the selection traces choose between them all.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models import Cascade, NARXModel
+from sysid.models import Cascade
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.member_config import MemberConfig
-from sysid.workbench.assembly.members import Members, assembled, whole_score
 from sysid.workbench.assembly.stage_config import GrowConfig
+
+GROWN = "grown"
+"""How the stages of growth are called in the report, with the number of the round."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,15 +66,21 @@ class Round:
 
     Args:
         number: 0 is the whole as it was before.
-        added: Names of the sequences that were added for it, the worst first.
-        samples: Samples that the members were trained on in it.
+        stage: The stage of the report that it ends with.
+        added: Names of the sequences that were added for it, the first first.
+        traces: Traces that the whole was trained on in it.
+        samples: Samples of these.
+        seconds: That its training took.
         look: The whole after it, on the sequences that train nothing.
-        score: Of the whole after it, on the selection traces.
+        score: Of the whole after it, on the traces that choose between the stages.
     """
 
     number: int
+    stage: str
     added: tuple[str, ...]
+    traces: int
     samples: int
+    seconds: float
     look: Look
     score: float
 
@@ -83,40 +90,41 @@ class Growth:
     """What came of it.
 
     Args:
+        asked: What was asked for.
         rounds: All that were done, the state before them first.
-        best: Number of the round whose members are kept.
-        models: Those members.
-        key: Digest of what they depend on.
-        limit: Error that a sequence should stay under.
-        outputs: Outputs that were looked at.
+        held_out: How many sequences said what a round has brought.
+        ended: Why no further round was begun.
     """
 
+    asked: GrowConfig
     rounds: tuple[Round, ...]
-    best: int
-    models: Members
-    key: str
-    limit: float
-    outputs: tuple[str, ...]
+    held_out: int
+    ended: str
 
     @property
-    def added(self) -> frozenset[str]:
-        """Names of the sequences that had been added by the round that is kept."""
-        return frozenset(name for done in self.rounds[: self.best + 1] for name in done.added)
+    def added(self) -> int:
+        """How many sequences were added."""
+        return sum(len(done.added) for done in self.rounds)
+
+    @property
+    def where(self) -> str:
+        """Which sequences were added."""
+        return "at which the whole was worst" if self.asked.pick == "worst" else "in the order of the pool"
 
     @property
     def sentence(self) -> str:
         """For the report."""
-        first, kept = self.rounds[0], self.rounds[self.best]
-        share = f"from {100.0 * first.look.within:.3g} to {100.0 * kept.look.within:.3g} %"
+        first, last, outputs = self.rounds[0].look, self.rounds[-1].look, ", ".join(self.asked.outputs)
         return (
-            f"Grown over {len(self.rounds) - 1} rounds, {sum(len(r.added) for r in self.rounds)} sequences added where "
-            f"the whole was worst; round {self.best} is kept. On sequences of the pool that train nothing the share "
-            f"with an error under {self.limit:g} ({', '.join(self.outputs)}) goes {share}."
+            f"Grown over {len(self.rounds) - 1} rounds by {self.added} sequences, {self.where}; {self.ended}. On "
+            f"{self.held_out} sequences of the pool that train nothing the share with an error of {outputs} under "
+            f"{self.asked.within:g} goes from {100.0 * first.within:.3g} to {100.0 * last.within:.3g} %, the error "
+            f"that 99 % stay under from {first.rare:.3g} to {last.rare:.3g}."
         )
 
 
-Fit = Callable[[MemberConfig, Members, Sequence[Trace], int, str], tuple[NARXModel, str]]
-"""Trains a member on traces in a round, from where it stands: the model and the digest of what it depends on."""
+Train = Callable[[Cascade, Sequence[Trace], int], tuple[Cascade, float]]
+"""Trains a whole, from where it stands, on these traces in a round: the whole after it, and the seconds it took."""
 
 
 def sequence_errors(whole: Cascade, sequences: Sequence[Trace], outputs: Sequence[str]) -> NDArray[np.float64]:
@@ -141,74 +149,79 @@ def sequence_errors(whole: Cascade, sequences: Sequence[Trace], outputs: Sequenc
 
 
 def grow(
-    config: AssemblyConfig,
-    models: Members,
-    key: str,
-    fit: Fit,
+    asked: GrowConfig,
+    whole: Cascade,
+    train: Train,
     *,
+    begins: str,
     estimation: Sequence[Trace],
-    selection: Sequence[Trace],
     pool: Sequence[Trace],
     held_out: Sequence[Trace],
+    score: Callable[[Cascade], float],
     report: Callable[[Round], Any] = lambda _: None,
 ) -> Growth:
-    """Grow the training data of an assembly, round by round.
+    """Grow the training data of a whole, round by round.
 
     Args:
-        config: The pipeline, with ``grow``.
-        models: The members as they stand.
-        key: Digest of what they depend on.
-        fit: Trains a member.
-        estimation: Traces that they were trained on.
-        selection: Traces that choose between states of a fit.
+        asked: How.
+        whole: The whole as it stands.
+        train: Trains it end to end.
+        begins: The stage of the report that it stands at.
+        estimation: Traces that it was trained on last; every round has them too.
         pool: Sequences to add from.
         held_out: Sequences that say what a round has brought.
+        score: The error by which stages are chosen.
         report: Told after every round.
 
     Returns:
-        The members of the best round, and what each round brought.
+        What each round brought.
     """
-    asked = config.grow
-    if asked is None:
-        raise TypeError("the pipeline grows nothing")
-    members = {member.mapping.output: member for member in config.members}
-    scored = config.choose_on or config.outputs
-    left, added, rounds = list(pool), list[Trace](), list[Round]()
+    left, traces, rounds = list(pool), list(estimation), list[Round]()
 
-    def done(number: int, worst: Sequence[Trace], now: Members) -> None:
-        whole = assembled(config, now)
+    def done(stage: str, added: Sequence[Trace], seconds: float) -> None:
         rounds.append(
             Round(
-                number=number,
-                added=tuple(trace.name for trace in worst),
-                samples=sum(map(len, estimation)) + sum(map(len, added)),
+                number=len(rounds),
+                stage=stage,
+                added=tuple(trace.name for trace in added),
+                traces=len(traces),
+                samples=sum(map(len, traces)),
+                seconds=seconds,
                 look=Look.at(sequence_errors(whole, held_out, asked.outputs), asked.within),
-                score=whole_score(whole, selection, scored),
+                score=score(whole),
             )
         )
         report(rounds[-1])
 
-    done(0, (), models)
-    best, kept = 0, (models, key)
-    while left and not _finished(asked, rounds, best):
-        errors = sequence_errors(assembled(config, models), left, asked.outputs)
-        worst = [left[i] for i in np.argsort(-errors, kind="stable")[: asked.add]]
-        left = [trace for trace in left if trace not in worst]
-        added += worst
-        for name in asked.members:
-            member = members[name]
-            own = (*estimation[: member.traces], *added)
-            model, key = fit(member.model_copy(update={"traces": None}), models, own, len(rounds), key)
-            models = {**models, name: model}
-        done(len(rounds), worst, models)
-        if rounds[-1].look.better_than(rounds[best].look):
-            best, kept = len(rounds) - 1, (models, key)
-    return Growth(
-        rounds=tuple(rounds), best=best, models=kept[0], key=kept[1], limit=asked.within, outputs=asked.outputs
-    )
+    done(begins, (), 0.0)
+    while (ended := _ended(asked, rounds, len(left))) is None:
+        number = len(rounds)
+        added = _picked(asked, whole, left, asked.additions[number - 1])
+        left = [trace for trace in left if trace not in added]
+        # Behind the others, not between them: where places take the traces in turn, each keeps its place.
+        traces += added
+        whole, seconds = train(whole, tuple(traces), number)
+        done(f"{GROWN}, round {number}", added, seconds)
+    return Growth(asked=asked, rounds=tuple(rounds), held_out=len(held_out), ended=ended)
 
 
-def _finished(asked: GrowConfig, rounds: Sequence[Round], best: int) -> bool:
-    """Whether the figures hold, have stopped improving, or the rounds are done."""
-    done = len(rounds) - 1
-    return done >= asked.rounds or rounds[best].look.within >= asked.until or done - best >= asked.patience
+def _picked(asked: GrowConfig, whole: Cascade, left: Sequence[Trace], count: int) -> list[Trace]:
+    """What the next round adds: the worst of what is left of the pool, or what comes next."""
+    if asked.pick == "next":
+        return list(left[:count])
+    errors = sequence_errors(whole, left, asked.outputs)
+    return [left[i] for i in np.argsort(-errors, kind="stable")[:count]]
+
+
+def _ended(asked: GrowConfig, rounds: Sequence[Round], left: int) -> str | None:
+    """Why no further round is begun; ``None`` if one is."""
+    best = 0
+    for done in rounds[1:]:
+        best = done.number if done.look.better_than(rounds[best].look) else best
+    if rounds[best].look.within >= asked.until:
+        return f"it ended with {100.0 * asked.until:g} % under the limit, as aimed at"
+    if (idle := len(rounds) - 1 - best) >= asked.patience:
+        return f"it ended after {idle} rounds that brought no improvement"
+    if len(rounds) > len(asked.additions):
+        return "it ended with the last round that was asked for"
+    return None if left else "it ended with the pool"

@@ -15,7 +15,7 @@ from sysid.errors import ConfigError
 from sysid.models import Cascade, Line
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference
-from sysid.workbench.assembly.config import LineConfig
+from sysid.workbench.assembly.proof_config import LineConfig
 
 WORKERS = 2
 """Threads of the timed runs."""

@@ -78,8 +78,9 @@ class Material:
 
     @property
     def choosing(self) -> tuple[Trace, ...]:
-        """All traces that choose between wholes."""
-        return (*self.selection, *chain.from_iterable(chosen_by for _, chosen_by in self.also.values()))
+        """All traces that choose between wholes, the pool's that train nothing among them."""
+        held_out = () if self.pool is None else self.pool[1]
+        return (*self.selection, *chain.from_iterable(chosen_by for _, chosen_by in self.also.values()), *held_out)
 
 
 def _beside(config: AssemblyConfig, found: TraceSet) -> tuple[list[Trace], list[Trace]]:

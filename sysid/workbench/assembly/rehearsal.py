@@ -29,7 +29,7 @@ def rehearse(config: AssemblyConfig, like: Trace) -> None:
     models = {member.mapping.output: _untaught(member, like) for member in config.members}
     models |= {known.mapping.output: known_model(known, like) for known in config.known}
     whole = assembled(config, models)
-    for one in config.together.rounds if config.together else ():
+    for one in (*config.joint, *config.growing):
         whole = reading_more(whole, one.reads)
         if one.everywhere:
             Everywhere.of(config, one, whole)

@@ -21,7 +21,7 @@ class RoundDone:
     """A round that was trained.
 
     Args:
-        number: From 1 on.
+        name: What it is called: ``2``, or ``2.1 of growth``.
         start: Which of the pipeline's starts it belongs to; ``None`` of a single one.
         trained: Outputs of the members that it trained, each in its first place.
         everywhere: Whether it trained them in all of their places.
@@ -32,7 +32,7 @@ class RoundDone:
         fit: What came of it.
     """
 
-    number: int
+    name: str
     start: int | None
     trained: tuple[str, ...]
     everywhere: bool
@@ -50,7 +50,7 @@ class RoundDone:
         ready: JointRound,
         fit: CascadeFit,
         *,
-        number: int,
+        name: str,
         start: int | None,
     ) -> RoundDone:
         """Say what a round did.
@@ -60,14 +60,14 @@ class RoundDone:
             asked: The round.
             ready: What it trained, and on what.
             fit: What came of it.
-            number: Which round it is.
+            name: What it is called.
             start: Which start it belongs to, of several.
 
         Returns:
             The round.
         """
         return cls(
-            number=number,
+            name=name,
             start=start,
             trained=tuple(
                 one.mapping.output for one in config.members if not set(placed_outputs(one)).isdisjoint(ready.trained)
@@ -93,7 +93,7 @@ class RoundDone:
     @property
     def sentences(self) -> list[str]:
         """All that its fit says: which states were looked at, which was chosen, and how it ended."""
-        called = f"Round {self.number}" if self.start is None else f"Start {self.start}, round {self.number}"
+        called = f"Round {self.name}" if self.start is None else f"Start {self.start}, round {self.name}"
         return [f"{called}: {said}" for said in (*self.fit.notes, self.fit.status.value)]
 
 
@@ -115,7 +115,7 @@ def rounds_table(rounds: Sequence[RoundDone]) -> dict[str, Any]:
         ],
         "rows": [
             [
-                str(one.number) if one.start is None else f"{one.number} of start {one.start}",
+                one.name if one.start is None else f"{one.name} of start {one.start}",
                 f"{_few(one.trained)}{', everywhere' if one.everywhere else ''}",
                 _few(one.measured),
                 one.traces, one.iterations, one.fit.train_time_s, one.loss, one.before, one.after,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -67,17 +68,14 @@ OF_TRAINING = ("max_iterations", "moves", "leverage", "soft_margin")
 """Options of a training that a round may have for itself."""
 
 
-class AgainConfig(BaseModel):
-    """A further round of training end to end, from where the round before ended; what it does not name stays.
+class RoundConfig(BaseModel):
+    """A round of training end to end as far as it is another one than that before; what it does not name stays.
 
     Args:
         members: Outputs of the members that are trained.
-        reads: Channels, or further lags, that members read from this round on, as under ``together``.
         measured: As under ``together``; ``[]`` for none any more.
         everywhere: As under ``together``.
         targets: The error of each output that counts as one, in its unit.
-        traces: Estimation traces used, the first so many.
-        also: Data sets as under ``together``.
         max_iterations: Of its training.
         moves: Of its training.
         leverage: Of its training.
@@ -87,16 +85,27 @@ class AgainConfig(BaseModel):
     model_config = STRICT
 
     members: tuple[str, ...] | None = Field(default=None, min_length=1)
-    reads: Reads = {}
     measured: tuple[str, ...] | None = None
     everywhere: bool | None = None
     targets: dict[str, float] | None = Field(default=None, min_length=1)
-    traces: int | None = Field(default=None, ge=1)
-    also: tuple[str, ...] | None = None
     max_iterations: int | None = Field(default=None, ge=1)
     moves: float | None = Field(default=None, gt=0)
     leverage: float | None = Field(default=None, gt=0)
     soft_margin: float | None = Field(default=None, gt=0)
+
+
+class AgainConfig(RoundConfig):
+    """A further round of training end to end, from where the round before ended.
+
+    Args:
+        reads: Channels, or further lags, that members read from this round on, as under ``together``.
+        traces: Estimation traces used, the first so many.
+        also: Data sets as under ``together``.
+    """
+
+    reads: Reads = {}
+    traces: int | None = Field(default=None, ge=1)
+    also: tuple[str, ...] | None = None
 
 
 class TogetherConfig(BaseModel):
@@ -135,38 +144,8 @@ class TogetherConfig(BaseModel):
 
     @model_validator(mode="after")
     def _check(self) -> TogetherConfig:
-        for one in self.rounds:
-            if one.everywhere and not one.members:
-                raise FieldError(
-                    "a round that trains everywhere names no members",
-                    expected="members that stand in the same places",
-                    got="all of them",
-                    remedy="name them under members",
-                )
-            both = set(one.measured) & {*(one.members or ()), *one.targets}
-            if both:
-                raise FieldError(
-                    f"{', '.join(sorted(both))} is to be as measured, and trained or judged",
-                    expected="outputs under measured that the same round has neither under members nor under targets",
-                    got=f"measured {', '.join(one.measured)}",
-                    remedy="take it out of measured, or out of the others",
-                )
+        check_rounds(self.rounds)
         return self
-
-    @property
-    def trained(self) -> tuple[str, ...]:
-        """Every member that some round's ``members`` names."""
-        return tuple(dict.fromkeys(name for one in self.rounds for name in one.members or ()))
-
-    @property
-    def judged(self) -> tuple[str, ...]:
-        """Outputs that are a target in some round."""
-        return tuple(dict.fromkeys(name for one in self.rounds for name in one.targets))
-
-    @property
-    def spared(self) -> tuple[str, ...]:
-        """Outputs that are as measured in some round."""
-        return tuple(dict.fromkeys(name for one in self.rounds for name in one.measured))
 
     @property
     def data(self) -> tuple[str, ...]:
@@ -174,20 +153,27 @@ class TogetherConfig(BaseModel):
         return tuple(dict.fromkeys(name for one in self.rounds for name in one.also))
 
     @property
-    def circles(self) -> tuple[str, ...]:
-        """Every channel that some round's ``reads`` names."""
-        return tuple(name for one in self.rounds for member, more in one.reads.items() for name in (member, *more))
-
-    @property
     def rounds(self) -> tuple[TogetherConfig, ...]:
         """Every round with all that it uses, in order."""
-        found = [self.model_copy(update={"again": ()})]
-        for more in self.again:
-            given = {**more.model_dump(exclude_none=True), "reads": more.reads}
+        first = self.model_copy(update={"again": ()})
+        return (first, *first.followed_by(self.again))
+
+    def followed_by(self, more: Sequence[RoundConfig]) -> tuple[TogetherConfig, ...]:
+        """Rounds that go on from this one, each from the one before.
+
+        Args:
+            more: What each of them is another one in.
+
+        Returns:
+            Each with all that it uses.
+        """
+        found = [self]
+        for one in more:
+            given = {**one.model_dump(exclude_none=True), "reads": one.reads if isinstance(one, AgainConfig) else {}}
             own: dict[str, Any] = {name: given.pop(name) for name in OF_TRAINING if name in given}
             training = found[-1].training.model_copy(update=own)
             found.append(found[-1].model_copy(update={**given, "training": training}))
-        return tuple(found)
+        return tuple(found[1:])
 
     def training_options(self, seed: int) -> JointTraining:
         """The options of the training, with a seed where none is named.
@@ -202,20 +188,71 @@ class TogetherConfig(BaseModel):
         return JointTraining(**{"seed": seed, **given})
 
 
-class GrowConfig(BaseModel):
-    """Training data that grow by what the whole is worst at, round by round.
+def check_rounds(rounds: Sequence[TogetherConfig]) -> None:
+    """Refuse what no round can be.
 
     Args:
-        data: Data set of the pool: cases with ``role: estimation`` are added from, cases with ``role: selection`` say
-            what a round has brought. Never sequences that are scored.
+        rounds: The rounds, with all that they use.
+
+    Raises:
+        FieldError: If one trains everywhere and names no members, or trains or judges what is to be as measured.
+    """
+    for one in rounds:
+        if one.everywhere and not one.members:
+            raise FieldError(
+                "a round that trains everywhere names no members",
+                expected="members that stand in the same places",
+                got="all of them",
+                remedy="name them under members",
+            )
+        if both := set(one.measured) & {*(one.members or ()), *one.targets}:
+            raise FieldError(
+                f"{', '.join(sorted(both))} is to be as measured, and trained or judged",
+                expected="outputs under measured that the same round has neither under members nor under targets",
+                got=f"measured {', '.join(one.measured)}",
+                remedy="take it out of measured, or out of the others",
+            )
+
+
+def names_in(rounds: Sequence[TogetherConfig]) -> dict[str, tuple[str, ...]]:
+    """The channels that some rounds name.
+
+    Args:
+        rounds: The rounds.
+
+    Returns:
+        By the field that names them, each channel once.
+    """
+    found = {
+        "members": (name for one in rounds for name in one.members or ()),
+        "targets": (name for one in rounds for name in one.targets),
+        "reads": (name for one in rounds for member, more in one.reads.items() for name in (member, *more)),
+        "measured": (name for one in rounds for name in one.measured),
+    }
+    return {field: tuple(dict.fromkeys(names)) for field, names in found.items()}
+
+
+Count = Annotated[int, Field(ge=1)]
+
+
+class GrowConfig(BaseModel):
+    """Training data that grow by what the whole is worst at, round by round, behind the rounds of ``together``.
+
+    Args:
+        data: Data set of the pool: cases with ``role: estimation`` are added from, cases with ``role: selection`` are
+            never trained on, say what a round has brought, and choose between the stages with the other selection
+            traces. A data set that nothing else uses.
         outputs: Outputs that are looked at; the one with the largest error counts.
         within: Root mean square error in their unit that a sequence should stay under.
-        members: Outputs of the members that are trained again in each round, in this order, on what the others put out.
-        add: Sequences added in each round.
-        rounds: At most.
+        add: Sequences added in each round; or in each one of its own, and there are as many rounds: ``[10, 20, 40]``.
+        rounds: At most; 5 by default.
         until: Share of the sequences within the limit at which no further round is begun.
         patience: Rounds without an improvement after which no further one is begun.
-        max_iterations: Of each training.
+        pick: Which sequences are added: those with the largest errors (``worst``), or those that come next in the pool
+            (``next``), to see beside it whether looking for the worst pays.
+        train: Rounds of training end to end that each round of growth goes through, as under ``again``. The first is
+            what the last round of ``together`` was, but for what it names, and each further one what the one before
+            was. All of them have the estimation traces of that last round, and all that has been added.
     """
 
     model_config = STRICT
@@ -223,9 +260,27 @@ class GrowConfig(BaseModel):
     data: str
     outputs: tuple[str, ...] = Field(min_length=1)
     within: float = Field(gt=0.0)
-    members: tuple[str, ...] = Field(min_length=1)
-    add: int = Field(default=20, ge=1)
-    rounds: int = Field(default=5, ge=1)
+    add: Count | Annotated[tuple[Count, ...], Field(min_length=1)] = 20
+    rounds: Count | None = None
     until: float = Field(default=0.99, gt=0.0, le=1.0)
     patience: int = Field(default=2, ge=1)
-    max_iterations: int = Field(default=60, ge=1)
+    pick: Literal["worst", "next"] = "worst"
+    train: tuple[RoundConfig, ...] = Field(default=(RoundConfig(),), min_length=1)
+
+    @model_validator(mode="after")
+    def _check(self) -> GrowConfig:
+        if isinstance(self.add, tuple) and self.rounds is not None and self.rounds != len(self.add):
+            raise FieldError(
+                f"{self.rounds} rounds of growth, and what to add in {len(self.add)}",
+                expected="as many numbers under add as there are rounds",
+                got=f"rounds: {self.rounds}, add: {', '.join(map(str, self.add))}",
+                remedy="leave rounds out: add says it",
+            )
+        return self
+
+    @property
+    def additions(self) -> tuple[int, ...]:
+        """How many sequences each round adds, for as many rounds as there are at most."""
+        if isinstance(self.add, tuple):
+            return self.add
+        return (self.add,) * (5 if self.rounds is None else self.rounds)

@@ -29,7 +29,7 @@ def stress_tables(found: Stress) -> list[dict[str, Any]]:
         [f"{100.0 * q:g} % of the sequences at most, {found.unit}", value] for q, value in found.quantiles.items()
     ]
     rows.append([f"share of sequences under {found.limit:g} {found.unit}", found.within])
-    rows.append(["sequences that diverged", float(found.lost)])
+    rows.append(["sequences that diverged", found.lost])
     rows += [[f"worst: {name}, {found.unit}", value] for name, value in found.worst]
     tables: list[dict[str, Any]] = [
         {
@@ -87,56 +87,82 @@ def limits_table(found: LimitCheck) -> dict[str, Any]:
     }
 
 
-def growth_table(grown: Growth) -> dict[str, Any]:
+def growth_table(grown: Growth, chosen: str) -> dict[str, Any]:
     """What each round brought.
 
     Args:
         grown: The growth.
+        chosen: The stage that was chosen.
 
     Returns:
         A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
     """
+    asked = grown.asked
     return {
         "caption": "How much data bought how much accuracy",
         "head": [
-            ["Round", ""], ["Sequences added", ""], ["Samples", ""], [f"Under {grown.limit:g}", "% of sequences"],
-            ["Median error", "rms"], ["99 % under", "rms"], ["Selection", "geometric mean"],
+            ["Round of growth", ""], ["Added", "sequences"], ["Trained on", "traces"], ["Trained on", "samples"],
+            ["Training", "s"], [f"Under {asked.within:g}", "% of sequences"], ["Median error", "rms"],
+            ["99 % under", "rms"], ["Selection", "geometric mean"],
         ],
         "rows": [
             [
-                f"{one.number} (kept)" if one.number == grown.best else str(one.number),
-                float(len(one.added)), float(one.samples), 100.0 * one.look.within, one.look.median, one.look.rare,
-                one.score,
+                f"{one.number} (chosen)" if one.stage == chosen else str(one.number),
+                len(one.added), one.traces, one.samples, one.seconds if one.number else None,
+                100.0 * one.look.within, one.look.median, one.look.rare, one.score,
             ]
             for one in grown.rounds
         ],
-        "note": f"Errors of {', '.join(grown.outputs)}, the largest counts, on sequences of the pool that train "
-        "nothing; the random sequences further on are others again.",
+        "note": f"Errors of {', '.join(asked.outputs)}, the largest counts, on {grown.held_out} sequences of the pool "
+        f"that train nothing, but are among those that choose between the stages. Added were sequences {grown.where}; "
+        f"{grown.ended}. Round 0 is the whole as it was {grown.rounds[0].stage}.",
     }  # fmt: skip
 
 
-def growth_chart(grown: Growth) -> dict[str, Any]:
-    """Error over samples trained on.
+def growth_charts(grown: Growth) -> list[dict[str, Any]]:
+    """Error, and share of sequences within the limit, over samples trained on.
 
     Args:
         grown: The growth.
 
     Returns:
-        A chart, as :class:`sysid.reporting.judgement.ChartRecord` has it.
+        Two charts, as :class:`sysid.reporting.judgement.ChartRecord` has them.
     """
+    asked, looks = grown.asked, [one.look for one in grown.rounds]
     samples = [float(one.samples) for one in grown.rounds]
-    return {
-        "title": "Error over data",
-        "caption": "Error on sequences of the pool that train nothing, over the samples that the members were "
-        "trained on: each round adds the sequences that the whole was worst at.",
-        "x": "samples trained on",
-        "y": "root mean square error of a sequence",
-        "lines": [
-            {"name": "99 % of the sequences under", "x": samples, "y": [one.look.rare for one in grown.rounds]},
-            {"name": "median", "x": samples, "y": [one.look.median for one in grown.rounds]},
-            {"name": "aimed at", "x": samples, "y": [grown.limit] * len(samples), "target": True},
-        ],
-    }
+    said = (
+        f"on {grown.held_out} sequences of the pool that train nothing, over the samples that the whole was trained "
+        f"on; each round, a mark, adds sequences {grown.where}."
+    )
+
+    def line(name: str, values: list[float], *, target: bool = False) -> dict[str, Any]:
+        return {"name": name, "x": samples, "y": values, "target": target, "points": not target}
+
+    return [
+        {
+            "title": "Error over data",
+            "caption": f"Error of {', '.join(asked.outputs)} {said}",
+            "x": "samples trained on",
+            "y": "root mean square error of a sequence",
+            "logarithmic": True,
+            "lines": [
+                line("99 % of the sequences under", [one.rare for one in looks]),
+                line("median", [one.median for one in looks]),
+                line("aimed at", [asked.within] * len(looks), target=True),
+            ],
+        },
+        {
+            "title": "Share over data",
+            "caption": f"Share with an error of {', '.join(asked.outputs)} under {asked.within:g} {said}",
+            "x": "samples trained on",
+            "y": "share of the sequences (%)",
+            "logarithmic": "x",
+            "lines": [
+                line(f"under {asked.within:g}", [100.0 * one.within for one in looks]),
+                line("aimed at", [100.0 * asked.until] * len(looks), target=True),
+            ],
+        },
+    ]
 
 
 def line_table(scores: LineScores, output: str) -> dict[str, Any]:

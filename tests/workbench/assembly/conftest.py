@@ -51,12 +51,12 @@ def levels(pump: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return upper, lower
 
 
-def write_tanks(folder: Path) -> None:
-    """The data set."""
+def write_tanks(folder: Path, seed: int = 0) -> None:
+    """The data set; with another seed, other sequences of the same tanks."""
     folder.mkdir(parents=True)
     cases = []
-    for seed, (name, role) in enumerate(ROLES.items()):
-        pump = np.repeat(np.random.default_rng(seed).uniform(0.0, 2.0, 15), 20)
+    for number, (name, role) in enumerate(ROLES.items(), start=seed):
+        pump = np.repeat(np.random.default_rng(number).uniform(0.0, 2.0, 15), 20)
         pump[:5] = 0.0
         rows = np.column_stack([np.arange(len(pump)) * 1.0, pump, *levels(pump)])
         np.savetxt(

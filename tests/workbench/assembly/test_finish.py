@@ -21,7 +21,7 @@ QUICK = (
     .replace("retrain: {members: [lower], max_iterations: 5}\n", "")
     .replace("export: null", "export: {formats: [c], tolerance: 1.0e-6}")
 )
-GROW = "grow: {data: pool, outputs: [lower], within: 0.001, members: [lower], add: 1, rounds: 1, max_iterations: 2}\n"
+GROW = "grow: {data: pool, outputs: [lower], within: 0.001, add: 1, rounds: 1, train: [{max_iterations: 2}]}\n"
 
 
 def write_data(folder: Path, without: str) -> None:

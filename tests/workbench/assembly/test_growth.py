@@ -1,4 +1,4 @@
-"""Growth: the worst sequences are added, the best round is kept, and a second run finds every round again."""
+"""Growth: the worst sequences are added, each round is a stage, and a second run finds every round again."""
 
 from __future__ import annotations
 
@@ -7,80 +7,110 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from sysid.errors import ConfigError
+from sysid.models import Cascade
 from sysid.reporting.judgement_report import read_judgement_results
-from sysid.workbench.assembly.growth import Look, grow, sequence_errors
+from sysid.traces import Trace
+from sysid.workbench.assembly.growth import Growth, Look, grow, sequence_errors
+from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.members import assembled
 from sysid.workbench.assembly.runner import run_assembly
+from sysid.workbench.assembly.stage_config import GrowConfig
+from sysid.workbench.assembly.views import growth_charts, growth_table
 from sysid.workbench.kinds import RunRequest
-from tests.workbench.assembly.conftest import PIPELINE
+from tests.workbench.assembly.conftest import PIPELINE, write_tanks
 from tests.workbench.assembly.test_members import TWO_PLACES, config, models, trace
 
-GROW = "grow: {data: pool, outputs: [AR, BP], within: 0.1, members: [BP, AR], add: 3, rounds: 4, patience: 2}\n"
+ASKED = GrowConfig(data="pool", outputs=("AR", "BP"), within=0.1, add=3, rounds=4)
+SEQUENCES = 28
 
 
-def grown(better_in: tuple[int, ...], pool: int = 20, text: str = GROW):
-    """A growth whose trainings are told apart by their round, with the whole right in some rounds and wrong else."""
-    asked, good = config(TWO_PLACES + text), models()
-    run = assembled(asked, good).simulate_trace
-    sequences = [truth(run, seed) for seed in range(pool + 8)]
-    bad = {name: _worse(model) for name, model in good.items()}
-    seen = []
-
-    def fit(member, now, traces, number, key):
-        name = member.mapping.output
-        seen.append((number, name, [one.name for one in traces], member.traces))
-        return (good if number in better_in else bad)[name], f"{key}>{number}{name}"
-
-    found = grow(
-        asked, bad, "start", fit, estimation=sequences[:2], selection=sequences[2:4], pool=sequences[8:],
-        held_out=sequences[4:8],
-    )  # fmt: skip
-    return found, seen, bad, sequences[8:], asked
-
-
-def truth(run, seed: int):
+def truth(whole: Cascade, seed: int) -> Trace:
     one = trace(n=60, seed=seed)
-    out = run(one)
+    out = whole.simulate_trace(one)
     return replace(one, name=f"T{seed}", values=np.column_stack([out[name] for name in one.channel_names]))
 
 
-def _worse(model):
-    return replace(model, theta=model.theta * 1.05)
+class Trained:
+    """A growth whose whole is right after some rounds and wrong after the others, and what its training was given."""
+
+    def __init__(self, asked: GrowConfig = ASKED, *, right_after: tuple[int, ...] = (), pool: int = 20) -> None:
+        right = assembled(config(TWO_PLACES), models())
+        self.wrong = assembled(
+            config(TWO_PLACES), {name: replace(one, theta=one.theta * 1.05) for name, one in models().items()}
+        )
+        sequences = [truth(right, seed) for seed in range(8 + pool)]
+        self.pool, self.told, self.calls, self.gave = sequences[8:], [], [], [self.wrong]
+
+        def train(now: Cascade, traces, number: int) -> tuple[Cascade, float]:
+            self.calls.append((now, [one.name for one in traces], number))
+            self.gave.append(replace(right if number in right_after else self.wrong))
+            return self.gave[-1], 2.5
+
+        self.found: Growth = grow(
+            asked, self.wrong, train, begins="trained end to end", estimation=sequences[:2], pool=self.pool,
+            held_out=sequences[4:8], score=lambda one: float(self.gave.index(one)), report=self.told.append,
+        )  # fmt: skip
 
 
 def test_the_worst_sequences_of_the_pool_are_added_and_none_twice():
-    found, seen, bad, pool, asked = grown(better_in=())
-    errors = sequence_errors(assembled(asked, bad), pool, ("AR", "BP"))
-    order = [pool[i].name for i in np.argsort(-errors)]
-    assert found.rounds[1].added == tuple(order[:3])
-    assert found.rounds[2].added == tuple(order[3:6])
-    assert found.rounds[0].added == ()
-    assert [one.samples for one in found.rounds] == [120, 300, 480]
-    # Each member in its turn, on what was there before and everything added so far.
-    assert [(number, name) for number, name, _, _ in seen] == [(1, "BP"), (1, "AR"), (2, "BP"), (2, "AR")]
-    assert seen[-1][2] == ["T0", "T1", *order[:6]]
-    assert all(cut is None for *_, cut in seen)
+    one = Trained()
+    errors = sequence_errors(one.wrong, one.pool, ("AR", "BP"))
+    order = [one.pool[i].name for i in np.argsort(-errors)]
+    assert [each.added for each in one.found.rounds] == [(), tuple(order[:3]), tuple(order[3:6])]
+    assert [(each.traces, each.samples) for each in one.found.rounds] == [(2, 120), (5, 300), (8, 480)]
+    # What was there before stays, each trace where it stood, and all that has been added comes behind.
+    assert [(names, number) for _, names, number in one.calls] == [
+        (["T0", "T1", *order[:3]], 1),
+        (["T0", "T1", *order[:6]], 2),
+    ]
+    assert one.told == list(one.found.rounds)
 
 
-def test_the_best_round_is_kept_and_growth_ends_when_nothing_improves():
-    found, *_ = grown(better_in=())
-    assert (len(found.rounds), found.best, found.key) == (3, 0, "start")
-    assert found.added == frozenset(), "what did not help is not trained on later either"
-    found, *_ = grown(better_in=(2,), text=GROW.replace("patience: 2", "patience: 2, until: 1.0"))
-    assert found.best == 2
-    assert found.rounds[2].look.within == 1.0
-    assert len(found.rounds) == 3, "the figure holds: no further round"
-    assert found.key == "start>1BP>1AR>2BP>2AR"
-    assert found.added == {name for one in found.rounds[1:] for name in one.added}
-    assert "round 2 is kept" in found.sentence
-    assert "6 sequences added" in found.sentence
+def test_the_control_adds_what_comes_next_in_the_pool():
+    one = Trained(ASKED.model_copy(update={"pick": "next"}))
+    names = [each.name for each in one.pool]
+    assert [each.added for each in one.found.rounds] == [(), tuple(names[:3]), tuple(names[3:6])]
+    assert "6 sequences, in the order of the pool" in one.found.sentence
 
 
-def test_growth_ends_when_the_pool_is_empty():
-    found, *_ = grown(better_in=(), pool=4, text=GROW.replace("patience: 2", "patience: 9"))
-    assert [len(one.added) for one in found.rounds] == [0, 3, 1]
+def test_each_round_goes_on_from_the_one_before_and_is_a_stage_of_its_own():
+    one = Trained()
+    assert [now is before for (now, _, _), before in zip(one.calls, one.gave, strict=False)] == [True, True]
+    assert [each.stage for each in one.found.rounds] == ["trained end to end", "grown, round 1", "grown, round 2"]
+    assert [each.number for each in one.found.rounds] == [0, 1, 2]
+    assert [(each.seconds, each.score) for each in one.found.rounds] == [(0.0, 0.0), (2.5, 1.0), (2.5, 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("asked", "right_after", "pool", "rounds", "why"),
+    [
+        pytest.param({}, (2,), 20, 2, "it ended with 99 % under the limit, as aimed at", id="the figure holds"),
+        pytest.param({}, (), 20, 2, "it ended after 2 rounds that brought no improvement", id="nothing improves"),
+        pytest.param({"patience": 9}, (), 20, 4, "it ended with the last round that was asked for", id="rounds"),
+        pytest.param({"patience": 9}, (), 4, 2, "it ended with the pool", id="the pool is empty"),
+        pytest.param({"rounds": None, "add": (1, 2), "patience": 9}, (), 20, 2, "last round", id="a number for each"),
+    ],
+)
+def test_growth_ends_when(asked: dict, right_after: tuple[int, ...], pool: int, rounds: int, why: str) -> None:
+    one = Trained(ASKED.model_copy(update=asked), right_after=right_after, pool=pool)
+    assert len(one.calls) == len(one.found.rounds) - 1 == rounds
+    assert why in one.found.ended
+    assert one.found.ended in one.found.sentence
+
+
+def test_a_round_may_add_as_many_as_it_names():
+    assert GrowConfig.model_validate(ASKED.model_dump() | {"add": [10, 20, 40], "rounds": None}).additions == (
+        10,
+        20,
+        40,
+    )
+    assert ASKED.additions == (3, 3, 3, 3)
+    assert GrowConfig(data="pool", outputs=("BC",), within=1.0).additions == (20,) * 5
+    one = Trained(ASKED.model_copy(update={"add": (1, 4), "rounds": None, "patience": 9}))
+    assert [len(each.added) for each in one.found.rounds] == [0, 1, 4]
 
 
 def test_of_an_error_per_sequence_the_largest_output_counts():
@@ -100,41 +130,158 @@ def test_more_sequences_within_the_limit_are_better_and_else_smaller_rare_errors
     assert Look.at(np.array([0.0, 1.0, 2.0, 3.0]), limit=1.5) == Look(within=0.5, median=1.5, rare=pytest.approx(2.97))
 
 
-def test_a_run_grows_resumes_and_reports(workspace: Path) -> None:
-    file = workspace / "pipelines" / "tanks.yaml"
-    lean = PIPELINE.replace("candidates: 2", "candidates: 1").split("retrain:")[0]
-    rounds = (
-        "grow: {data: tanks, outputs: [lower], within: 0.001, members: [lower], add: 1, rounds: 2, max_iterations: 4}\n"
-    )
-    file.write_text(f"{lean}{rounds}export: null\n", encoding="utf-8")
-
-    def run() -> list[list]:
-        assert run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
-        found = read_judgement_results(workspace / "runs" / "tanks")
-        assert found is not None
-        assert [one.name for one in found.subjects] == ["each alone", "grown"]
-        assert any(chart.title == "Error over data" for chart in found.judgement.charts)
-        return next(table.rows for table in found.judgement.tables if table.caption.startswith("How much data"))
-
-    rows = run()
-    assert [row[1] for row in rows] == [0.0, 1.0, 1.0]
-    assert [row[2] for row in rows] == [600.0, 900.0, 1200.0]
-    stamps = {one: one.stat().st_mtime_ns for one in workspace.rglob("fit.json")}
-    assert sum("grown" in str(one) for one in stamps) == 2
-    assert run() == rows
-    assert {one: one.stat().st_mtime_ns for one in workspace.rglob("fit.json")} == stamps, "nothing is fitted again"
+def test_the_table_counts_what_is_counted_and_the_curves_have_a_point_for_each_round():
+    found = Trained(right_after=(2,)).found
+    table = growth_table(found, "grown, round 2")
+    assert [row[0] for row in table["rows"]] == ["0", "1", "2 (chosen)"]
+    counts = [row[1:4] for row in table["rows"]]
+    assert counts == [[0, 2, 120], [3, 5, 300], [3, 8, 480]]
+    assert all(type(value) is int for row in counts for value in row)
+    assert [row[4] for row in table["rows"]] == [None, 2.5, 2.5]
+    assert table["rows"][2][5] == 100.0
+    error, share = growth_charts(found)
+    assert (error["logarithmic"], share["logarithmic"]) == (True, "x")
+    for chart in (error, share):
+        assert all(line["x"] == [120.0, 300.0, 480.0] for line in chart["lines"])
+        assert [line["points"] for line in chart["lines"]] == [not line["target"] for line in chart["lines"]]
+    assert error["lines"][0]["y"] == [each.look.rare for each in found.rounds]
+    assert share["lines"][0]["y"] == [100.0 * each.look.within for each in found.rounds]
 
 
-def test_a_pool_without_sequences_that_train_nothing_is_refused(workspace: Path) -> None:
-    file, data = workspace / "pipelines" / "tanks.yaml", workspace / "datasets" / "tanks" / "dataset.yaml"
-    pool = workspace / "datasets" / "pool"
-    pool.mkdir()
-    for one in data.parent.glob("*.csv"):
-        (pool / one.name).write_bytes(one.read_bytes())
-    text = data.read_text(encoding="utf-8").replace("name: tanks", "name: pool").replace("selection", "validation")
-    (pool / "dataset.yaml").write_text(text, encoding="utf-8")
-    lean = PIPELINE.replace("candidates: 2", "candidates: 1").split("retrain:")[0]
-    rounds = "grow: {data: pool, outputs: [lower], within: 0.1, members: [lower]}\n"
-    file.write_text(f"{lean}{rounds}export: null\n", encoding="utf-8")
+GROWN = "grow: {data: pool, outputs: [lower], within: 0.001, add: 1, rounds: 2, train: [{max_iterations: 2}]}\n"
+LEAN = (
+    PIPELINE.replace("candidates: 2", "candidates: 1")
+    .replace("retrain: {members: [lower], max_iterations: 5}\n", "")
+    .replace("looks: 2}\n", "looks: 2}\n  traces: 1\n", 1)
+    .replace("stress: {data: tanks, output: lower, within: 0.5}\n", GROWN)
+)
+"""Trained end to end on one trace, then grown by the two of the pool."""
+
+
+@pytest.fixture
+def pooled(workspace: Path) -> Path:
+    """The workspace with a pool, other tanks of the same kind."""
+    write_tanks(workspace / "datasets" / "pool", seed=10)
+    file = workspace / "datasets" / "pool" / "dataset.yaml"
+    file.write_text(file.read_text(encoding="utf-8").replace("name: tanks", "name: pool"), encoding="utf-8")
+    return workspace
+
+
+def run(workspace: Path, text: str, name: str = "tanks"):
+    file = workspace / "pipelines" / f"{name}.yaml"
+    file.write_text(text.replace("name: tanks", f"name: {name}"), encoding="utf-8")
+    assert run_assembly(RunRequest(path=file, typed=name, tracking=False)) == 0
+    found = read_judgement_results(workspace / "runs" / name)
+    assert found is not None
+    return found
+
+
+def test_a_run_grows_resumes_and_reports(pooled: Path) -> None:
+    results = run(pooled, LEAN)
+    stages = ["each alone", "trained end to end", "grown, round 1", "grown, round 2"]
+    assert [one.name for one in results.subjects] == stages
+    found = results.judgement
+    assert [row[0].removesuffix(" (chosen)") for row in found.tables[0].rows[: len(stages)]] == stages
+    assert [one.title for one in found.charts][:2] == ["Error over data", "Share over data"]
+    rows = next(one.rows for one in found.tables if one.caption.startswith("How much data"))
+    assert [row[1:4] for row in rows] == [[0, 1, 300], [1, 2, 600], [1, 3, 900]]
+    rounds = next(one.rows for one in found.tables if one.caption.startswith("Training end to end"))
+    assert [(row[0], row[3]) for row in rounds] == [("1", 1), ("1 of growth", 2), ("2 of growth", 3)]
+    assert any("Grown over 2 rounds by 2 sequences, at which the whole was worst" in one for one in found.sentences)
+    # The stages' score and the curve's are one figure: by the selection traces and those of the pool.
+    assert [row[-1] for row in found.tables[0].rows[1 : len(stages)]] == [row[-1] for row in rows]
+
+    files = [pooled / "runs" / "tanks" / f"{name}.json" for name in ("together", "grown-1", "grown-2")]
+    stamps = [one.stat().st_mtime_ns for one in files]
+    assert run(pooled, LEAN).judgement.tables[0] == found.tables[0]
+    assert [one.stat().st_mtime_ns for one in files] == stamps, "nothing is trained again"
+    run(pooled, LEAN.replace("add: 1, rounds: 2", "add: [1, 1], pick: next"))
+    assert files[0].stat().st_mtime_ns == stamps[0], "growth leaves what was before it"
+
+
+def test_each_round_goes_through_several_trainings_that_have_all_that_was_added(
+    pooled: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple] = []
+
+    def of(config, one, whole, *, estimation, selection):
+        asked.append((one.members, tuple(one.measured), one.training.max_iterations, len(estimation), len(selection)))
+        return make(config, one, whole, estimation=estimation, selection=selection)
+
+    make = JointRound.of
+    monkeypatch.setattr(JointRound, "of", of)
+    two = "[{members: [upper], measured: [lower], targets: {upper: 0.1}, max_iterations: 1}, {max_iterations: 2}]"
+    results = run(pooled, LEAN.replace("train: [{max_iterations: 2}]", f"train: {two}"))
+    # The pool's sequences that train nothing choose between the stages, and not between the states on the way.
+    assert asked == [
+        (None, (), 4, 1, 1),
+        (("upper",), ("lower",), 1, 2, 1),
+        (("upper",), ("lower",), 2, 2, 1),
+        (("upper",), ("lower",), 1, 3, 1),
+        (("upper",), ("lower",), 2, 3, 1),
+    ]
+    rounds = next(one for one in results.judgement.tables if one.caption.startswith("Training end to end"))
+    assert [row[0] for row in rounds.rows][1:] == [f"{one} of growth" for one in ("1.1", "1.2", "2.1", "2.2")]
+    assert any(one.startswith("Round 1.2 of growth: ") for one in rounds.folded)
+    assert (pooled / "runs" / "tanks" / "grown-2-2.json").is_file()
+
+
+def test_what_is_begun_from_another_whole_grows_too(pooled: Path) -> None:
+    run(pooled, LEAN.replace("export: null", "export: {formats: [c]}").replace(GROWN, ""))
+    results = run(pooled, LEAN.replace("seed: 3", "seed: 3\nbegin: ../runs/tanks/bundle"), "further")
+    stages = ["as it was begun from", "trained end to end", "grown, round 1", "grown, round 2"]
+    assert [one.name for one in results.subjects] == stages
+
+
+def test_a_pool_without_sequences_that_train_nothing_is_refused(pooled: Path) -> None:
+    file = pooled / "datasets" / "pool" / "dataset.yaml"
+    file.write_text(file.read_text(encoding="utf-8").replace("selection", "validation"), encoding="utf-8")
     with pytest.raises(ConfigError, match="the pool lacks a role"):
-        run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False))
+        run(pooled, LEAN)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("data: pool", "data: tanks", "the pool to grow by is used otherwise: tanks is under training"),
+        ("training: tanks", "training: [tanks, pool]", "pool is under training"),
+        ("data: tanks\n", "data: pool\n", "pool is under data"),
+        ("outputs: [lower], within", "outputs: [level], within", "grow, outputs names level"),
+        ("{max_iterations: 2}]", "{members: [level]}]", "grow, train, members names level"),
+        ("{max_iterations: 2}]", "{targets: {level: 1}}]", "grow, train, targets names level"),
+        ("{max_iterations: 2}]", "{measured: [lower]}]", "lower is to be as measured, and trained or judged"),
+        ("{max_iterations: 2}]", "{everywhere: true}]", "that trains everywhere names no members"),
+        ("{max_iterations: 2}]", "{traces: 2}]", "traces"),
+        ("{max_iterations: 2}]", "{reads: {upper: {lower: 2}}}]", "reads"),
+        ("{max_iterations: 2}]", "]", "train"),
+        ("rounds: 2", "rounds: 2, pick: best", "pick"),
+        ("add: 1, rounds: 2", "add: [1, 2], rounds: 3", "3 rounds of growth, and what to add in 2"),
+        ("add: 1", "add: 0", "add"),
+    ],
+)
+def test_what_cannot_be_grown_is_refused(workspace: Path, old: str, new: str, complaint: str) -> None:
+    assert old in LEAN
+    with pytest.raises(ConfigError, match=complaint):
+        run(workspace, LEAN.replace(old, new, 1))
+
+
+def test_growth_goes_on_from_training_end_to_end(workspace: Path) -> None:
+    before, _, behind = LEAN.partition("together:")
+    with pytest.raises(ConfigError, match="growth without training end to end"):
+        run(workspace, before + behind[behind.index("grow:") :])
+
+
+def test_the_rounds_of_growth_are_the_last_one_before_but_for_what_they_name():
+    text = LEAN.replace("train: [{max_iterations: 2}]", "train: [{max_iterations: 2}, {targets: {lower: 0.3}}]")
+    asked = config(text)
+    last = asked.joint[-1]
+    first, second = asked.growing
+    assert (first.targets, second.targets) == (last.targets, {"lower": 0.3})
+    assert [one.training.max_iterations for one in (last, first, second)] == [4, 2, 2]
+    assert first.traces == second.traces == 1
+    assert config(LEAN.replace(", train: [{max_iterations: 2}]", "")).growing == (last,)
+
+
+def test_a_share_of_none_is_nothing_to_aim_at():
+    with pytest.raises(ValidationError, match="until"):
+        GrowConfig(data="pool", outputs=("BC",), within=1.0, until=0.0)

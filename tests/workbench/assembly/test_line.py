@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Role, Trace, TraceSet
-from sysid.workbench.assembly.config import LineConfig
 from sysid.workbench.assembly.line import line_of, places_of, score_line
 from sysid.workbench.assembly.members import assembled
+from sysid.workbench.assembly.proof_config import LineConfig
 from sysid.workbench.assembly.views import line_chart, line_metrics, line_point, line_table
 from tests.workbench.assembly.test_members import TWO_PLACES, config, models, trace
 

@@ -65,7 +65,7 @@ def done(**changes: object) -> RoundDone:
         history={"iteration": np.array([0.0, 1.0, 2.0]), "loss": np.array([4.0, 2.0, 1.0])},
         train_time_s=3.0,
     )
-    own = {"number": 1, "start": None, "trained": ("BC",), "everywhere": False, "measured": (), "traces": 5}
+    own = {"name": "1", "start": None, "trained": ("BC",), "everywhere": False, "measured": (), "traces": 5}
     return RoundDone(**{"before": 2.0, "after": 0.5, "fit": fit, **own, **changes})
 
 
@@ -78,7 +78,8 @@ def test_a_round_that_brought_nothing_has_no_curve_and_no_residual() -> None:
 @pytest.mark.parametrize(
     ("changes", "column", "said"),
     [
-        ({"number": 3, "start": 2}, 0, "3 of start 2"),
+        ({"name": "3", "start": 2}, 0, "3 of start 2"),
+        ({"name": "2.1 of growth"}, 0, "2.1 of growth"),
         ({"trained": ("AR", "BC"), "everywhere": True}, 1, "AR, BC, everywhere"),
         ({"measured": ("BP", "AR", "ER")}, 2, "BP, AR, ER"),
         ({"measured": ("BP", "AR", "ER", "VO")}, 2, "4 outputs"),

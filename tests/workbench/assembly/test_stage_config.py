@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sysid.workbench.assembly.stage_config import TogetherConfig
+from sysid.workbench.assembly.stage_config import TogetherConfig, names_in
 
 
 def together(**fields) -> TogetherConfig:
@@ -37,7 +37,8 @@ def test_a_channel_that_was_measured_in_one_round_may_be_trained_in_the_next():
     both = {"targets": {"BP": 0.2, "BC": 0.1}, "measured": []}
     one = together(measured=["BP"], again=[{"traces": 3}, both])
     assert [one.measured for one in one.rounds] == [("BP",), ("BP",), ()]
-    assert (one.spared, one.judged) == (("BP",), ("BC", "BP"))
+    named = names_in(one.rounds)
+    assert (named["measured"], named["targets"]) == (("BP",), ("BC", "BP"))
 
 
 def test_data_sets_that_a_round_has_beside_the_others_stay_for_the_next():

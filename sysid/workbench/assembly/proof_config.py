@@ -1,0 +1,89 @@
+"""What a pipeline asks of the finished whole: random sequences, places between others, published figures."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from pydantic import BaseModel, Field, model_validator
+
+from sysid.workbench.fields import STRICT
+from sysid.yaml_files import FieldError
+
+
+class StressConfig(BaseModel):
+    """Random sequences of the reference, on which the whole has to hold.
+
+    Args:
+        data: Data set with the sequences.
+        output: Output that is judged.
+        within: Root mean square error in its unit that a sequence should stay under.
+        states: Name of an annotator, for errors state by state.
+    """
+
+    model_config = STRICT
+
+    data: str
+    output: str
+    within: float = Field(gt=0.0)
+    states: str | None = None
+
+
+class LineConfig(BaseModel):
+    """Places between those that are modelled: a channel is interpolated to them, and the members stand there too.
+
+    Args:
+        channel: What the members at a place read, by its name in the first place.
+        knots: Position of each place that is modelled, increasing, by the channel's name there.
+        outputs: What is had at every place, by the names in the first place.
+        data: Data set with the reference at places: the output at place 17 is the output's name with 17 behind it.
+        judged: Outputs that are scored there; all by default.
+    """
+
+    model_config = STRICT
+
+    channel: str
+    knots: dict[str, float] = Field(min_length=2)
+    outputs: tuple[str, ...] = Field(min_length=1)
+    data: str
+    judged: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> LineConfig:
+        positions = list(self.knots.values())
+        if any(after <= before for before, after in pairwise(positions)):
+            raise FieldError(
+                "the knots are no line",
+                expected="increasing positions",
+                got=", ".join(f"{name}: {position:g}" for name, position in self.knots.items()),
+                remedy="give the knots in the order in which they stand",
+            )
+        strangers = [name for name in self.judged if name not in self.outputs]
+        if strangers:
+            raise FieldError(
+                f"judged names {', '.join(strangers)}, which is not had at a place",
+                expected=f"some of {', '.join(self.outputs)}",
+                got=", ".join(self.judged),
+                remedy="add it to the outputs",
+            )
+        return self
+
+    @property
+    def scored(self) -> tuple[str, ...]:
+        """Outputs that are scored at places."""
+        return self.judged or self.outputs
+
+
+class PublishedConfig(BaseModel):
+    """Published figures of an output, beside ours.
+
+    Args:
+        source: Where they stand.
+        mse: By case, in the output's unit squared.
+        target: Share of the published figure that is aimed at.
+    """
+
+    model_config = STRICT
+
+    source: str
+    mse: dict[str, float]
+    target: float = Field(default=1.0, gt=0.0)
