@@ -158,6 +158,8 @@ class Course:
                     name=f"grown-{number}{suffix.replace('.', '-')}",
                     title=f"Growing, round {number}{suffix}, on {len(traces)} traces",
                     called=f"{number}{suffix} of growth",
+                    # By the others alone, a round that has learnt what the pool has of rare things is not taken.
+                    chosen_by=held_out,
                 )
                 took += seconds
             self.stages[f"{GROWN}, round {number}"] = now
@@ -183,12 +185,21 @@ class Course:
         return dealt([self.material.estimation, *(self.material.also[name][0] for name in one.also)])
 
     def _trained(
-        self, one: TogetherConfig, whole: Cascade, traces: Sequence[Trace], *, name: str, title: str, called: str
+        self,
+        one: TogetherConfig,
+        whole: Cascade,
+        traces: Sequence[Trace],
+        *,
+        name: str,
+        title: str,
+        called: str,
+        chosen_by: Sequence[Trace] = (),
     ) -> tuple[Cascade, float]:
         """The whole after a round of training end to end, and the seconds that took; the table has a row more."""
         config = self.context.config
         also = chain.from_iterable(self.material.also[data][1] for data in one.also)
-        ready = JointRound.of(config, one, whole, estimation=traces, selection=[*self.material.selection, *also])
+        selection = [*self.material.selection, *also, *chosen_by]
+        ready = JointRound.of(config, one, whole, estimation=traces, selection=selection)
         asked_for = one.model_dump(mode="json", exclude={"again", "also"})  # their traces are among the round's
         key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
         fit = self._round(self.context.named(name), self.context.titled(title), key, ready)

@@ -1,9 +1,10 @@
 """Grown by finding where the whole is worst: train, look, add the worst sequences to the training, train again.
 
 The sequences come from a pool that is scored nowhere else. Its cases with ``role: estimation`` are what is added from;
-those with ``role: selection`` are never trained on, and say after each round what the added data brought. The whole
-begins each round, which trains it end to end, where the round before has left it. Which of the states on the way is
-taken is not decided here: each is a stage of the report, and the selection traces choose between them all.
+those with ``role: selection`` are never trained on, and say after each round what the added data brought. They choose
+with the other selection traces, among the states of a round and between the stages, each round being one: their figures
+are a little too good, and what counts in the end is sequences that had no say in anything. The whole begins each round,
+which trains it end to end, where the round before has left it.
 """
 
 from __future__ import annotations
@@ -93,12 +94,14 @@ class Growth:
         asked: What was asked for.
         rounds: All that were done, the state before them first.
         held_out: How many sequences said what a round has brought.
+        unit: Of the outputs that were looked at; empty where they differ.
         ended: Why no further round was begun.
     """
 
     asked: GrowConfig
     rounds: tuple[Round, ...]
     held_out: int
+    unit: str
     ended: str
 
     @property
@@ -112,14 +115,20 @@ class Growth:
         return "at which the whole was worst" if self.asked.pick == "worst" else "in the order of the pool"
 
     @property
+    def limit(self) -> str:
+        """The error that a sequence should stay under, with its unit."""
+        return f"{self.asked.within:g} {self.unit}".strip()
+
+    @property
     def sentence(self) -> str:
         """For the report."""
         first, last, outputs = self.rounds[0].look, self.rounds[-1].look, ", ".join(self.asked.outputs)
         return (
             f"Grown over {len(self.rounds) - 1} rounds by {self.added} sequences, {self.where}; {self.ended}. On "
             f"{self.held_out} sequences of the pool that train nothing the share with an error of {outputs} under "
-            f"{self.asked.within:g} goes from {100.0 * first.within:.3g} to {100.0 * last.within:.3g} %, the error "
-            f"that 99 % stay under from {first.rare:.3g} to {last.rare:.3g}."
+            f"{self.limit} goes from {100.0 * first.within:.3g} to {100.0 * last.within:.3g} %, the error "
+            f"that 99 % stay under from {first.rare:.3g} to {last.rare:.3g} {self.unit}".strip()
+            + "."
         )
 
 
@@ -202,7 +211,9 @@ def grow(
         traces += added
         whole, seconds = train(whole, tuple(traces), number)
         done(f"{GROWN}, round {number}", added, seconds)
-    return Growth(asked=asked, rounds=tuple(rounds), held_out=len(held_out), ended=ended)
+    units = {held_out[0].channel(name).unit for name in asked.outputs}
+    unit = units.pop() if len(units) == 1 else ""
+    return Growth(asked=asked, rounds=tuple(rounds), held_out=len(held_out), unit=unit, ended=ended)
 
 
 def _picked(asked: GrowConfig, whole: Cascade, left: Sequence[Trace], count: int) -> list[Trace]:

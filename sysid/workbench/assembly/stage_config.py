@@ -240,8 +240,8 @@ class GrowConfig(BaseModel):
 
     Args:
         data: Data set of the pool: cases with ``role: estimation`` are added from, cases with ``role: selection`` are
-            never trained on, say what a round has brought, and choose between the stages with the other selection
-            traces. A data set that nothing else uses.
+            never trained on, say what a round has brought, and choose with the other selection traces, among the states
+            of a round of growth and between the stages. A data set that nothing else uses.
         outputs: Outputs that are looked at; the one with the largest error counts.
         within: Root mean square error in their unit that a sequence should stay under.
         add: Sequences added in each round; or in each one of its own, and there are as many rounds: ``[10, 20, 40]``.

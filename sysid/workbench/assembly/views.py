@@ -102,8 +102,8 @@ def growth_table(grown: Growth, chosen: str) -> dict[str, Any]:
         "caption": "How much data bought how much accuracy",
         "head": [
             ["Round of growth", ""], ["Added", "sequences"], ["Trained on", "traces"], ["Trained on", "samples"],
-            ["Training", "s"], [f"Under {asked.within:g}", "% of sequences"], ["Median error", "rms"],
-            ["99 % under", "rms"], ["Selection", "geometric mean"],
+            ["Training", "s"], [f"Under {grown.limit}", "% of sequences"],
+            ["Median error", grown.unit or "rms"], ["99 % under", grown.unit or "rms"], ["Selection", "geometric mean"],
         ],
         "rows": [
             [
@@ -113,9 +113,9 @@ def growth_table(grown: Growth, chosen: str) -> dict[str, Any]:
             ]
             for one in grown.rounds
         ],
-        "note": f"Errors of {', '.join(asked.outputs)}, the largest counts, on {grown.held_out} sequences of the pool "
-        f"that train nothing, but are among those that choose between the stages. Added were sequences {grown.where}; "
-        f"{grown.ended}. Round 0 is the whole as it was {grown.rounds[0].stage}.",
+        "note": f"Root mean square error of {', '.join(asked.outputs)}, the largest counts, on {grown.held_out} "
+        "sequences of the pool that train nothing, but choose with the selection traces. Added were "
+        f"sequences {grown.where}; {grown.ended}. Round 0 is the whole as it was {grown.rounds[0].stage}.",
     }  # fmt: skip
 
 
@@ -143,7 +143,7 @@ def growth_charts(grown: Growth) -> list[dict[str, Any]]:
             "title": "Error over data",
             "caption": f"Error of {', '.join(asked.outputs)} {said}",
             "x": "samples trained on",
-            "y": "root mean square error of a sequence",
+            "y": f"root mean square error of a sequence{f' ({grown.unit})' if grown.unit else ''}",
             "logarithmic": True,
             "lines": [
                 line("99 % of the sequences under", [one.rare for one in looks]),
@@ -153,12 +153,12 @@ def growth_charts(grown: Growth) -> list[dict[str, Any]]:
         },
         {
             "title": "Share over data",
-            "caption": f"Share with an error of {', '.join(asked.outputs)} under {asked.within:g} {said}",
+            "caption": f"Share with an error of {', '.join(asked.outputs)} under {grown.limit} {said}",
             "x": "samples trained on",
             "y": "share of the sequences (%)",
             "logarithmic": "x",
             "lines": [
-                line(f"under {asked.within:g}", [100.0 * one.within for one in looks]),
+                line(f"under {grown.limit}", [100.0 * one.within for one in looks]),
                 line("aimed at", [100.0 * asked.until] * len(looks), target=True),
             ],
         },

@@ -139,7 +139,9 @@ def test_the_table_counts_what_is_counted_and_the_curves_have_a_point_for_each_r
     assert all(type(value) is int for row in counts for value in row)
     assert [row[4] for row in table["rows"]] == [None, 2.5, 2.5]
     assert table["rows"][2][5] == 100.0
+    assert [head[0] for head in table["head"][5:6]] == ["Under 0.1 psi"]
     error, share = growth_charts(found)
+    assert error["y"] == "root mean square error of a sequence (psi)"
     assert (error["logarithmic"], share["logarithmic"]) == (True, "x")
     for chart in (error, share):
         assert all(line["x"] == [120.0, 300.0, 480.0] for line in chart["lines"])
@@ -212,13 +214,13 @@ def test_each_round_goes_through_several_trainings_that_have_all_that_was_added(
     monkeypatch.setattr(JointRound, "of", of)
     two = "[{members: [upper], measured: [lower], targets: {upper: 0.1}, max_iterations: 1}, {max_iterations: 2}]"
     results = run(pooled, LEAN.replace("train: [{max_iterations: 2}]", f"train: {two}"))
-    # The pool's sequences that train nothing choose between the stages, and not between the states on the way.
+    # The pool's sequence that trains nothing chooses with the other one as soon as the pool's train.
     assert asked == [
         (None, (), 4, 1, 1),
-        (("upper",), ("lower",), 1, 2, 1),
-        (("upper",), ("lower",), 2, 2, 1),
-        (("upper",), ("lower",), 1, 3, 1),
-        (("upper",), ("lower",), 2, 3, 1),
+        (("upper",), ("lower",), 1, 2, 2),
+        (("upper",), ("lower",), 2, 2, 2),
+        (("upper",), ("lower",), 1, 3, 2),
+        (("upper",), ("lower",), 2, 3, 2),
     ]
     rounds = next(one for one in results.judgement.tables if one.caption.startswith("Training end to end"))
     assert [row[0] for row in rounds.rows][1:] == [f"{one} of growth" for one in ("1.1", "1.2", "2.1", "2.2")]
