@@ -66,12 +66,12 @@ def say(what: str, one: Taken, *, target: float | None = None, published: str = 
 
 def say_faster(what: str, slow: Taken, fast: Taken, target: float | None = None) -> None:
     """By how much one is faster than another, as a finding."""
-    # Divided among cores processor times are a projection: that of a machine which is otherwise idle.
-    times = f"by the clock {number(slow.wall / fast.wall)} x"
+    # What is slow runs on one core: by its processor time, so that load never makes two threads look better.
+    other = f"by the clock {number(slow.wall / fast.wall)} x"
     if fast.cores > 1:
-        times = f"by processor time over {fast.cores} cores {number(fast.cores * slow.processor / fast.processor)} x"
-    ratio = slow.processor / fast.processor if fast.cores == 1 else slow.wall / fast.wall
-    found(what, ratio, "x", target=target, at_least=True, note=times)
+        # A projection: that of a machine which is otherwise idle.
+        other = f"by processor time over {fast.cores} cores {number(fast.cores * slow.processor / fast.processor)} x"
+    found(what, slow.seconds / fast.seconds, "x", target=target, at_least=True, note=other)
 
 
 def reference(command: Command, pairs: int) -> Callable[[], object]:
