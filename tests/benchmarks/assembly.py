@@ -1,21 +1,34 @@
 """Run time of cascades against the compiled reference: one car and fifty, 3 and 101 vehicles, warm and cold.
 
-Run with ``python -m tests.benchmarks assembly``. Not collected by pytest. The cascades have random weights of the size
-of fitted ones (their run time does not depend on the values); ``--whole=runs/combined-brake`` measures the fitted
-assembly of that run folder too, ``--line=runs/whole-train`` its fitted line at every place. The same 2,000 s of command
-go into everything; each figure is the median of repeats after one run that warms up. Beside the wall time stands the
-processor time of all threads: on a machine that others use, ratios of processor times are the ones that hold. Divided
-among cores they are a projection, that of a machine which is otherwise idle.
+    python -m tests.benchmarks assembly
+    python -m tests.benchmarks assembly --whole=runs/combined-brake --line=runs/whole-train
+
+* The fitted whole of one car, of a bundle or a run folder (``--whole=``; without it the published
+  ``reports/combined-brake-grown/bundle``): 2,000 s of a designed command, and each case of ``abdx-service`` and of
+  ``abdx-combined`` (``--cases=`` takes one of them), beside the reference of 3 and of 101 vehicles on the same command,
+  every cylinder recorded. What is aimed at is for 2,000 s: a short case bears the fixed share of a call. The surrogate
+  stands for the first valve of 101 vehicles; its run time is the same for any train. Beside it what it exports as C,
+  called from Python once for the whole record.
+* Every brake cylinder of 101 vehicles, on two threads: fifty copies of the fitted whole, which is what a whole for each
+  car would take; cascades of the dissertation's size, with random weights of the size of fitted ones (their run time
+  does not depend on the values), as one model that reads its place and as a model for each car; and, with ``--line=``,
+  the fitted line of a run folder at every place.
+* Cold: a process of its own, with kernels that were compiled before, and as on a machine that has never run any.
+
+Medians of repeats after one run that warms up (``--repeats=`` takes fewer). Times on one core are processor times, as
+other work on the machine hardly changes them; what a clock shows stands beside them. Times on two threads and cold ones
+are what a clock shows, and hold on a machine that is otherwise idle.
+
+The published figures are a footnote: MATLAB 2019b on a quad-core laptop of 2015, the reference being 3 vehicles
+interpreted in Simulink, on traces that are not public.
 """
 
 from __future__ import annotations
 
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,228 +36,244 @@ from pathlib import Path
 import numpy as np
 
 from sysid.airbrake.command import Command
-from sysid.airbrake.consist import Consist
-from sysid.airbrake.machine import Probe
-from sysid.airbrake.simulate import simulate
 from sysid.export import Surrogate, exporter
-from sysid.models import (
-    NARX,
-    Cascade,
-    Limit,
-    Mapping,
-    NARXModel,
-    Scaling,
-    parameter_count,
-    simulate_family,
-)
-from sysid.workbench.assembly.runner import read_assembly, read_line
+from sysid.ingest import load_dataset
+from sysid.models import Cascade, simulate_family
+from sysid.reporting import read_published
+from sysid.reporting.numbers import number
+from sysid.traces import Trace
+from sysid.workbench.assembly.runner import read_line
+from tests.benchmarks._cascades import COMBINED, DESIGNED, SERVICE, Fitted, cascade, fitted
+from tests.benchmarks._findings import FILE_VARIABLE, found, read
+from tests.benchmarks._timing import Taken, handle, reference, say, say_faster, taken
 
-DURATION, CARS, WORKERS = 2000.0, 50, 2
-ROWS = [[0, 90], [100, 84], [300, 90], [500, 70], [800, 90], [1100, 64.2], [1300, 90], [1700, 0], [1800, 90]]
-SERVICE = (("STP -> BP", 20), ("BP -> AR", 15), ("BP+AR -> BC", 30))
-COMBINED = (("STP -> BP", 20), ("BP -> ER", 15), ("BP+ER -> AR", 20), ("BP+AR+ER -> BC", 30))
-LEVELS = {"BP": 90.0, "AR": 90.0, "ER": 90.0, "BC": 0.0}
-
-TARGETS = {
-    "one car, 2,000 s, one core": "at most 25 ms",
-    "against the reference of 3 vehicles": "4x",
-    "against the reference of 101 vehicles": "100x",
-    "50 cars, 2,000 s, two cores": "at most 0.5 s",
-    "50 cars against the reference of 101 vehicles": "8x",
-}
-PUBLISHED = "published (MATLAB 2019b, another machine): service 1.37 to 1.48 s, combined 1.70 to 1.88 s per 2,000 s;"
-PUBLISHED_REFERENCE = "its interpreted Simulink reference of 3 vehicles: 20.0 to 22.3 s"
+DURATION, CARS, WORKERS = DESIGNED.duration, 50, 2
+PUBLISHED_WHOLE = "reports/combined-brake-grown/bundle"
+TRAINS = {3: 1, 101: 50}
+"""Wagon pairs, by vehicles."""
+ONE_CAR, FASTER, ALL_CARS, ALL_FASTER = 25.0, {3: 4.0, 101: 100.0}, 0.5, 8.0
+"""What is aimed at: ms, times by vehicles, s, times."""
 
 
 @dataclass(frozen=True)
-class Taken:
-    """Seconds of one run."""
+class Theirs:
+    """Where the published run times of a data set's cases stand."""
 
-    wall: float
-    processor: float
+    figures: str
+    table: str
+    variant: str
+    per_second: str = ""
+    reference: tuple[str, ...] = ()
+    """Cases on which their reference ran the same command."""
 
+    def beside(self, case: str) -> str:
+        """What is published of a case, in words."""
+        words = [f"{self._span(self.table, case, self.variant)} s ({self.table})"]
+        if self.per_second:
+            words.append(f"{self._span(self.per_second, case, self.variant)} ms per simulated s ({self.per_second})")
+        if case in self.reference:
+            words.append(f"the reference {self._span(self.table, case, 'original model')} s")
+        return "; ".join(words)
 
-def network(text: str, neurons: int, seed: int, extra: tuple[str, ...] = ()) -> NARXModel:
-    """A network with lags in powers of two and small random weights."""
-    mapping = Mapping.parse(text)
-    mapping = Mapping(inputs=(*mapping.inputs, *extra), output=mapping.output)
-    n = len(mapping.inputs)
-    delays = [[0, 1, 2, 4, 8, 16, 32]] * (n - len(extra)) + [[0]] * len(extra)
-    structure = NARX(input_delays=delays, output_delays=[1, 2, 4, 8], neurons=neurons)
-    count = parameter_count(structure.lags(n), neurons, linear=True)
-    return NARXModel(
-        network=structure,
-        theta=np.random.default_rng(seed).normal(0.0, 0.05, count),
-        scaling=Scaling(input_offset=(77.0,) * n, input_scale=(13.0,) * n, output_offset=45.0, output_scale=45.0),
-        mapping=mapping,
-        sample_time=0.1,
-        input_units=("psi",) * n,
-        output_unit="psi",
-        rest_output=LEVELS[mapping.output],
-    )
-
-
-def cascade(members: tuple[tuple[str, int], ...], seed: int = 0, extra: tuple[str, ...] = ()) -> Cascade:
-    """An assembly with the limits that users expect."""
-    models = [network(text, neurons, seed + i, extra) for i, (text, neurons) in enumerate(members)]
-    return Cascade(models=models, rest={"BP": "STP"}, limits={"BC": Limit(low=0.0, high="BP")})
+    def _span(self, *where: str) -> str:
+        """An interval as it is printed: seconds, or thousandths by simulated second."""
+        ends = [
+            f"{one.value * (1e3 if one.unit == 's/s' else 1.0):.2f}"
+            for one in read_published(self.figures).figures
+            if (one.source, one.case, one.variant) == where and one.quantity.endswith(("_low", "_high"))
+        ]
+        return " to ".join(ends)
 
 
-def taken(work: Callable[[], object], repeats: int) -> Taken:
-    """Median over repeats, after one that warms up."""
-    work()
-    walls, processors = [], []
-    for _ in range(repeats):
-        wall, processor = time.perf_counter(), time.process_time()
-        work()
-        walls.append(time.perf_counter() - wall)
-        processors.append(time.process_time() - processor)
-    return Taken(statistics.median(walls), statistics.median(processors))
+# EST01 and VAL01 of Table 7.7 are longer than those that its reference ran.
+SETS = {
+    "abdx-service": Theirs(
+        "lopes-2021", "Table 6.4", "proposed model", "Table 6.5", ("EST01", "VAL01", "VAL02", "VAL03", "VAL04")
+    ),
+    "abdx-combined": Theirs(
+        "lopes-2021-combined", "Table 7.7", "combined model", reference=("VAL02", "VAL03", "VAL04")
+    ),
+}
 
 
-def show(name: str, one: Taken) -> None:
-    """One line."""
-    print(
-        f"{name:<58} {1e3 * one.wall:9.1f} ms wall {1e3 * one.processor:9.1f} ms processor "
-        f"{1e3 * one.wall / DURATION:8.4f} ms per simulated s {DURATION / one.wall:9.0f}x real time"
-    )
+@dataclass(frozen=True)
+class Case:
+    """A command with the reference's times on it, by vehicles."""
+
+    name: str
+    command: Command
+    references: dict[int, Taken]
+    published: str = ""
 
 
-def ratio(slow: Taken, fast: Taken, cores: int = 1) -> str:
-    """How much faster; by processor time as if each thread had a core to itself."""
-    by_processor = f"{cores * slow.processor / fast.processor:.1f}x by processor time"
-    return f"{slow.wall / fast.wall:.1f}x wall, {by_processor}" + (f" over {cores} cores" if cores > 1 else "")
+def option(name: str) -> list[str]:
+    """What was said to an option, each time that it was."""
+    return [word.removeprefix(f"--{name}=") for word in sys.argv[1:] if word.startswith(f"--{name}=")]
 
 
-def reference(pairs: int) -> Callable[[], object]:
-    """The compiled physics, recording every cylinder."""
-    command = Command(times=tuple(row[0] for row in ROWS), pressures=tuple(row[1] for row in ROWS), duration=DURATION)
-    consist = Consist(pairs=pairs)
-    probes = tuple(Probe(quantity="cylinder", node=node) for node in consist.valve_nodes)
-    return lambda: simulate(command, consist=consist, probes=probes)
+def timed(work: Callable[[], object], repeats: int, duration: float = DURATION, cores: int = 1) -> Taken:
+    """Medians over so many repeats, or fewer where ``--repeats=`` says so."""
+    return taken(work, min([repeats, *map(int, option("repeats"))]), duration, cores)
 
 
-COLD = """
-import sys, time
-sys.argv = ["cold"]
-began = time.perf_counter()
-from tests.benchmarks import assembly
-loaded = time.perf_counter()
-one = assembly.cascade(assembly.COMBINED)
-one.simulate(assembly.command())
-print(f"{loaded - began:.2f} s to import, {time.perf_counter() - loaded:.2f} s for the first run")
-"""
-
-
-def cold(cache: str | None) -> str:
-    """First run in a process of its own."""
-    environment = dict(os.environ) | ({"NUMBA_CACHE_DIR": cache} if cache else {})
-    done = subprocess.run([sys.executable, "-c", COLD], env=environment, capture_output=True, text=True, check=True)
-    return done.stdout.strip()
-
-
-def command() -> np.ndarray:
-    """The handle at each sample, shape ``(n_samples, 1)``."""
-    times = 0.1 * np.arange(round(DURATION / 0.1))
-    rows = np.array(ROWS)
-    return rows[np.searchsorted(rows[:, 0], times, side="right") - 1, 1][:, np.newaxis]
-
-
-def beside_targets(figures: dict[str, str]) -> None:
-    """A line for each figure."""
-    for what, figure in figures.items():
-        print(f"  {what:<48} {figure:<60} (target {TARGETS[what]})")
-
-
-def one_car(single: Taken, small: Taken, large: Taken) -> dict[str, str]:
-    """The figures of an assembly of one car."""
-    return {
-        "one car, 2,000 s, one core": f"{1e3 * single.wall:.1f} ms wall, {1e3 * single.processor:.1f} ms processor",
-        "against the reference of 3 vehicles": ratio(small, single),
-        "against the reference of 101 vehicles": ratio(large, single),
+def timed_case(name: str, command: Command, published: str = "") -> Case:
+    """A command, run by the reference."""
+    references = {
+        vehicles: timed(reference(command, pairs), 5 if pairs == 1 else 3, command.duration)
+        for vehicles, pairs in TRAINS.items()
     }
+    return Case(name, command, references, published)
 
 
-def exported(whole: Cascade, u: np.ndarray, folder: Path) -> Callable[[], object]:
+def held(trace: Trace) -> Command:
+    """The command of a trace, by where its handle moves."""
+    values = trace["STP"]
+    moves = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1])
+    duration = len(values) * trace.sample_time
+    return Command(times=tuple(moves * trace.sample_time), pressures=tuple(values[moves]), duration=duration)
+
+
+def cases_of(name: str) -> list[Case]:
+    """The cases of a data set."""
+    traces = load_dataset(name)
+    read(name, traces.digest)
+    return [timed_case(one.name, held(one), SETS[name].beside(one.name)) for one in traces.traces]
+
+
+def exported(one: Fitted, u: np.ndarray, folder: Path) -> Callable[[], object]:
     """What a train simulator embeds: the exported source, built by the compiler that is here."""
-    writer, surrogate = exporter("c"), Surrogate.of(whole)
+    writer, surrogate = exporter("c"), Surrogate.of(one.whole, outputs=one.outputs)
     (file,) = writer.write(surrogate, folder)
     run, state = writer.load(file, folder), surrogate.at_rest(u[0])[np.newaxis]
     return lambda: run(u[:, np.newaxis], state)
 
 
-def fitted_whole(folder: Path, u: np.ndarray, small: Taken, large: Taken) -> None:
-    """A fitted assembly beside the reference."""
-    whole = read_assembly(folder)
-    single = taken(lambda: whole.simulate(u), 15)
-    print(f"\n{folder.name}, fitted: {len(whole.models)} members, {whole.n_parameters} parameters")
-    show(f"{folder.name}, one car", single)
+def one_car(name: str, whole: Cascade, designed: Case) -> Taken:
+    """The whole of one car over the designed command, beside its targets."""
+    u = handle(designed.command)
+    single = timed(lambda: whole.simulate(u), 15)
+    say(f"{name}, one car, 2,000 s", single, target=ONE_CAR)
+    for vehicles, target in FASTER.items():
+        say_faster(f"{name}, against the reference of {vehicles}", designed.references[vehicles], single, target)
+    return single
+
+
+def over(one: Fitted, name: str, cases: list[Case]) -> None:
+    """The whole of one car over the cases of a data set, and the case where it gains least."""
+    taken_by = {}
+    for case in cases:
+        u = handle(case.command)
+        taken_by[case.name] = timed(lambda u=u: one.whole.simulate(u), 15, case.command.duration)
+        ratios = [
+            f"the reference of {vehicles} vehicles {number(1e3 * slow.seconds)} ms, "
+            f"{number(slow.seconds / taken_by[case.name].seconds)} times as long"
+            for vehicles, slow in case.references.items()
+        ]
+        say(
+            f"{one.name}, {name}: {case.name}, {case.command.duration:,.0f} s",
+            taken_by[case.name],
+            published=case.published,
+            more="; ".join(ratios),
+        )
+    for vehicles in FASTER:
+        least = min(cases, key=lambda case: case.references[vehicles].seconds / taken_by[case.name].seconds)
+        what = f"{one.name}, {name}: against the reference of {vehicles}, least in {least.name}"
+        say_faster(what, least.references[vehicles], taken_by[least.name])
+
+
+def all_cars(name: str, work: Callable[[], object], large: Taken, repeats: int = 5) -> None:
+    """Every brake cylinder of a train of 101 vehicles, beside its targets."""
+    batch = timed(work, repeats, cores=WORKERS)
+    say(f"{name}, {CARS} cars, 2,000 s, {WORKERS} threads", batch, target=ALL_CARS)
+    say_faster(f"{name}, {CARS} cars, against the reference of 101", large, batch, ALL_FASTER)
+
+
+def fitted_whole(one: Fitted, designed: Case, sets: dict[str, list[Case]]) -> None:
+    """A fitted whole: one car, over the cases, and fifty of them."""
+    whole, u = one.whole, handle(designed.command)
+    print(f"\n{one.name}, fitted: {len(whole.models)} members, {whole.n_parameters} parameters")
+    single = one_car(one.name, whole, designed)
     with tempfile.TemporaryDirectory() as place:
-        show(f"{folder.name}, one car, exported as C", taken(exported(whole, u, Path(place)), 15))
-    beside_targets(one_car(single, small, large))
+        as_c = timed(exported(one, u, Path(place)), 15)
+    say(f"{one.name}, one car, exported as C", as_c, more=f"{number(as_c.seconds / single.seconds)} x our own free run")
+    for name, cases in sets.items():
+        over(one, name, cases)
+    shared = np.repeat(u[np.newaxis], CARS, axis=0)
+    copies = [whole] * CARS
+    large = designed.references[101]
+    all_cars(f"{one.name}, a copy for each car", lambda: simulate_family(copies, shared, workers=WORKERS), large)
 
 
-def fitted_line(folder: Path, u: np.ndarray, large: Taken) -> None:
-    """A fitted line at every place, beside the reference of 101 vehicles; its handle never asks for an emergency."""
+def fitted_line(folder: Path, large: Taken) -> None:
+    """A fitted line at every place; its handle never asks for an emergency."""
     line, places = read_line(folder).line, np.arange(1.0, CARS + 1.0)
-    inputs = np.maximum(u, 64.2)
-    batch = taken(lambda: line.simulate(inputs, places, workers=WORKERS), 7)
+    inputs = np.maximum(handle(DESIGNED), 64.2)
     print(f"\n{folder.name}, fitted: {line.n_parameters} parameters")
-    show(f"{folder.name}, {CARS} places, {WORKERS} threads", batch)
-    figures = {
-        "50 cars, 2,000 s, two cores": f"{batch.wall:.3f} s wall, {batch.processor:.3f} s processor over both",
-        "50 cars against the reference of 101 vehicles": ratio(large, batch, cores=WORKERS),
-    }
-    beside_targets(figures)
+    all_cars(f"{folder.name}, every place", lambda: line.simulate(inputs, places, workers=WORKERS), large, 7)
+
+
+def random_whole(name: str, members: tuple[tuple[str, int], ...], designed: Case) -> None:
+    """A cascade with random weights: one car, one model for all places, a model for each."""
+    sizes = ", ".join(f"{text} {neurons}" for text, neurons in members)
+    one, u, large = cascade(members), handle(designed.command), designed.references[101]
+    print(f"\n{name}, random weights: {sizes} neurons, {one.n_parameters} parameters")
+    label = f"{name}, random weights"
+    one_car(label, one, designed)
+    placed = cascade(members, extra=("POSITION",))
+    # Every car reads the same handle and its own place in the train.
+    inputs = np.stack([np.column_stack([u, np.full(len(u), float(car))]) for car in range(CARS)])
+    order = [("STP", "POSITION").index(channel) for channel in placed.inputs]
+    records = np.ascontiguousarray(inputs[:, :, order])
+    all_cars(f"{label}, one model", lambda: placed.simulate_batch(records, workers=WORKERS), large)
+    family = [cascade(members, seed=10 * car) for car in range(CARS)]
+    shared = np.repeat(u[np.newaxis], CARS, axis=0)
+    all_cars(f"{label}, a model for each car", lambda: simulate_family(family, shared, workers=WORKERS), large)
+
+
+COLD = """
+import sys, time
+from pathlib import Path
+began = time.perf_counter()
+from tests.benchmarks import _cascades, _timing
+loaded = time.perf_counter()
+if len(sys.argv) > 1:
+    _cascades.fitted(Path(sys.argv[1])).whole.simulate(_timing.handle(_cascades.DESIGNED))
+else:
+    _timing.reference(_cascades.DESIGNED, 1)()
+print(loaded - began, time.perf_counter() - loaded)
+"""
+
+
+def cold(what: str, arguments: list[str]) -> None:
+    """First runs in processes of their own."""
+    with tempfile.TemporaryDirectory() as empty:
+        for when, cache in (("kernels compiled before", None), ("on a machine that has never run it", empty)):
+            environment = {name: text for name, text in os.environ.items() if name != FILE_VARIABLE}
+            environment |= {"NUMBA_CACHE_DIR": cache} if cache else {}
+            words = [sys.executable, "-c", COLD, *arguments]
+            done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
+            imported, ran = (float(word) for word in done.stdout.split()[-2:])
+            note = f"{number(imported)} s to import, {number(ran)} s to read and run"
+            found(f"cold, {what}, {when}: 2,000 s", imported + ran, "s", note=note)
 
 
 def main() -> None:
-    """Print a table, and each figure beside its target."""
-    print(f"load before: {', '.join(f'{value:.1f}' for value in os.getloadavg())} on {os.cpu_count()} cores\n")
-    u = command()
-    runs: dict[str, Taken] = {}
-
-    def measure(name: str, work: Callable[[], object], repeats: int) -> Taken:
-        runs[name] = taken(work, repeats)
-        show(name, runs[name])
-        return runs[name]
-
-    small = measure("compiled reference, 3 vehicles", reference(1), 5)
-    large = measure("compiled reference, 101 vehicles", reference(50), 3)
+    """Measure everything that was asked for."""
+    places = [Path(text) for text in option("whole") or [PUBLISHED_WHOLE]]
+    wholes = [fitted(place) for place in places]
+    designed = timed_case("designed", DESIGNED)
+    for vehicles, one in designed.references.items():
+        say(f"compiled reference, {vehicles} vehicles, 2,000 s", one)
+    sets = {name: cases_of(name) for name in option("cases") or SETS}
+    for one in wholes:
+        fitted_whole(one, designed, sets)
+    for folder in option("line"):
+        fitted_line(Path(folder), designed.references[101])
     for name, members in {"service": SERVICE, "combined": COMBINED}.items():
-        sizes = ", ".join(f"{text} {neurons}" for text, neurons in members)
-        one = cascade(members)
-        print(f"\n{name}: {sizes} neurons, {one.n_parameters} parameters")
-        single = measure(f"{name}, one car", lambda one=one: one.simulate(u), 15)
-        placed = cascade(members, extra=("POSITION",))
-        # Every car reads the same handle and its own place in the train.
-        inputs = np.stack([np.column_stack([u, np.full(len(u), float(car))]) for car in range(CARS)])
-        order = [("STP", "POSITION").index(channel) for channel in placed.inputs]
-        records = np.ascontiguousarray(inputs[:, :, order])
-        batch = measure(
-            f"{name}, {CARS} cars, one model with the position as input, {WORKERS} threads",
-            lambda placed=placed, records=records: placed.simulate_batch(records, workers=WORKERS), 5,
-        )  # fmt: skip
-        family = [cascade(members, seed=10 * car) for car in range(CARS)]
-        shared = np.repeat(u[np.newaxis], CARS, axis=0)
-        measure(
-            f"{name}, {CARS} cars, a model for each, {WORKERS} threads",
-            lambda family=family, shared=shared: simulate_family(family, shared, workers=WORKERS), 5,
-        )  # fmt: skip
-        figures = one_car(single, small, large) | {
-            "50 cars, 2,000 s, two cores": f"{batch.wall:.3f} s wall, {batch.processor:.3f} s processor over both",
-            "50 cars against the reference of 101 vehicles": ratio(large, batch, cores=WORKERS),
-        }
-        beside_targets(figures)
-    for folder in (word.removeprefix("--whole=") for word in sys.argv[1:] if word.startswith("--whole=")):
-        fitted_whole(Path(folder), u, small, large)
-    for folder in (word.removeprefix("--line=") for word in sys.argv[1:] if word.startswith("--line=")):
-        fitted_line(Path(folder), u, large)
-    print(f"\ncold, kernels compiled before: {cold(None)}")
-    with tempfile.TemporaryDirectory() as cache:
-        print(f"cold, first run on a machine: {cold(cache)}")
-    print(f"\n{PUBLISHED} {PUBLISHED_REFERENCE}")
-    print(f"load after: {', '.join(f'{value:.1f}' for value in os.getloadavg())}")
+        random_whole(name, members, designed)
+    print()
+    cold(wholes[0].name, [str(places[0])])
+    cold("compiled reference, 3 vehicles", [])
 
 
 if __name__ == "__main__":

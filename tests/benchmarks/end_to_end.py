@@ -1,11 +1,11 @@
 """One iteration of training a whole end to end, against its limit: the matrix product of its normal equations.
 
-    python -m tests.benchmarks end_to_end --whole=runs/combined-brake-held
+    python -m tests.benchmarks end_to_end --whole=reports/combined-brake-held/bundle
 
-2,000 s of command through the fitted whole of a run folder (a cascade of four networks with random weights without
-one); every member is trained, every tenth sample of every output of a network counts. Beside it the product of a matrix
-of the same shape, which is all that an iteration would take if the sensitivities were free. Medians of five after one
-run that warms up; one BLAS thread, processor times.
+2,000 s of command through the fitted whole of a bundle or a run folder (a cascade of four networks with random weights
+without one); every member is trained, every tenth sample of every output of a network counts. Beside it the product of
+a matrix of the same shape, which is all that an iteration would take if the sensitivities were free. Medians of five
+after one run that warms up; one BLAS thread, processor times.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from sysid.estimation.cascade_provider import CascadeProvider
 from sysid.models import Cascade, Ends
 from sysid.reporting.numbers import number
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.runner import read_assembly
+from tests.benchmarks._cascades import COMBINED, DESIGNED, cascade, fitted
 from tests.benchmarks._findings import found
-from tests.benchmarks.assembly import COMBINED, cascade, command
+from tests.benchmarks._timing import handle
 from tests.benchmarks.training import median_ms
 
 STRIDE = 10
@@ -36,7 +36,7 @@ def networks(whole: Cascade) -> tuple[str, ...]:
 
 def record(whole: Cascade, outputs: tuple[str, ...]) -> Trace:
     """What the whole itself puts out, and a little more: residuals that are not all zero."""
-    u = command()
+    u = handle(DESIGNED)
     run = whole.simulate(u)
     noise = np.random.default_rng(0).normal(0.0, 0.1, (len(u), len(outputs)))
     values = np.column_stack([u, np.stack([run[name] for name in outputs], axis=1) + noise])
@@ -75,7 +75,8 @@ def main() -> None:
     folders = [Path(word.removeprefix("--whole=")) for word in sys.argv[1:] if word.startswith("--whole=")]
     with threadpool_limits(1, user_api="blas"):
         for folder in folders:
-            iteration(folder.name, read_assembly(folder))
+            one = fitted(folder)
+            iteration(one.name, one.whole)
         if not folders:
             iteration("four networks", cascade(COMBINED))
 
