@@ -7,10 +7,13 @@ where the model has them. The caller decides what to do.
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.export.stage import Side, Stage
 from sysid.export.surrogate import Surrogate
 
 
@@ -52,15 +55,15 @@ def expected_flags(
     low, high = (np.array([getattr(port, side) for port in surrogate.inputs]) for side in ("low", "high"))
     outside = ((inputs < low) | (inputs > high)).any(axis=1)
     lost = np.isnan(inputs).any(axis=1) | np.isnan(computed).any(axis=1)
-    known, n_inputs = np.column_stack([inputs, computed]), inputs.shape[1]
+    n_inputs = inputs.shape[1]
     bound, limited = (np.zeros(len(inputs), dtype=bool) for _ in range(2))
     for stage in surrogate.stages:
         cell, n = stage.cell, len(stage.sources)
-        for j, (target, sides, told) in enumerate(zip(stage.targets, stage.limits, stage.told, strict=True)):
+        for j, (target, told) in enumerate(zip(stage.targets, stage.told, strict=True)):
             output, offset, scale = computed[:, target - n_inputs], cell.offset[n + j], cell.scale[n + j]
             reached = np.zeros(len(inputs), dtype=bool)
-            for side in sides:
-                reached |= output == (side.value if side.column is None else known[:, side.column])
+            for _, at_side in _at_sides(stage, j, inputs, computed):
+                reached |= at_side
             for value in (cell.low, cell.high):
                 if np.isfinite(value):
                     bound |= ~reached & (output == value * scale + offset)
@@ -72,3 +75,59 @@ def expected_flags(
         + limited * int(Flag.AT_LIMIT)
     )
     return np.asarray(flags, dtype=np.int32)
+
+
+def _at_sides(
+    stage: Stage, number: int, inputs: NDArray[np.float64], computed: NDArray[np.float64]
+) -> Iterator[tuple[Side, NDArray[np.bool_]]]:
+    """Each side of an output's declared limits, and the samples at which the output is there."""
+    known = np.column_stack([inputs, computed])
+    output = known[:, stage.targets[number]]
+    for side in stage.limits[number]:
+        yield side, output == (side.value if side.column is None else known[:, side.column])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """For how much of a run an output is at one of its declared limits.
+
+    Args:
+        output: The output.
+        upper: Whether it is its upper limit.
+        limit: The limit: a value with its unit, or the name of a channel.
+        share: Share of the samples.
+    """
+
+    output: str
+    upper: bool
+    limit: str
+    share: float
+
+    @property
+    def sentence(self) -> str:
+        """In words."""
+        side = "upper" if self.upper else "lower"
+        return f"{self.output} at its {side} limit {self.limit} in {100.0 * self.share:.3g} %"
+
+
+def limits_reached(surrogate: Surrogate, inputs: NDArray[np.float64], computed: NDArray[np.float64]) -> list[Held]:
+    """Which declared limits hold which outputs of a free run, and for how much of it.
+
+    Args:
+        surrogate: What is run.
+        inputs: Shape ``(n_samples, n_inputs)``, in their units.
+        computed: Shape ``(n_samples, n_computed)``, in their units, as :meth:`Surrogate.compute` gives them.
+
+    Returns:
+        Of the outputs that come out, the limits that are reached.
+    """
+    ports, found = (*surrogate.inputs, *surrogate.computed), []
+    for stage in surrogate.stages:
+        for j, (target, told) in enumerate(zip(stage.targets, stage.told, strict=True)):
+            port = ports[target]
+            for side, there in _at_sides(stage, j, inputs, computed) if told else ():
+                share = float(np.mean(there)) if len(there) else 0.0
+                if share:
+                    limit = f"{side.value:g} {port.unit}" if side.column is None else ports[side.column].name
+                    found.append(Held(output=port.name, upper=side.upper, limit=limit, share=share))
+    return found

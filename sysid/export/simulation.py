@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
 from sysid.export.command_table import CommandTable, read_command
-from sysid.export.flags import MEANING, Flag, expected_flags
+from sysid.export.flags import MEANING, Flag, Held, expected_flags, limits_reached
 from sysid.export.reading import read_bundle
 from sysid.export.surrogate import Surrogate
 from sysid.ingest import read_trace
@@ -28,18 +28,25 @@ class Simulation:
         inputs: Names of the inputs.
         outputs: Names of the outputs.
         flags: Of every sample, bits of :class:`sysid.export.Flag`.
+        held: Which declared limits held which outputs, and for how much of the run.
     """
 
     trace: Trace
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     flags: NDArray[np.int32]
+    held: tuple[Held, ...] = ()
 
     @property
     def sentences(self) -> list[str]:
         """What was raised, and for how much of the run; empty if nothing was."""
         shares = {flag: float(np.mean((self.flags & int(flag)) > 0)) for flag in Flag}
-        return [f"in {100.0 * share:.3g} % of the samples {MEANING[flag]}" for flag, share in shares.items() if share]
+        which = {Flag.AT_LIMIT: f": {'; '.join(one.sentence for one in self.held)}" if self.held else ""}
+        return [
+            f"in {100.0 * share:.3g} % of the samples {MEANING[flag]}{which.get(flag, '')}"
+            for flag, share in shares.items()
+            if share
+        ]
 
 
 def simulate_bundle(
@@ -133,4 +140,5 @@ def _run(bundle: Bundle, given: Trace, channels: tuple[Channel, ...], initial: f
         provenance=(*given.provenance, f"{surrogate.mapping} simulated in free run by {bundle.folder}"),
     )
     flags = expected_flags(surrogate, values, computed)
-    return Simulation(trace=trace, inputs=names, outputs=tuple(c.name for c in outputs), flags=flags)
+    held = tuple(limits_reached(surrogate, values, computed))
+    return Simulation(trace=trace, inputs=names, outputs=tuple(c.name for c in outputs), flags=flags, held=held)

@@ -37,12 +37,26 @@ def test_a_command_gives_every_channel_of_the_cascade(whole, limited, file):
         np.testing.assert_array_equal(found.trace.columns(limited.outputs), limited.simulate(u).values[:, 2:])
 
 
-def test_limits_and_ranges_are_reported(whole, file):
+def test_limits_and_ranges_are_reported(whole, limited, file):
     found = simulate_bundle(whole, file)
-    assert (found.flags & Flag.AT_LIMIT).any()
-    assert any(
-        sentence.endswith("an output is held at a limit that was declared for it") for sentence in found.sentences
-    )
+    at_limit = (found.flags & Flag.AT_LIMIT) > 0
+    assert at_limit.any()
+    (sentence,) = [one for one in found.sentences if "held at a limit that was declared for it" in one]
+    assert sentence.endswith(": " + "; ".join(one.sentence for one in found.held))
+    # Which limit, and how long: counted by hand from the channels themselves.
+    limits = {(one.output, one.upper): one for one in found.held}
+    for name, limit in limited.limits.items():
+        for upper, value in ((False, limit.low), (True, limit.high)):
+            there = (
+                None
+                if value is None
+                else found.trace[name] == (found.trace[value] if isinstance(value, str) else value)
+            )
+            if there is not None and there.any():
+                one = limits.pop((name, upper))
+                assert one.share == pytest.approx(float(np.mean(there)))
+                assert one.limit == (value if isinstance(value, str) else f"{value:g} psi")
+    assert not limits, "nothing else is reached"
     assert len(found.trace) == len(found.flags)
 
 

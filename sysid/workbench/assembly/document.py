@@ -17,6 +17,7 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.lessons import Lesson, lessons_point, lessons_table
 from sysid.workbench.assembly.limit_check import LimitCheck
+from sysid.workbench.assembly.limits_held import Holding, holding_table
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.member_scores import MemberScores, member_tables
 from sysid.workbench.assembly.rounds import RoundDone, rounds_table
@@ -66,6 +67,7 @@ class Outcome:
         growth: What growing the training data brought, if it was asked for.
         line: How the places do between those that are modelled, if they were asked for.
         exported: The bundle, if one was asked for.
+        holding: Which limits hold the outputs in free run.
         members: The members' candidates by themselves, where there are several or they were fitted one step ahead too.
         lessons: What the stages say of lessons of modelling by parts.
     """
@@ -84,6 +86,7 @@ class Outcome:
     growth: Sequence[Growth] = ()
     line: LineScores | None = None
     exported: Bundle | None = None
+    holding: Sequence[Holding] = ()
     members: Sequence[MemberScores] = ()
     lessons: Sequence[Lesson] = ()
 
@@ -143,6 +146,8 @@ def _tables(config: AssemblyConfig, found: Outcome) -> list[dict[str, Any]]:
     if found.stressed is not None:
         tables += stress_tables(found.stressed)
     tables.append(_time_table(found.timing, found.cases))
+    if found.holding:
+        tables.append(holding_table(found.holding))
     if found.limits.passed:
         tables.append(limits_table(found.limits))
     if found.exported is not None:

@@ -22,6 +22,7 @@ from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.document import SELECTION, Outcome, document
 from sysid.workbench.assembly.lessons import lessons_of
+from sysid.workbench.assembly.limits_held import holding
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.member_scores import score_candidates
@@ -61,31 +62,7 @@ class Finish:
             What is reported, as it is stored.
         """
         config = self.context.config
-        outputs = config.choose_on or config.outputs
-        scores, timing, chosen_by = {}, {}, {}
-        for stage, cascade in self.trained.stages.items():
-            # What only the training looked at is no part of the surrogate, nor of its run time.
-            evaluation = evaluate_cascade(cascade.upstream_of(config.wanted), cases, outputs=config.outputs)
-            scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
-            timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
-            chosen_by[stage] = whole_score(cascade, material.choosing, outputs)
-        chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
-        whole = self.trained.stages[chosen].upstream_of(config.wanted)
-        write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
-        stressed, worst = self._stressed(whole)
-        line = self._line(whole)
-        exported = self._export(whole, cases, evaluate_cascade(whole, cases), material)
-        candidates = self.trained.candidates
-        members = [] if candidates is None else score_candidates(candidates, tuple(cases))
-        said = document(
-            config,
-            Outcome(
-                whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.trained.notes,
-                rounds=self.trained.rounds, timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst,
-                line=line, growth=self.trained.growth, exported=exported, limits=material.limits,
-                members=members, lessons=lessons_of(scores, members, cases, config.lessons),
-            ),
-        )  # fmt: skip
+        said = document(config, self._outcome(cases, material))
         results = JudgementResults(
             kind=config.kind,
             pipeline=config.name,
@@ -107,18 +84,45 @@ class Finish:
         write_judgement_results(self.context.store.path, results)
         return results
 
-    def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...]]:
-        """What came of the random sequences, and those that the whole did worst on."""
+    def _outcome(self, cases: TraceSet, material: Material) -> Outcome:
+        """Every stage scored, one chosen by the selection traces, proven and exported."""
+        config = self.context.config
+        outputs = config.choose_on or config.outputs
+        scores, timing, chosen_by = {}, {}, {}
+        for stage, cascade in self.trained.stages.items():
+            # What only the training looked at is no part of the surrogate, nor of its run time.
+            evaluation = evaluate_cascade(cascade.upstream_of(config.wanted), cases, outputs=config.outputs)
+            scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
+            timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
+            chosen_by[stage] = whole_score(cascade, material.choosing, outputs)
+        chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
+        whole = self.trained.stages[chosen].upstream_of(config.wanted)
+        write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
+        stressed, worst, sequences = self._stressed(whole)
+        line = self._line(whole)
+        exported = self._export(whole, cases, evaluate_cascade(whole, cases), material)
+        candidates = self.trained.candidates
+        members = [] if candidates is None else score_candidates(candidates, tuple(cases))
+        return Outcome(
+            whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.trained.notes,
+            rounds=self.trained.rounds, timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst,
+            line=line, growth=self.trained.growth, exported=exported, limits=material.limits,
+            holding=holding(whole, config.outputs, tuple(cases), sequences), members=members,
+            lessons=lessons_of(scores, members, cases, config.lessons),
+        )  # fmt: skip
+
+    def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...], tuple[Trace, ...]]:
+        """What came of the random sequences, those that the whole did worst on, and all of them."""
         asked = self.context.config.stress
         if asked is None:
-            return None, ()
+            return None, (), ()
         annotator = None if asked.states is None else find_annotator(asked.states, where="stress, states")
         step, sequences = "Running the whole on random sequences", self.context.load(asked.data)
         self.context.tell(events.StepStarted(step=step))
         found = stress(whole, tuple(sequences), asked.output, asked.within, annotator=annotator)
         detail = f"{found.lost} of {found.sequences} diverged, {100 * found.within:.3g} % within"
         self.context.tell(events.StepDone(step=step, stored=False, detail=detail))
-        return found, tuple(sequences[name] for name, _ in found.worst)
+        return found, tuple(sequences[name] for name, _ in found.worst), tuple(sequences)
 
     def _line(self, whole: Cascade) -> LineScores | None:
         asked = self.context.config.line

@@ -37,7 +37,7 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
     assert results is not None
     stages = [subject.name for subject in results.subjects]
     assert stages == ["each alone", "chosen together", "retrained", "trained end to end"]
-    upper, lower, lessons, alone, rounds, stress, timing = results.judgement.tables
+    upper, lower, lessons, alone, rounds, stress, timing, holding = results.judgement.tables
     assert [row[0] for row in lower.rows if str(row[0]).removesuffix(" (chosen)") in stages] == [
         row[0] for row in upper.rows
     ]
@@ -54,6 +54,7 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
     assert [row[0] for row in rounds.rows] == ["1"]
     assert any("diverged" in str(row[0]) for row in stress.rows)
     assert len(timing.rows) == 4
+    assert [row[:2] for row in holding.rows] == [["lower at its lower limit", "0 cm"]]
     # What the table says is what the stored assembly does.
     whole = read_assembly(folder)
     pump = np.repeat(np.random.default_rng(3).uniform(0.0, 2.0, 15), 20)
