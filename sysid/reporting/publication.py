@@ -34,9 +34,15 @@ LEFT_OUT: Final = ("fit-", "frequency-response", "residuals")
 """Beginnings of the anchors of sections that only the whole report has."""
 BUNDLE: Final = "bundle"
 """The folder of the frozen surrogate, in a run's folder and beside a page."""
+LINE: Final = "line.json"
+"""The file of a frozen line, every place of it, likewise."""
 FROZEN: Final = f"""
 The frozen surrogate lies beside this page, in [{BUNDLE}]({BUNDLE}): what it was exported as, with its card, its range
 and how far each file is from the model. `sysid simulate` runs it.
+"""
+FROZEN_LINE: Final = f"""
+The frozen line lies beside this page, in [{LINE}]({LINE}): `sysid simulate` with `--places` and this folder runs every
+place of it in one call.
 """
 
 
@@ -59,19 +65,19 @@ def publish_run(
         into: Folder of the published reports.
         name: Name of the report; the pipeline's by default.
         workspace: Where the user's own tables of published figures lie; ``None`` is the current folder.
-        bundle: Whether the frozen surrogate that the run exported goes with the page.
+        bundle: Whether the frozen surrogate that the run left, exported or as a line, goes with the page.
 
     Returns:
         The page, ``<into>/<name>/README.md``, with its figures beside it, and ``scores.json`` for programs; the
-        surrogate in ``bundle``.
+        surrogate in ``bundle``, or as ``line.json``.
 
     Raises:
-        ConfigError: If the folder holds no results, or no bundle that was asked for, or there is another page of that
-            name that is not ours.
+        ConfigError: If the folder holds no results, or no surrogate that was asked for, or there is another page of
+            that name that is not ours.
         BundleError: If the bundle is damaged.
     """
     source = _source(Path(run_folder), workspace)
-    frozen = _frozen(Path(run_folder)) if bundle else None
+    frozen = _frozen(Path(run_folder)) if bundle else ()
     chosen = name or source.document.results.pipeline
     target = into / chosen
     refuse_others(target)
@@ -82,9 +88,13 @@ def publish_run(
         draft.mkdir()
         command = f"sysid publish {run_folder} --as {chosen}{' --bundle' if frozen else ''}"
         text = _page(source, chosen, command, draft)
-        if frozen:
-            shutil.copytree(frozen, draft / BUNDLE)
-            text += FROZEN
+        for left in frozen:
+            if left.is_dir():
+                shutil.copytree(left, draft / BUNDLE)
+                text += FROZEN
+            else:
+                shutil.copyfile(left, draft / LINE)
+                text += FROZEN_LINE
         (draft / PAGE).write_text(text, encoding="utf-8", newline="\n")
         if source.scores:
             write_scores(draft, source.scores)
@@ -108,20 +118,22 @@ def _source(folder: Path, workspace: Path | None) -> _Source:
     )
 
 
-def _frozen(run_folder: Path) -> Path:
-    """The bundle that a run left, whole."""
+def _frozen(run_folder: Path) -> list[Path]:
+    """What a run left for use: its bundle, whole, and its line."""
     from sysid.export import read_bundle
 
-    folder = run_folder / BUNDLE
-    if not folder.is_dir():
+    folder, line = run_folder / BUNDLE, run_folder / LINE
+    found = [read_bundle(folder).folder] if folder.is_dir() else []
+    found += [line] if line.is_file() else []
+    if not found:
         raise ConfigError(
             "there is no bundle to publish",
             where=folder,
-            expected="the bundle that a run leaves whose pipeline says export",
-            got="no such folder",
-            remedy="run a pipeline with an export, or leave --bundle out",
+            expected=f"the bundle that a run leaves whose pipeline says export, or the {LINE} of one with a line",
+            got="neither",
+            remedy="run a pipeline with an export or a line, or leave --bundle out",
         )
-    return read_bundle(folder).folder
+    return found
 
 
 def _page(source: _Source, name: str, command: str, folder: Path) -> str:

@@ -210,7 +210,8 @@ def simulate(
         float | None, typer.Option(help="Output before the first sample; its declared level by default.")
     ] = None,
     places: Annotated[
-        str | None, typer.Option(help="Places of a line, as 1:50; BUNDLE is then the run folder of its assembly.")
+        str | None,
+        typer.Option(help="Places of a line, as 1:50; BUNDLE is then the folder of its run, or of its published page."),
     ] = None,
 ) -> None:
     """Run an exported model or cascade on a file of inputs or a command, fed with nothing but its own past."""

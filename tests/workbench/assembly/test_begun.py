@@ -123,6 +123,17 @@ def test_a_published_bundle_is_begun_from_as_well(workspace: Path, trained: Path
     assert read_judgement_results(run(workspace, "further", published)) is not None
 
 
+def test_a_line_is_published_beside_the_page_as_it_is(workspace: Path) -> None:
+    """Whatever the line is of: it is copied, and the page says where it lies."""
+    folder = run(workspace, "tanks", QUICK)
+    shutil.rmtree(folder / "bundle", ignore_errors=True)
+    (folder / "line.json").write_text('{"a": "line"}', encoding="utf-8")
+    page = publish_run(folder, workspace / "reports", bundle=True)
+    assert "[line.json](line.json)" in page.read_text(encoding="utf-8")
+    assert not (page.parent / "bundle").exists()
+    assert (page.parent / "line.json").read_bytes() == (folder / "line.json").read_bytes()
+
+
 def test_a_bundle_that_is_not_there_is_not_published(workspace: Path) -> None:
     folder = run(workspace, "tanks", QUICK)
     with pytest.raises(ConfigError, match="no bundle to publish"):
