@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from sysid.reporting.published import PublishedTable, read_published
 from sysid.reporting.thinning import thin
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.growth import Growth
+from sysid.workbench.assembly.growth import Growth, Look
 from sysid.workbench.assembly.lessons import Lesson, lessons_point, lessons_table
 from sysid.workbench.assembly.limit_check import LimitCheck
 from sysid.workbench.assembly.limits_held import Holding, holding_table
@@ -65,6 +65,7 @@ class Outcome:
         stressed: What came of the random sequences.
         worst: The sequences that the whole did worst on, for their charts.
         growth: What growing the training data brought, if it was asked for.
+        unseen: By stage of growth, how it does on the random sequences.
         line: How the places do between those that are modelled, if they were asked for.
         exported: The bundle, if one was asked for.
         holding: Which limits hold the outputs in free run.
@@ -84,6 +85,7 @@ class Outcome:
     stressed: Stress | None
     worst: Sequence[Trace] = ()
     growth: Sequence[Growth] = ()
+    unseen: Mapping[str, Look] = field(default_factory=dict)
     line: LineScores | None = None
     exported: Bundle | None = None
     holding: Sequence[Holding] = ()
@@ -116,7 +118,7 @@ def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
         ],
         "tables": _tables(config, found),
         "charts": [
-            *(chart for one in found.growth for chart in growth_charts(one)),
+            *(chart for one in found.growth for chart in growth_charts(one, found.unseen)),
             *(_chart(whole, trace, name) for name in config.outputs for trace in found.cases),
             *([] if found.line is None else [line_chart(found.line, name) for name in found.line.mse]),
             *([] if found.stressed is None else [_chart(whole, one, found.stressed.output) for one in found.worst]),
@@ -135,7 +137,7 @@ def _tables(config: AssemblyConfig, found: Outcome) -> list[dict[str, Any]]:
     """The stages first, then how they came about, and what else the whole was put to."""
     published = None if config.published_models is None else read_published(config.published_models)
     tables = [_stage_table(config, name, found, published) for name in config.outputs]
-    tables += [growth_table(one, found.chosen) for one in found.growth]
+    tables += [growth_table(one, found.chosen, found.unseen) for one in found.growth]
     if found.lessons:
         tables.append(lessons_table(found.lessons))
     tables += [table for one in found.members for table in member_tables(one, published)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ from sysid.workbench import events
 from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.document import SELECTION, Outcome, document
+from sysid.workbench.assembly.growth import Look, sequence_errors
 from sysid.workbench.assembly.lessons import lessons_of
 from sysid.workbench.assembly.limits_held import holding
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
@@ -106,7 +108,8 @@ class Finish:
         return Outcome(
             whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.trained.notes,
             rounds=self.trained.rounds, timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst,
-            line=line, growth=self.trained.growth, exported=exported, limits=material.limits,
+            line=line, growth=self.trained.growth, unseen=self._unseen(sequences), exported=exported,
+            limits=material.limits,
             holding=holding(whole, config.outputs, tuple(cases), sequences), members=members,
             lessons=lessons_of(scores, members, cases, config.lessons),
         )  # fmt: skip
@@ -123,6 +126,18 @@ class Finish:
         detail = f"{found.lost} of {found.sequences} diverged, {100 * found.within:.3g} % within"
         self.context.tell(events.StepDone(step=step, stored=False, detail=detail))
         return found, tuple(sequences[name] for name, _ in found.worst), tuple(sequences)
+
+    def _unseen(self, sequences: Sequence[Trace]) -> dict[str, Look]:
+        """Every stage of growth on the random sequences, which had no say in anything."""
+        asked, stages = self.context.config.stress, self.trained.stages
+        rounds = [one.stage for grown in self.trained.growth for one in grown.rounds if one.stage in stages]
+        if asked is None or not rounds:
+            return {}
+        wholes = {stage: stages[stage].upstream_of([asked.output]) for stage in rounds}
+        return {
+            stage: Look.at(sequence_errors(whole, sequences, [asked.output]), asked.within)
+            for stage, whole in wholes.items()
+        }
 
     def _line(self, whole: Cascade) -> LineScores | None:
         asked = self.context.config.line

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sysid.reporting.numbers import number, seconds
-from sysid.workbench.assembly.growth import Growth
+from sysid.workbench.assembly.growth import Growth, Look
 from sysid.workbench.assembly.limit_check import LimitCheck
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.stress import Stress
@@ -87,48 +88,62 @@ def limits_table(found: LimitCheck) -> dict[str, Any]:
     }
 
 
-def growth_table(grown: Growth, chosen: str) -> dict[str, Any]:
+def growth_table(grown: Growth, chosen: str, unseen: Mapping[str, Look] | None = None) -> dict[str, Any]:
     """What each round brought.
 
     Args:
         grown: The growth.
         chosen: The stage that was chosen.
+        unseen: By stage, how it does on the random sequences of the stress, where there are such.
 
     Returns:
         A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
     """
-    asked = grown.asked
+    asked, seen = grown.asked, unseen or {}
+    judged = [["Random sequences", "% under their limit"], ["99 % of them", "under"]] if seen else []
+    note = " The random sequences are those further on, which had no say in anything." if seen else ""
     return {
         "caption": "How much data bought how much accuracy",
         "head": [
             ["Round of growth", ""], ["Added", "sequences"], ["Trained on", "traces"], ["Trained on", "samples"],
             ["Training", "s"], [f"Under {grown.limit}", "% of sequences"],
             ["Median error", grown.unit or "rms"], ["99 % under", grown.unit or "rms"], ["Selection", "geometric mean"],
+            *judged,
         ],
         "rows": [
             [
                 f"{one.number} (chosen)" if one.stage == chosen else str(one.number),
                 len(one.added), one.traces, one.samples, one.seconds if one.number else None,
                 100.0 * one.look.within, one.look.median, one.look.rare, one.score,
+                *_shown(seen, one.stage),
             ]
             for one in grown.rounds
         ],
         "note": f"Root mean square error of {', '.join(asked.outputs)}, the largest counts, on {grown.held_out} "
         "sequences of the pool that train nothing, but choose with the selection traces. Added were "
-        f"sequences {grown.where}; {grown.ended}. Round 0 is the whole as it was {grown.rounds[0].stage}.",
+        f"sequences {grown.where}; {grown.ended}. Round 0 is the whole as it was {grown.rounds[0].stage}.{note}",
     }  # fmt: skip
 
 
-def growth_charts(grown: Growth) -> list[dict[str, Any]]:
+def _shown(seen: Mapping[str, Look], stage: str) -> list[float | None]:
+    """A stage on the random sequences, if there are such."""
+    if not seen:
+        return []
+    return [100.0 * seen[stage].within, seen[stage].rare] if stage in seen else [None, None]
+
+
+def growth_charts(grown: Growth, unseen: Mapping[str, Look] | None = None) -> list[dict[str, Any]]:
     """Error, and share of sequences within the limit, over samples trained on.
 
     Args:
         grown: The growth.
+        unseen: By stage, how it does on the random sequences of the stress, where there are such.
 
     Returns:
         Two charts, as :class:`sysid.reporting.judgement.ChartRecord` has them.
     """
     asked, looks = grown.asked, [one.look for one in grown.rounds]
+    rare = [unseen[one.stage].rare for one in grown.rounds if one.stage in unseen] if unseen else []
     samples = [float(one.samples) for one in grown.rounds]
     said = (
         f"on {grown.held_out} sequences of the pool that train nothing, over the samples that the whole was trained "
@@ -148,6 +163,7 @@ def growth_charts(grown: Growth) -> list[dict[str, Any]]:
             "lines": [
                 line("99 % of the sequences under", [one.rare for one in looks]),
                 line("median", [one.median for one in looks]),
+                *([line("99 % of the random sequences under", rare)] if len(rare) == len(looks) else []),
                 line("aimed at", [asked.within] * len(looks), target=True),
             ],
         },

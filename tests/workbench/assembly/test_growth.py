@@ -150,6 +150,20 @@ def test_the_table_counts_what_is_counted_and_the_curves_have_a_point_for_each_r
     assert share["lines"][0]["y"] == [100.0 * each.look.within for each in found.rounds]
 
 
+def test_stages_on_random_sequences_stand_beside_what_the_pool_says():
+    found = Trained(right_after=(2,)).found
+    looks = {one.stage: Look(within=0.1 * one.number, median=0.0, rare=5.0 - one.number) for one in found.rounds}
+    table = growth_table(found, "grown, round 2", looks)
+    assert all(len(row) == len(table["head"]) for row in table["rows"])
+    assert [row[-2:] for row in table["rows"]] == [[0.0, 5.0], [pytest.approx(10.0), 4.0], [pytest.approx(20.0), 3.0]]
+    lines = {line["name"]: line["y"] for line in growth_charts(found, looks)[0]["lines"]}
+    assert lines["99 % of the random sequences under"] == [5.0, 4.0, 3.0]
+    # A stage that was not run on them has no figure, and the curve none at all.
+    partial = {stage: look for stage, look in looks.items() if look.rare < 5.0}
+    assert growth_table(found, "grown, round 2", partial)["rows"][0][-2:] == [None, None]
+    assert all("random" not in line["name"] for line in growth_charts(found, partial)[0]["lines"])
+
+
 GROWN = "grow: {data: pool, outputs: [lower], within: 0.001, add: 1, rounds: 2, train: [{max_iterations: 2}]}\n"
 LEAN = (
     PIPELINE.replace("candidates: 2", "candidates: 1")
@@ -199,6 +213,17 @@ def test_a_run_grows_resumes_and_reports(pooled: Path) -> None:
     assert [one.stat().st_mtime_ns for one in files] == stamps, "nothing is trained again"
     run(pooled, LEAN.replace("add: 1, rounds: 2", "add: [1, 1], pick: next"))
     assert files[0].stat().st_mtime_ns == stamps[0], "growth leaves what was before it"
+
+
+def test_where_there_is_a_stress_each_round_is_put_to_it(pooled: Path) -> None:
+    text = LEAN + "stress: {data: tanks, output: lower, within: 0.5}\n"
+    found = run(pooled, text).judgement
+    growth = next(one for one in found.tables if one.caption.startswith("How much data"))
+    stress = next(one for one in found.tables if "random sequences of the reference" in one.caption)
+    assert growth.head[-2:] == [("Random sequences", "% under their limit"), ("99 % of them", "under")]
+    (chosen,) = [row for row in growth.rows if str(row[0]).endswith("(chosen)")]
+    quantiles = {str(row[0]): row[1] for row in stress.rows}
+    assert chosen[-1] == pytest.approx(quantiles["99 % of the sequences at most, cm"])
 
 
 def test_each_round_goes_through_several_trainings_that_have_all_that_was_added(
