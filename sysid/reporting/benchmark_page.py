@@ -56,7 +56,7 @@ def _lines(report: Benchmarks) -> list[str]:
     if report.findings:
         lines += [f"**{verdict_on(report.findings)}**", "", *_points(report.findings)]
     machines = [machine(benchmark.environment) for benchmark in report.benchmarks]
-    rows = {key: "<br>".join(dict.fromkeys(one[key] for one in machines)) for key in ("machine", "versions")}
+    rows = {key: "; ".join(dict.fromkeys(one[key] for one in machines)) for key in ("machine", "versions")}
     lines += [*facts_lines({key: escape(text) for key, text in rows.items()})]
     for benchmark in report.benchmarks:
         lines += ["", *_section(benchmark)]
