@@ -18,7 +18,7 @@ from sysid.workbench import events
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.known import known_model
 from sysid.workbench.assembly.member_config import MemberConfig, SweepSource
-from sysid.workbench.assembly.members import Members, own_traces
+from sysid.workbench.assembly.members import Members, geometric_mean, own_traces
 from sysid.workbench.assembly.stages import Choice, choose_together, fit_member, fit_one_step, model_of
 from sysid.workbench.store import digest, strict
 from sysid.workbench.sweep_store import TRIALS, TrialStore
@@ -160,6 +160,8 @@ def _swept(context: Context, member: MemberConfig, source: SweepSource) -> list[
         )
     found = list[_Asked]()
     for trial in sorted(record.tried_in_full, key=lambda one: (record.choice(one), one.number)):
+        if len(found) == source.keep:
+            break
         stored = trials.read(trial.key)
         fit = None if stored is None else FitResult.from_dict(stored["fit"])
         if fit is not None and isinstance(fit.model, NARXModel):
@@ -172,7 +174,7 @@ def _swept(context: Context, member: MemberConfig, source: SweepSource) -> list[
             got=f"{len(record.trials)} trials",
             remedy="run the sweep again: sysid sweep NAME",
         )
-    return found[: source.keep]
+    return found
 
 
 def _fitted(
@@ -217,7 +219,7 @@ def _alone(member: MemberConfig, model: NARXModel, selection: Sequence[Trace]) -
         float(np.mean((model.simulate(t.columns(model.mapping.inputs)) - t[model.mapping.output]) ** 2))
         for t in own_traces(member, selection)
     ]
-    return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+    return geometric_mean(errors)
 
 
 def _choice(

@@ -16,6 +16,7 @@ from sysid.reporting.numbers import number, times
 from sysid.traces import Role, TraceSet
 from sysid.workbench.assembly.course import ALONE, CHOSEN, ONE_STEP, RETRAINED, TOGETHER
 from sysid.workbench.assembly.member_scores import MemberScores
+from sysid.workbench.assembly.members import geometric_mean
 from sysid.workbench.assembly.stage_config import LessonsConfig
 
 Scores = Mapping[str, Mapping[str, float]]
@@ -145,10 +146,8 @@ def _of(errors: Mapping[str, float], counted: Sequence[str]) -> float:
 
 def _mean(errors: Iterable[float]) -> float:
     """Geometric mean, infinite where one is no number."""
-    values = np.array(list(errors))
-    if not np.all(np.isfinite(values)):
-        return float("inf")
-    return float(np.exp(np.mean(np.log(np.maximum(values, np.finfo(np.float64).tiny)))))
+    values = list(errors)
+    return geometric_mean(values) if np.all(np.isfinite(values)) else float("inf")
 
 
 def lessons_table(lessons: Sequence[Lesson]) -> dict[str, Any]:

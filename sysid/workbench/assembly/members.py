@@ -10,7 +10,7 @@ from itertools import zip_longest
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sysid.models import Cascade, Ends, Limit, Mapping, NARXModel
 from sysid.traces import Trace
@@ -267,6 +267,22 @@ def mean_squares(
     )
 
 
+def geometric_mean(errors: ArrayLike) -> float:
+    """What some mean squared errors come to as one figure.
+
+    Args:
+        errors: The errors; one that is no number makes the mean none.
+
+    Returns:
+        Their geometric mean; an error of zero counts as the least number that there is.
+
+    Example:
+        >>> round(geometric_mean([0.5, 2.0]), 12)
+        1.0
+    """
+    return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
+
+
 def score_of(runs: Sequence[NDArray[np.float64]], traces: Sequence[Trace], outputs: Sequence[str]) -> float:
     """How good some free runs are.
 
@@ -278,8 +294,7 @@ def score_of(runs: Sequence[NDArray[np.float64]], traces: Sequence[Trace], outpu
     Returns:
         Geometric mean over traces and outputs of the mean squared error.
     """
-    errors = np.maximum(mean_squares(runs, traces, outputs), np.finfo(np.float64).tiny)
-    return float(np.exp(np.mean(np.log(errors))))
+    return geometric_mean(mean_squares(runs, traces, outputs))
 
 
 def whole_score(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str]) -> float:
