@@ -39,7 +39,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 FIELDS = {"airbrake", "rail"}
 """Rooms that know a field of application."""
 
-ONLY_IN = {"mlflow": "workbench/tracking.py", "optuna": "workbench/sweep.py"}
+ONLY_IN = {"mlflow": "workbench/tracking/mlflow_store.py", "optuna": "workbench/sweep/sampler.py"}
 """Packages that one file alone may import."""
 
 BRAKE_WORDS = re.compile(r"brak|abdx|railway|wagon|locomotive|dissertation", re.IGNORECASE)

@@ -9,13 +9,13 @@ from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.form import AbstractForm
 from sysid.models.history import History, Start, StartKind
-from sysid.models.ladder import Domain
+from sysid.models.interpolation import Line
 from sysid.models.lags import Lags
-from sysid.models.line import Line
 from sysid.models.mapping import Mapping
 from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_form import NeuralForm
 from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
+from sysid.models.orthonormal_basis import Domain
 from sysid.models.recursion import Recursion, parameter_count
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace

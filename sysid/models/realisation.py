@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.models.ladder import Domain, Rung
+from sysid.models.orthonormal_basis import Domain, Rung
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

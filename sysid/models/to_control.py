@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models.arx import ARXModel
-from sysid.models.ladder import Domain
+from sysid.models.orthonormal_basis import Domain
 from sysid.models.transfer_function import TransferFunctionModel
 
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import ConfigError
-from sysid.models import ladder as ladders
+from sysid.models import orthonormal_basis as ladders
 from sysid.models.base import AbstractModel, AbstractStructure
-from sysid.models.ladder import Domain, Rung
 from sysid.models.mapping import Mapping
+from sysid.models.orthonormal_basis import Domain, Rung
 from sysid.models.ranges import IntRange
 from sysid.models.realisation import Realisation, realise
 from sysid.models.scaling import Scaling
@@ -105,7 +105,7 @@ class TransferFunctionModel(AbstractModel):
     Args:
         orders: The structure, with its dead times.
         sections: For each input the denominators of its sections, ``[1, c1, c2]`` in powers of ``1/q`` or
-            ``[c0, c1, 1]`` in powers of ``s``; see :mod:`sysid.models.ladder`.
+            ``[c0, c1, 1]`` in powers of ``s``; see :mod:`sysid.models.orthonormal_basis`.
         taps: For each input the weights of its ladder's taps, in scaled numbers, shapes ``(zeros_j + 1,)``.
         constant: Scaled output without inputs.
         scaling: Between units and scaled numbers.

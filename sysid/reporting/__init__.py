@@ -6,16 +6,16 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sysid.reporting.against import compare_runs as compare_runs
-    from sysid.reporting.against_page import write_comparison as write_comparison
-    from sysid.reporting.benchmark_page import publish_benchmarks as publish_benchmarks
-    from sysid.reporting.figures import case_figure as case_figure
+    from sysid.reporting.benchmarks.page import publish_benchmarks as publish_benchmarks
+    from sysid.reporting.comparing.against import compare_runs as compare_runs
+    from sysid.reporting.comparing.against_page import write_comparison as write_comparison
+    from sysid.reporting.comparing.published import PublishedFigure as PublishedFigure
+    from sysid.reporting.comparing.published import PublishedTable as PublishedTable
+    from sysid.reporting.comparing.published import published_names as published_names
+    from sysid.reporting.comparing.published import read_published as read_published
+    from sysid.reporting.figures.fit_figures import case_figure as case_figure
     from sysid.reporting.pdf import write_pdf as write_pdf
     from sysid.reporting.publication import publish_run as publish_run
-    from sysid.reporting.published import PublishedFigure as PublishedFigure
-    from sysid.reporting.published import PublishedTable as PublishedTable
-    from sysid.reporting.published import published_names as published_names
-    from sysid.reporting.published import read_published as read_published
     from sysid.reporting.report import write_report as write_report
     from sysid.reporting.results import Results as Results
     from sysid.reporting.results import parse_results as parse_results
@@ -28,20 +28,20 @@ if TYPE_CHECKING:
 # Loaded when first asked for: matplotlib takes longer to import than `sysid --help` may take to answer.
 _HOME = {
     "CaseSignals": "signals",
-    "PublishedFigure": "published",
-    "PublishedTable": "published",
+    "PublishedFigure": "comparing.published",
+    "PublishedTable": "comparing.published",
     "Results": "results",
-    "case_figure": "figures",
-    "compare_runs": "against",
+    "case_figure": "figures.fit_figures",
+    "compare_runs": "comparing.against",
     "parse_results": "results",
-    "publish_benchmarks": "benchmark_page",
+    "publish_benchmarks": "benchmarks.page",
     "publish_run": "publication",
-    "published_names": "published",
-    "read_published": "published",
+    "published_names": "comparing.published",
+    "read_published": "comparing.published",
     "read_results": "results",
     "read_signals": "signals",
     "results_json_schema": "results",
-    "write_comparison": "against_page",
+    "write_comparison": "comparing.against_page",
     "write_pdf": "pdf",
     "write_report": "report",
     "write_results": "results",

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from sysid.reporting.figures.style import PALETTE, new_figure, styled
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, picture
 from sysid.reporting.results import FitRecord
 from sysid.reporting.signals import CaseSignals
-from sysid.reporting.style import PALETTE, new_figure, styled
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
 
 BANDS = 8

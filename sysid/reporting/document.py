@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sysid.reporting import figures
 from sysid.reporting.amplitude import amplitude_section
+from sysid.reporting.comparing.published import PublishedTable
 from sysid.reporting.evidence import evidence_sections
-from sysid.reporting.judgement import judgement_sections, read_judgements
+from sysid.reporting.figures import fit_figures as figures
+from sysid.reporting.judging.tables import judgement_sections, read_judgements
 from sysid.reporting.moments import Moment, worst_moments
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Picture, Section, identifier, picture
-from sysid.reporting.published import PublishedTable
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.runtime_table import exported_run_times
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.state_table import state_section
-from sysid.reporting.sweep_section import sweep_points, sweep_sections
+from sysid.reporting.sweep.section import sweep_points, sweep_sections
 from sysid.reporting.tables import (
     DIVERGED,
     Cell,
@@ -40,7 +40,7 @@ from sysid.reporting.training_view import training_parts, trust_sections
 from sysid.reporting.verdict import Verdict, verdict
 
 if TYPE_CHECKING:
-    from sysid.reporting.judgement_report import JudgementResults
+    from sysid.reporting.judging.results import JudgementResults
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,9 @@ from pathlib import Path
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.models import ARXModel, TransferFunctionModel
-from sysid.reporting.linear_figures import bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.parts import Part, Section, identifier, picture
-from sysid.reporting.residual_figure import residual_figure
 from sysid.reporting.residuals import GroupRecord, read_residuals
 from sysid.reporting.results import FitRecord, LinearityRecord, Results
 from sysid.reporting.tables import Cell, Table, figure_cell

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from sysid.reporting.svg import svg
+from sysid.reporting.figures.svg import svg
 from sysid.reporting.tables import Table
 
 

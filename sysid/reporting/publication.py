@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Final
 
 from sysid.errors import ConfigError
-from sysid.reporting.comparison import with_published
+from sysid.reporting.comparing.published import read_published
+from sysid.reporting.comparing.published_comparison import with_published
 from sysid.reporting.document import Document, build_document
 from sysid.reporting.html import readable
-from sysid.reporting.judgement_report import judgement_document, read_judgement_results
+from sysid.reporting.judging.results import judgement_document, read_judgement_results
 from sysid.reporting.markdown import (
     MARK,
     PAGE,
@@ -25,7 +26,6 @@ from sysid.reporting.markdown import (
     refuse_others,
     section_lines,
 )
-from sysid.reporting.published import read_published
 from sysid.reporting.results import Results, read_results
 from sysid.reporting.scores import Score, score_of, write_scores
 from sysid.reporting.tables import scored_cases

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.atomic import replacing
-from sysid.reporting.comparison import with_published
+from sysid.reporting.comparing.published import read_published
+from sysid.reporting.comparing.published_comparison import with_published
 from sysid.reporting.document import build_document
 from sysid.reporting.html import render_html
-from sysid.reporting.judgement_report import read_judgement_results, write_judgement_report
-from sysid.reporting.published import read_published
+from sysid.reporting.judging.results import read_judgement_results, write_judgement_report
 from sysid.reporting.results import read_results, write_results
 
 

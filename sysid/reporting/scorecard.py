@@ -15,7 +15,7 @@ from typing import Final
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError
-from sysid.reporting.findings import FINDINGS_FILE, Finding, read_findings
+from sysid.reporting.benchmarks.findings import FINDINGS_FILE, Finding, read_findings
 from sysid.reporting.markdown import escape, rows_lines
 from sysid.reporting.numbers import number
 from sysid.reporting.scores import SCORES_FILE, Score, read_scores

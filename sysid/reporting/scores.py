@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from sysid.atomic import replacing
-from sysid.reporting.figures_file import read_figures
+from sysid.reporting.comparing.figures_file import read_figures
 from sysid.reporting.numbers import seconds
 from sysid.reporting.results import Number, Results
 

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sysid.reporting.figures.style import MARKERS, PALETTE, new_figure, styled
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.results import AttemptRecord, CaseRecord, FitRecord, Results
-from sysid.reporting.style import MARKERS, PALETTE, new_figure, styled
 from sysid.reporting.tables import Cell, Table, case_columns, figure_cell
 
 ROWS = 30

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.arx import fit_arx
-from sysid.estimation.order_search import OrderLosses
+from sysid.estimation.linear.arx import fit_arx
+from sysid.estimation.linear.order_search import OrderLosses
 from sysid.estimation.result import FitResult
 from sysid.models import Mapping, Start
 from sysid.traces import Trace

@@ -66,7 +66,7 @@ def _refuse(error: SysidError, *, debug: bool) -> int:
 
 def _unexpected(error: Exception, arguments: list[str], *, debug: bool) -> int:
     """A usage error, a refusal of the operating system, or a bug of ours, which alone shows its trace unasked."""
-    from sysid.workbench.faults import refusal
+    from sysid.workbench.runner.faults import refusal
 
     if callable(getattr(error, "show", None)):
         return _usage(error, arguments, debug=debug)

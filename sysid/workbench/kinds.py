@@ -68,8 +68,8 @@ class Kind:
 
 FOUND: dict[str, Kind] = {
     "sysid.judges": Kind(
-        config="sysid.workbench.judgement.config:JudgementConfig",
-        runner="sysid.workbench.judgement.runner:run_judgement",
+        config="sysid.workbench.judging.config:JudgementConfig",
+        runner="sysid.workbench.judging.runner:run_judgement",
     ),
     "sysid.makers": Kind(
         config="sysid.workbench.making.config:MakingConfig", runner="sysid.workbench.making.runner:run_making"
@@ -78,13 +78,13 @@ FOUND: dict[str, Kind] = {
 """Entry-point groups whose names are kinds too: packages bring them, and what they are about is not known here."""
 
 KINDS: dict[str, Kind] = {
-    DEFAULT: Kind(config="sysid.workbench.config:PipelineConfig", runner="sysid.workbench.commands.run:run_fits"),
+    DEFAULT: Kind(config="sysid.workbench.fits.config:PipelineConfig", runner="sysid.workbench.commands.run:run_fits"),
     "assembly": Kind(
         config="sysid.workbench.assembly.config:AssemblyConfig",
         runner="sysid.workbench.assembly.runner:run_assembly",
     ),
     "sweep": Kind(
-        config="sysid.workbench.sweep_config:SweepConfig", runner="sysid.workbench.commands.sweep:run_sweep_request"
+        config="sysid.workbench.sweep.config:SweepConfig", runner="sysid.workbench.commands.sweep:run_sweep_request"
     ),
 }
 """The kinds by name."""

@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sysid.reporting.findings import Benchmark, Finding
+from sysid.reporting.benchmarks.findings import Benchmark, Finding
 from sysid.reporting.scores import Score
 from tests.benchmarks._findings import FILE_VARIABLE
 
@@ -62,7 +62,7 @@ def publish(report: str, names: list[str], options: list[str]) -> int:
 
 def record(name: str, options: list[str]) -> Benchmark | None:
     """Run a benchmark and keep what it says; ``None`` if it fails."""
-    from sysid.workbench.environment import environment
+    from sysid.workbench.runner.environment import environment
 
     words = ["-m", "tests.benchmarks", name, *options]
     load = os.getloadavg()[0]

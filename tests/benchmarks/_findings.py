@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from sysid.reporting.findings import Finding
+from sysid.reporting.benchmarks.findings import Finding
 from sysid.reporting.scores import Score
 
 FILE_VARIABLE = "SYSID_FINDINGS"
@@ -21,7 +21,7 @@ def found(what: str, ours: float, unit: str = "", **more: Any) -> Finding:
         what: What was measured.
         ours: The figure.
         unit: Its unit.
-        **more: Other fields of :class:`sysid.reporting.findings.Finding`.
+        **more: Other fields of :class:`sysid.reporting.benchmarks.findings.Finding`.
     """
     finding = Finding(what=what, ours=ours, unit=unit, **more)
     verdict = {True: ", reached", False: ", missed", None: ""}[finding.met]

@@ -24,7 +24,7 @@ from sysid.estimation import fit_narx
 from sysid.ingest import load_dataset
 from sysid.models import NARX, AbstractModel
 from sysid.traces import Trace
-from sysid.workbench.config import parse_pipeline
+from sysid.workbench.fits.config import parse_pipeline
 from tests.benchmarks._findings import found
 
 PIPELINE = Path("pipelines/mapping-stp-bp.yaml")

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sysid.estimation import fit_transfer_function
-from sysid.estimation.linear_records import TimeRecord
-from sysid.estimation.order_search import OrderGrid, search_orders
-from sysid.estimation.separable import PoleParameters, SeparableProvider
+from sysid.estimation.linear.order_search import OrderGrid, search_orders
+from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
 from sysid.models import Domain, Mapping, TransferFunction
 from sysid.traces import Channel, Trace
 from sysid.validation.order_finalists import run_finalists

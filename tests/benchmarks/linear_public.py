@@ -18,7 +18,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from sysid.estimation import FitResult, fit_arx, fit_transfer_function
-from sysid.estimation.order_search import OrderGrid, search_orders
+from sysid.estimation.linear.order_search import OrderGrid, search_orders
 from sysid.models import Mapping, Start, StartKind, TransferFunction
 from sysid.traces import Channel, Trace
 from sysid.validation.order_finalists import free_run_figures, run_finalists

@@ -17,12 +17,12 @@ import numpy as np
 
 from sysid.airbrake.consist import Consist
 from sysid.models import NARX, Mapping, NARXModel, Scaling, parameter_count
-from sysid.rail.brake import AbstractBrake, ReferenceBrake, no_brake
-from sysid.rail.drive import Limits, Schedule, drive
-from sysid.rail.motion import MovingTrain
-from sysid.rail.surrogate import Stage, SurrogateBrake, ValveSurrogateBrake
-from sysid.rail.track import TrackProfile
-from sysid.rail.train import heavy_haul
+from sysid.rail.dynamics.brake import AbstractBrake, ReferenceBrake, no_brake
+from sysid.rail.dynamics.drive import Limits, Schedule, drive
+from sysid.rail.dynamics.motion import MovingTrain
+from sysid.rail.dynamics.surrogate import Stage, SurrogateBrake, ValveSurrogateBrake
+from sysid.rail.dynamics.train import heavy_haul
+from sysid.rail.track.track import TrackProfile
 
 DURATION, REPEATS = 600.0, 5
 CONSIST = Consist(pairs=50)

@@ -24,7 +24,7 @@ from sysid.models import (
     simulate_family,
 )
 from sysid.models.cascade_batch import MIN_LANES
-from sysid.models.ladder import numerators, rungs
+from sysid.models.orthonormal_basis import numerators, rungs
 from sysid.testing import simulate_cascade
 from sysid.traces import Channel, Trace
 from tests.models.cascades import CASCADES, block, command, linear, network, service

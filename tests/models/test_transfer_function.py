@@ -11,7 +11,7 @@ from scipy import linalg, signal
 
 from sysid.errors import ConfigError, TraceError
 from sysid.models import ARX, ARXModel, Domain, History, Mapping, Scaling, TransferFunction, model_from_dict
-from sysid.models.ladder import numerators, rungs
+from sysid.models.orthonormal_basis import numerators, rungs
 from sysid.models.to_control import state_space
 from sysid.models.transfer_function import TransferFunctionModel
 

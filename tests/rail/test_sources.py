@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid.rail.brake_computer import ComputerSettings
-from sysid.rail.card import CardCode, read_card
 from sysid.rail.constants import MPH
-from sysid.rail.deceleration import COAST, COAST_RATE, CRUISE, FULL_SERVICE, JERK, OPEN_LOOP, RATE, JerkProfile
-from sysid.rail.terrain import correlation, equivalent_grade_change, uniform
-from sysid.rail.track import TrackProfile
-from sysid.rail.transit import braking, commanded_pressure
+from sysid.rail.end_of_train.brake_computer import ComputerSettings
+from sysid.rail.track.card import CardCode, read_card
+from sysid.rail.track.terrain import correlation, equivalent_grade_change, uniform
+from sysid.rail.track.track import TrackProfile
+from sysid.rail.transit.deceleration import COAST, COAST_RATE, CRUISE, FULL_SERVICE, JERK, OPEN_LOOP, RATE, JerkProfile
+from sysid.rail.transit.transit import braking, commanded_pressure
 
 HERE = Path(__file__).parent
 CARD = HERE.parents[1] / "datasets" / "rail-example" / "card-a-b.csv"

@@ -16,9 +16,9 @@ from sysid.estimation import FitResult, fit_arx
 from sysid.models import ARX, Mapping
 from sysid.reporting import read_results, write_report
 from sysid.reporting.evidence import evidence_sections
-from sysid.reporting.linear_figures import bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.parts import Picture
-from sysid.reporting.residual_figure import residual_figure
 from sysid.reporting.residuals import read_residuals
 from sysid.reporting.tables import Table
 from sysid.traces import Trace

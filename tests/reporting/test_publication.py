@@ -12,8 +12,8 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.reporting import publish_run, read_results
-from sysid.reporting.judgement import parse_judgement
-from sysid.reporting.judgement_report import JudgementResults, SceneRecord, SubjectRecord, write_judgement_results
+from sysid.reporting.judging.results import JudgementResults, SceneRecord, SubjectRecord, write_judgement_results
+from sysid.reporting.judging.tables import parse_judgement
 from sysid.reporting.markdown import MARK
 
 PAIR = ("ARX", "NARX free run")

@@ -10,7 +10,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.reporting import publish_benchmarks, publish_run, read_results
-from sysid.reporting.findings import Benchmark, Finding
+from sysid.reporting.benchmarks.findings import Benchmark, Finding
 from sysid.reporting.numbers import number
 from sysid.reporting.scorecard import PLACE, main, place, scorecard
 from sysid.reporting.scores import Score, read_scores

@@ -87,7 +87,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(scope="session")
 def empty_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A tracking store without runs; making one takes seconds, copying it nothing."""
-    from sysid.workbench.tracking import connect
+    from sysid.workbench.tracking.mlflow_store import connect
 
     database = tmp_path_factory.mktemp("store") / "mlflow.db"
     connect(f"sqlite:///{database}")
@@ -97,8 +97,8 @@ def empty_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A workspace whose pipeline has been run and its best network exported, to be copied."""
-    from sysid.workbench.config import read_pipeline
-    from sysid.workbench.pipeline import run_pipeline
+    from sysid.workbench.fits.config import read_pipeline
+    from sysid.workbench.fits.run import run_pipeline
 
     folder = tmp_path_factory.mktemp("finished")
     fill(folder)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation.provider import Experiment
+from sysid.estimation.networks.provider import Experiment
 from sysid.ingest import load_dataset
 from sysid.models import Mapping, Start
 from sysid.reporting.results import read_results
@@ -17,9 +17,9 @@ from sysid.validation import CaseResult, Evaluation
 from sysid.validation.metrics import figures
 from sysid.workbench.annotation import annotated_set, by_state, find_annotator, weighted
 from sysid.workbench.cli import run_cli
-from sysid.workbench.config import read_pipeline
-from sysid.workbench.pipeline import run_pipeline
-from sysid.workbench.record import read_scores
+from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.record import read_scores
+from sysid.workbench.fits.run import run_pipeline
 
 U = Channel(name="u", unit="V")
 BRAKE = """\

@@ -21,7 +21,7 @@ from typing import Any
 import pytest
 
 from sysid.workbench.cli import run_cli
-from sysid.workbench.store import RunFolder
+from sysid.workbench.runner.store import RunFolder
 from tests.workbench.test_bad_inputs import contents
 
 RUN = Path("runs/first")

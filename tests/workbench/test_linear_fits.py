@@ -9,9 +9,9 @@ import pytest
 from sysid.errors import UserError
 from sysid.estimation import Loop
 from sysid.models import Domain, TransferFunction
-from sysid.workbench import steps
-from sysid.workbench.config import find_pipeline, parse_pipeline, read_pipeline
-from sysid.workbench.data import load_data
+from sysid.workbench.fits import steps
+from sysid.workbench.fits.config import find_pipeline, parse_pipeline, read_pipeline
+from sysid.workbench.fits.data import load_data
 
 ARX = "structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}"
 TF = "structure: {kind: TransferFunction, poles: [1, 1], zeros: [0, 0], delays: [1, 1]}"

@@ -18,7 +18,7 @@ from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.runner import read_line
 from sysid.workbench.cli import app
 from sysid.workbench.commands.simulate_line import parse_places, simulate_line_command
-from tests.models.test_line import line
+from tests.models.test_interpolation import line
 
 HANDLE = Channel(name="STP", unit="psi", reference=Reference.GAUGE)
 CYLINDER = Channel(name="BC", unit="psi", reference=Reference.GAUGE)

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from sysid.reporting.sweep_record import SweepRecord, Trial, TrialCase, write_sweep
-from sysid.workbench.events import SweepReady
-from sysid.workbench.sweep import publish
-from sysid.workbench.tracker import Tracker
+from sysid.reporting.sweep.record import SweepRecord, Trial, TrialCase, write_sweep
+from sysid.workbench.runner.events import SweepReady
+from sysid.workbench.sweep.sampler import publish
+from sysid.workbench.tracking.listener import Tracker
 
 OWNER = "postgres"
 """PostgreSQL refuses to run as root; its package makes this user."""

@@ -12,16 +12,16 @@ import numpy as np
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.models import Mapping, NARXModel
-from sysid.reporting.sweep_record import read_sweep
+from sysid.reporting.sweep.record import read_sweep
 from sysid.traces import Trace
-from sysid.workbench import events
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.known import known_model
 from sysid.workbench.assembly.member_config import MemberConfig, SweepSource
 from sysid.workbench.assembly.members import Members, geometric_mean, own_traces
 from sysid.workbench.assembly.stages import Choice, choose_together, fit_member, fit_one_step, model_of
-from sysid.workbench.store import digest, strict
-from sysid.workbench.sweep_store import TRIALS, TrialStore
+from sysid.workbench.runner import events
+from sysid.workbench.runner.store import digest, strict
+from sysid.workbench.sweep.store import TRIALS, TrialStore
 
 SEEDS_OF_A_CANDIDATE = 1000
 """How far the seeds of one candidate are from the next one's of the same structure."""

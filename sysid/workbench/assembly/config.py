@@ -18,8 +18,8 @@ from sysid.workbench.assembly.stage_config import (
     check_rounds,
     names_in,
 )
-from sysid.workbench.config import ExportConfig
 from sysid.workbench.fields import STRICT
+from sysid.workbench.fits.config import ExportConfig
 from sysid.yaml_files import FieldError
 
 

@@ -10,11 +10,11 @@ from typing import Any
 from sysid.content import content_folders
 from sysid.estimation import FitProgress, FitResult
 from sysid.traces import TraceSet
-from sysid.workbench import events
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import Joined
-from sysid.workbench.record import is_final, read_fit, write_fit
-from sysid.workbench.store import RunFolder, code_digest, digest, strict
+from sysid.workbench.fits.record import is_final, read_fit, write_fit
+from sysid.workbench.runner import events
+from sysid.workbench.runner.store import RunFolder, code_digest, digest, strict
 
 CODE = ("estimation", "models", "kernels")
 """Rooms whose code a fit depends on."""

@@ -11,7 +11,6 @@ from sysid.estimation import CascadeFit
 from sysid.estimation.result import Status
 from sysid.models import Cascade
 from sysid.traces import Trace
-from sysid.workbench import events
 from sysid.workbench.assembly.begun import begun, read_whole
 from sysid.workbench.assembly.candidates import Candidates, fit_candidates
 from sysid.workbench.assembly.context import CODE, Context
@@ -26,8 +25,9 @@ from sysid.workbench.assembly.stages import (
     reading_more,
     retrain,
 )
-from sysid.workbench.record import is_final
-from sysid.workbench.store import code_digest, digest, read_json, strict, write_json
+from sysid.workbench.fits.record import is_final
+from sysid.workbench.runner import events
+from sysid.workbench.runner.store import code_digest, digest, read_json, strict, write_json
 
 BEGUN = "as it was begun from"
 ONE_STEP = "each alone, one step ahead"

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sysid.models import Cascade
+from sysid.reporting.comparing.published import PublishedTable, read_published
+from sysid.reporting.figures.thinning import thin
 from sysid.reporting.numbers import number, quantity, seconds
-from sysid.reporting.published import PublishedTable, read_published
-from sysid.reporting.thinning import thin
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.growth import Growth, Look
@@ -94,7 +94,7 @@ class Outcome:
 
 
 def document(config: AssemblyConfig, found: Outcome) -> dict[str, Any]:
-    """All of it, as :class:`sysid.reporting.judgement.JudgementRecord` has it.
+    """All of it, as :class:`sysid.reporting.judging.tables.JudgementRecord` has it.
 
     Args:
         config: The pipeline.

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from sysid.errors import ConfigError
 from sysid.models import Mapping
 from sysid.workbench.kinds import DEFAULT
-from sysid.workbench.store import write_bytes
+from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import Loc, Origins, read_yaml, yaml_text
 
 JOINED_FILE = "pipeline-joined.yaml"

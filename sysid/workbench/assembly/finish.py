@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.models import Cascade
-from sysid.reporting.judgement import parse_judgement
-from sysid.reporting.judgement_report import (
+from sysid.reporting.judging.results import (
     JudgementResults,
     SceneRecord,
     SubjectRecord,
     write_judgement_results,
 )
+from sysid.reporting.judging.tables import parse_judgement
 from sysid.traces import Trace, TraceSet
 from sysid.validation import evaluate_cascade
-from sysid.workbench import events
 from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.document import SELECTION, Outcome, document
@@ -31,8 +30,9 @@ from sysid.workbench.assembly.member_scores import score_candidates
 from sysid.workbench.assembly.members import whole_score, written
 from sysid.workbench.assembly.starts import Trained
 from sysid.workbench.assembly.stress import Stress, stress
-from sysid.workbench.environment import environment
-from sysid.workbench.store import digest, strict, write_json
+from sysid.workbench.runner import events
+from sysid.workbench.runner.environment import environment
+from sysid.workbench.runner.store import digest, strict, write_json
 
 if TYPE_CHECKING:
     from sysid.export import Bundle

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from sysid.estimation import CascadeFit, JointTraining, fit_cascade
-from sysid.estimation.joint import NEGLIGIBLE
+from sysid.estimation.networks.joint import NEGLIGIBLE
 from sysid.models import Cascade, Ends
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig

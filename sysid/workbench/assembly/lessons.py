@@ -157,7 +157,7 @@ def lessons_table(lessons: Sequence[Lesson]) -> dict[str, Any]:
         lessons: The lessons.
 
     Returns:
-        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+        A table, as :class:`sysid.reporting.judging.tables.TableRecord` has it.
     """
     rows = [
         [

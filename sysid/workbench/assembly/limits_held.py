@@ -89,7 +89,7 @@ def holding_table(found: Sequence[Holding]) -> dict[str, Any]:
         found: What came of it; at least one.
 
     Returns:
-        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+        A table, as :class:`sysid.reporting.judging.tables.TableRecord` has it.
     """
     rows: list[list[Any]] = []
     for one in found:

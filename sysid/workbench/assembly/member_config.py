@@ -10,7 +10,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import NARX, AbstractStructure
 from sysid.workbench.fields import STRICT, MappingField, StructureField, TrainingConfig, as_field_error
-from sysid.workbench.naming import slug
+from sysid.workbench.runner.naming import slug
 from sysid.yaml_files import FieldError
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models import NARXModel
-from sysid.reporting.published import PublishedTable
+from sysid.reporting.comparing.published import PublishedTable
 from sysid.traces import Trace
 from sysid.workbench.assembly.candidates import Candidate, Candidates
 from sysid.workbench.assembly.members import in_place

@@ -104,7 +104,7 @@ def rounds_table(rounds: Sequence[RoundDone]) -> dict[str, Any]:
         rounds: The rounds, at least one.
 
     Returns:
-        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+        A table, as :class:`sysid.reporting.judging.tables.TableRecord` has it.
     """
     return {
         "caption": "Training end to end, round by round",

@@ -7,8 +7,8 @@ from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.models import Cascade, cascade_from_dict
-from sysid.reporting.judgement_report import JudgementResults
-from sysid.reporting.published import read_published
+from sysid.reporting.comparing.published import read_published
+from sysid.reporting.judging.results import JudgementResults
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.extending import read_joined
@@ -16,10 +16,10 @@ from sysid.workbench.assembly.finish import ASSEMBLY, LINE, Finish
 from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.starts import train
-from sysid.workbench.environment import environment
 from sysid.workbench.kinds import RunRequest
-from sysid.workbench.naming import nearby
-from sysid.workbench.store import RunFolder, read_json, write_json
+from sysid.workbench.runner.environment import environment
+from sysid.workbench.runner.naming import nearby
+from sysid.workbench.runner.store import RunFolder, read_json, write_json
 from sysid.yaml_files import check
 
 
@@ -35,7 +35,7 @@ def run_assembly(request: RunRequest) -> int:
     Raises:
         UserError: If the pipeline or its data cannot be used.
     """
-    from sysid.workbench.audience import Audience, typed_command
+    from sysid.workbench.runner.listeners import Audience, typed_command
 
     joined = read_joined(request.path)
     config = check(AssemblyConfig, joined.data, where=joined.origins)

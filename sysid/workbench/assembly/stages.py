@@ -15,8 +15,8 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, fit_narx
-from sysid.estimation.growing import grown, widened
-from sysid.estimation.initialise import Layout
+from sysid.estimation.networks.initialise import Layout
+from sysid.estimation.networks.warm_start import grown, widened
 from sysid.estimation.result import Loop, Status
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace

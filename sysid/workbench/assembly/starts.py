@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from sysid.models import Cascade, mean_of
 from sysid.traces import Trace
-from sysid.workbench import events
 from sysid.workbench.assembly.candidates import Candidates
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.course import Course
@@ -25,6 +24,7 @@ from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.members import free_runs, score_of, whole_score
 from sysid.workbench.assembly.rounds import RoundDone
+from sysid.workbench.runner import events
 
 Runs = Sequence[NDArray[np.float64]]
 """Free runs of a whole on some traces, an array of shape ``(n_samples, n_outputs)`` of each."""

@@ -24,7 +24,7 @@ def stress_tables(found: Stress) -> list[dict[str, Any]]:
         found: What came of them.
 
     Returns:
-        One or two tables, as :class:`sysid.reporting.judgement.TableRecord` has them.
+        One or two tables, as :class:`sysid.reporting.judging.tables.TableRecord` has them.
     """
     rows: list[list[Any]] = [
         [f"{100.0 * q:g} % of the sequences at most, {found.unit}", value] for q, value in found.quantiles.items()
@@ -60,7 +60,7 @@ def export_table(bundle: Bundle) -> dict[str, Any]:
         bundle: Where they lie.
 
     Returns:
-        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+        A table, as :class:`sysid.reporting.judging.tables.TableRecord` has it.
     """
     units = sorted({str(output["unit"]) for output in bundle.outputs})
     return {
@@ -77,7 +77,7 @@ def limits_table(found: LimitCheck) -> dict[str, Any]:
         found: What came of holding them beside each other.
 
     Returns:
-        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+        A table, as :class:`sysid.reporting.judging.tables.TableRecord` has it.
     """
     return {
         "caption": "Limits that training traces pass",
@@ -97,7 +97,7 @@ def growth_table(grown: Growth, chosen: str, unseen: Mapping[str, Look] | None =
         unseen: By stage, how it does on the random sequences of the stress, where there are such.
 
     Returns:
-        A table, as :class:`sysid.reporting.judgement.TableRecord` has it.
+        A table, as :class:`sysid.reporting.judging.tables.TableRecord` has it.
     """
     asked, seen = grown.asked, unseen or {}
     judged = [["Random sequences", "% under their limit"], ["99 % of them", "under"]] if seen else []
@@ -140,7 +140,7 @@ def growth_charts(grown: Growth, unseen: Mapping[str, Look] | None = None) -> li
         unseen: By stage, how it does on the random sequences of the stress, where there are such.
 
     Returns:
-        Two charts, as :class:`sysid.reporting.judgement.ChartRecord` has them.
+        Two charts, as :class:`sysid.reporting.judging.tables.ChartRecord` has them.
     """
     asked, looks = grown.asked, [one.look for one in grown.rounds]
     rare = [unseen[one.stage].rare for one in grown.rounds if one.stage in unseen] if unseen else []

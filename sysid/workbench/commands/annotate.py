@@ -14,9 +14,9 @@ from sysid.ingest import load_dataset, write_trace
 from sysid.traces import TraceSet
 from sysid.units import Reference
 from sysid.workbench.annotation import Annotator, annotated_set, find_annotator
-from sysid.workbench.audience import console
-from sysid.workbench.naming import slug
-from sysid.workbench.store import write_bytes
+from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.naming import slug
+from sysid.workbench.runner.store import write_bytes
 
 
 def annotate_command(source: str, *, annotator: str, out: Path | None) -> None:

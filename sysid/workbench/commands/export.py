@@ -6,12 +6,12 @@ from pathlib import Path
 
 from sysid.errors import ConfigError
 from sysid.export.bundle import zip_bundle
-from sysid.workbench import steps
-from sysid.workbench.audience import console
-from sysid.workbench.config import ExportConfig, FitConfig, Pipeline, find_pipeline, read_pipeline
-from sysid.workbench.data import Data, load_data
-from sysid.workbench.record import read_fit, read_scores
-from sysid.workbench.store import RunFolder
+from sysid.workbench.fits import steps
+from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, find_pipeline, read_pipeline
+from sysid.workbench.fits.data import Data, load_data
+from sysid.workbench.fits.record import read_fit, read_scores
+from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.store import RunFolder
 
 
 def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Path | None, pack: bool) -> None:

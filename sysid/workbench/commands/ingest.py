@@ -12,15 +12,15 @@ from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
 from sysid.ingest.assemble import stamps_in_seconds
 from sysid.ingest.reading import read_table
-from sysid.reporting.record_figure import record_figure
-from sysid.reporting.style import styled
-from sysid.reporting.svg import svg
+from sysid.reporting.figures.record_figure import record_figure
+from sysid.reporting.figures.style import styled
+from sysid.reporting.figures.svg import svg
 from sysid.traces import TraceSet
 from sysid.units import Reference
-from sysid.workbench.audience import console
-from sysid.workbench.naming import nearby
+from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.naming import nearby
+from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.schemas import schema_line
-from sysid.workbench.store import write_bytes
 
 
 def ingest_command(source: str, *, propose: Path | None) -> None:

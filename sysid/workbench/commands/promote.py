@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sysid.workbench.audience import console
-from sysid.workbench.registry import promote
-from sysid.workbench.tracking import connect, store_uri
+from sysid.workbench.runner.listeners import console
+from sysid.workbench.tracking.mlflow_store import connect, store_uri
+from sysid.workbench.tracking.registry import promote
 
 
 def promote_command(name: str, *, version: str | None) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.errors import ConfigError
-from sysid.workbench.audience import Audience, console, typed_command
-from sysid.workbench.config import find_pipeline, read_pipeline
+from sysid.workbench.fits.config import find_pipeline, read_pipeline
+from sysid.workbench.fits.run import run_pipeline
 from sysid.workbench.kinds import DEFAULT, RunRequest, kind_of, kinds
-from sysid.workbench.pipeline import run_pipeline
-from sysid.workbench.screen import duration, table_of_fits, table_of_steps
+from sysid.workbench.runner.listeners import Audience, console, typed_command
+from sysid.workbench.runner.screen import duration, table_of_fits, table_of_steps
 
 
 def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool) -> int:
@@ -43,7 +43,7 @@ def plan_command(pipeline: str, *, fresh: bool, out: Path | None) -> None:
     Raises:
         UserError: If the pipeline, its data or its options cannot be used.
     """
-    from sysid.workbench.dry_run import plan
+    from sysid.workbench.runner.plan import plan
 
     path = find_pipeline(pipeline)
     kind = kind_of(path)

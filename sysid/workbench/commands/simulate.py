@@ -13,7 +13,7 @@ from sysid.export.flags import Flag
 from sysid.export.reading import read_bundle
 from sysid.export.simulation import Simulation, read_inputs, simulate_bundle
 from sysid.ingest import write_trace
-from sysid.workbench.audience import console
+from sysid.workbench.runner.listeners import console
 
 PICTURES = (".png", ".svg", ".pdf")
 """What a picture may end in."""
@@ -107,8 +107,8 @@ def _tell(simulation: Simulation, out: Path) -> None:
 
 
 def _draw(simulation: Simulation, plot: Path, *, title: str) -> None:
-    from sysid.reporting.simulation_figure import simulation_figure
-    from sysid.reporting.style import styled
+    from sysid.reporting.figures.simulation_figure import simulation_figure
+    from sysid.reporting.figures.style import styled
 
     outside = (simulation.flags & int(Flag.OUTSIDE_RANGE)) > 0
     figure = simulation_figure(simulation.trace, simulation.inputs, outside=outside, title=title)

@@ -15,8 +15,8 @@ from sysid.ingest import write_trace
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.runner import read_line
-from sysid.workbench.audience import console
 from sysid.workbench.commands.simulate import check_picture
+from sysid.workbench.runner.listeners import console
 
 DRAWN = 5
 """Places in the picture at most: more lines of one field are not told apart."""
@@ -145,8 +145,8 @@ def _cannot(text: str, got: str) -> ConfigError:
 
 
 def _draw(stored: StoredLine, trace: Trace, positions: list[float], plot: Path, *, title: str) -> None:
-    from sysid.reporting.simulation_figure import simulation_figure
-    from sysid.reporting.style import styled
+    from sysid.reporting.figures.simulation_figure import simulation_figure
+    from sysid.reporting.figures.style import styled
 
     drawn = [positions[i] for i in np.unique(np.linspace(0, len(positions) - 1, DRAWN).round().astype(int))]
     inputs = tuple(channel.name for channel in stored.inputs)

@@ -9,13 +9,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from sysid.errors import ConfigError
-from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.audience import Audience, typed_command
-from sysid.workbench.config import find_pipeline
+from sysid.reporting.sweep.record import SweepRecord, Trial
+from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.kinds import KINDS, RunRequest, kind_of
-from sysid.workbench.screen import table_of_fits
-from sysid.workbench.sweep_run import Sweep, read_sweep_file, run_sweep
-from sysid.workbench.sweep_store import TrialStore
+from sysid.workbench.runner.listeners import Audience, typed_command
+from sysid.workbench.runner.screen import table_of_fits
+from sysid.workbench.sweep.run import Sweep, read_sweep_file, run_sweep
+from sysid.workbench.sweep.store import TrialStore
 
 SHOWN = 5
 """Trials in the table on the screen."""

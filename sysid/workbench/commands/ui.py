@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import IO
 
 from sysid.errors import SysidError
-from sysid.workbench.audience import console
-from sysid.workbench.tracking import QUIET, latest_experiment, store_uri
-from sysid.workbench.views import VIEW
+from sysid.workbench.runner.listeners import console
+from sysid.workbench.tracking.mlflow_store import QUIET, latest_experiment, store_uri
+from sysid.workbench.tracking.mlflow_views import VIEW
 
 START_LIMIT_S = 60.0
 """Seconds that a server may take; 8 to 10 s were measured on two cores."""

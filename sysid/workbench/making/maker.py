@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 from pydantic import BaseModel
 
-from sysid.workbench.kept_steps import Step
 from sysid.workbench.plugins import find_plugin
+from sysid.workbench.runner.kept_steps import Step
 
 GROUP = "sysid.makers"
 

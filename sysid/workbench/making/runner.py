@@ -8,13 +8,13 @@ import yaml
 
 from sysid.ingest import load_dataset
 from sysid.traces import TraceSet
-from sysid.workbench.environment import environment
-from sysid.workbench.events import StepDone, StepProgress, StepStarted, Watcher
-from sysid.workbench.kept_steps import do_steps
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.making.config import MakingConfig
 from sysid.workbench.making.maker import find_maker
-from sysid.workbench.store import RunFolder, write_bytes, write_json
+from sysid.workbench.runner.environment import environment
+from sysid.workbench.runner.events import StepDone, StepProgress, StepStarted, Watcher
+from sysid.workbench.runner.kept_steps import do_steps
+from sysid.workbench.runner.store import RunFolder, write_bytes, write_json
 from sysid.yaml_files import check, read_yaml
 
 FILE = "dataset.yaml"
@@ -32,7 +32,7 @@ def run_making(request: RunRequest) -> int:
     Raises:
         UserError: If the pipeline or an option cannot be used.
     """
-    from sysid.workbench.audience import Audience, typed_command
+    from sysid.workbench.runner.listeners import Audience, typed_command
 
     config = check(MakingConfig, read_yaml(request.path), where=request.path)
     store = RunFolder(path=(request.out or Path("runs") / config.name).resolve())

@@ -11,10 +11,10 @@ from sysid.errors import BundleError, ConfigError
 from sysid.export import export_bundle
 from sysid.ingest import load_dataset
 from sysid.reporting import publish_run
-from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
-from sysid.workbench.record import read_fit
 from tests.workbench.assembly.conftest import PIPELINE
 
 QUICK = PIPELINE.replace("candidates: 2", "candidates: 1").replace(

@@ -10,13 +10,13 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.ingest import load_dataset
-from sysid.reporting.judgement import TableRecord
-from sysid.reporting.judgement_report import read_judgement_results
-from sysid.reporting.sweep_record import SweepRecord
+from sysid.reporting.judging.results import read_judgement_results
+from sysid.reporting.judging.tables import TableRecord
+from sysid.reporting.sweep.record import SweepRecord
 from sysid.workbench.assembly.runner import run_assembly
+from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
-from sysid.workbench.record import read_fit
-from sysid.workbench.sweep_run import read_sweep_file, run_sweep
+from sysid.workbench.sweep.run import read_sweep_file, run_sweep
 from tests.workbench.assembly.conftest import PIPELINE
 
 BASE = (

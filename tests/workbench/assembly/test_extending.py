@@ -10,7 +10,7 @@ import pytest
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
-from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.assembly.runner import run_assembly

@@ -11,7 +11,7 @@ import pytest
 
 from sysid.export import read_bundle
 from sysid.export.manifest import schema_text
-from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.kinds import RunRequest
 from tests.workbench.assembly.conftest import PIPELINE, write_tanks

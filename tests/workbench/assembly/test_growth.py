@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from sysid.errors import ConfigError
 from sysid.models import Cascade
-from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.judging.results import read_judgement_results
 from sysid.traces import Trace
 from sysid.workbench.assembly.growth import Growth, Look, grow, sequence_errors
 from sysid.workbench.assembly.joint_round import JointRound

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sysid.estimation import CascadeFit, Status
-from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.rounds import RoundDone, rounds_table
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.kinds import RunRequest

@@ -15,12 +15,12 @@ from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, Status
 from sysid.export import read_bundle
 from sysid.reporting import publish_run
-from sysid.reporting.judgement_report import read_judgement_results
+from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest, kind_of
-from sysid.workbench.record import read_fit
-from sysid.workbench.tracking import connect, store_uri
+from sysid.workbench.tracking.mlflow_store import connect, store_uri
 from tests.workbench.assembly.conftest import levels
 
 

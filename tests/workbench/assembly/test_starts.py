@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.reporting.judgement_report import JudgementResults, read_judgement_results
+from sysid.reporting.judging.results import JudgementResults, read_judgement_results
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.members import score_of

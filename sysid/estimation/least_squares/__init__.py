@@ -1,0 +1,1 @@
+"""The engine that every fit shares: Levenberg-Marquardt, damping, evidence, termination, posterior."""

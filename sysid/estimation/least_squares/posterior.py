@@ -1,0 +1,233 @@
+r"""The posterior of a fitted network: how far its parameters, and with them its output, may be off.
+
+At a minimum :math:`\hat\theta` of the penalised loss (``regularisation.py``) the posterior is taken to be the Gaussian
+whose precision is the curvature there (MacKay 1992, "A practical Bayesian framework for backpropagation networks",
+section 3.2), in the Gauss-Newton approximation:
+
+.. math::
+    \theta \sim \mathcal N(\hat\theta, \Sigma), \qquad \Sigma^{-1} = H = \frac{\beta}{c} J^T J + A,
+    \qquad A = \mathrm{diag}(\alpha).
+
+:math:`\beta` (``Prior.beta``) is already the precision of the residuals over their correlation time, so that
+residuals that persist do not count as new information at every sample; :math:`c` (``copies``) is how often each record
+was used, since a copy with an offset has no noise of its own. As for the evidence, everything comes from
+:math:`M = A^{-1/2} H A^{-1/2} = L L^T`, whose eigenvalues are at least 1 whatever the rank of :math:`J`. Training
+stands in a basis, :math:`\theta_\text{plain} = P\theta`, and what is kept is a factor of the covariance of the plain
+parameters:
+
+.. math:: F = P A^{-1/2} L^{-T}, \qquad \Sigma_\text{plain} = F F^T.
+
+An output depends on the parameters through its sensitivities :math:`j_t = d\hat y_t / d\theta`, the rows of the
+Jacobian in free run or one step ahead, and a measured output has the residuals' variance :math:`\sigma^2` besides:
+
+.. math:: \mathrm{var}(y_t) = \lVert F^T j_t \rVert^2 + \sigma^2.
+
+:math:`\sigma^2` is a figure of its own for each of the two: the mean squared residual on the estimation records, times
+:math:`N / (N - c\,\tau\gamma)` for the parameters that were fitted (of free-run residuals, :math:`\tau` at a time
+count as one). What a free run leaves is not noise but an error of the model, which depends on what the inputs do; the
+records that it was fitted to show the least of it. Where there are traces that trained nothing (``selection``),
+:func:`calibrate` therefore compares the standardised errors there with what the Gaussian promises, and ``spread``
+widens the intervals by the ratio of their 95 % quantiles (a split conformal interval, Lei et al. 2018,
+"Distribution-free predictive inference for regression", section 5.2, applied to whole records).
+
+Limits: the Gaussian is local and the output is linearised in the parameters, so other minima count for nothing; a model
+that was stopped early does not stand at a minimum; the residuals' variance is one number, too wide where the output
+rests and too narrow where it moves fast; the spread is that of one level, and of traces that also chose between the
+starts; errors at neighbouring samples are dependent, so that an interval says nothing about a whole record at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, stats
+
+from sysid.errors import ConfigError
+from sysid.estimation.least_squares.levenberg_marquardt import State
+from sysid.estimation.networks.provider import Experiment, RecursionProvider
+from sysid.estimation.result import Loop
+from sysid.models import AbstractModel, Recursion
+
+CALIBRATED_AT = 0.95
+"""The level at which the spread is found."""
+
+LEAST_NOISE_SHARE = 0.05
+"""Least share of the samples that is taken to be left for the residuals' variance once the parameters are paid for."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Noise:
+    """Errors that remain, of the free run and one step ahead.
+
+    Args:
+        free_run: Of the free run.
+        one_step: One step ahead.
+    """
+
+    free_run: float
+    one_step: float
+
+    def of(self, loop: Loop) -> float:
+        """The figure of one of the two.
+
+        Args:
+            loop: ``CLOSED`` for the free run.
+
+        Returns:
+            The figure.
+        """
+        return self.free_run if loop is Loop.CLOSED else self.one_step
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Posterior:
+    """The Gaussian posterior of a network's parameters.
+
+    Args:
+        factor: ``F`` with covariance ``F F^T`` of the model's flat parameters, shape ``(n_parameters, n_directions)``.
+        noise: Variance of the residuals, in the output's unit squared.
+        spread: Factor of the standard deviations, at least 1: how much larger errors were on traces that train nothing.
+    """
+
+    factor: NDArray[np.float64]
+    noise: Noise
+    spread: Noise = Noise(free_run=1.0, one_step=1.0)
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of the flat parameters, shape ``(n_parameters, n_parameters)``."""
+        return np.asarray(self.factor @ self.factor.T)
+
+    def parameter_variance(self, model: AbstractModel, experiment: Experiment, loop: Loop) -> NDArray[np.float64]:
+        """The part of an output's variance that is due to the parameters.
+
+        Args:
+            model: The model that the posterior belongs to.
+            experiment: Inputs, history and, one step ahead, the measured output.
+            loop: ``CLOSED`` for the free run.
+
+        Returns:
+            Shape ``(n_samples,)``, in the output's unit squared.
+
+        Raises:
+            ConfigError: If the model is no recursion over lags, whose sensitivities are known.
+        """
+        form = model.recursion
+        if not isinstance(form, Recursion):
+            raise ConfigError(
+                "no sensitivities are known for this kind of model",
+                where=model.structure.label,
+                expected="a model over lagged samples",
+                got=type(form).__name__,
+            )
+        provider = RecursionProvider(template=form, experiments=(experiment,), closed=loop is Loop.CLOSED)
+        return provider.output_variance(form.theta, self.factor) * form.scaling.output_scale**2
+
+    def to_arrays(self) -> dict[str, NDArray[np.float64]]:
+        """The fields as arrays, to be stored."""
+        return {
+            "factor": self.factor,
+            "noise": np.array([self.noise.free_run, self.noise.one_step]),
+            "spread": np.array([self.spread.free_run, self.spread.one_step]),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, NDArray[np.float64]]) -> Posterior:
+        """The posterior that :meth:`to_arrays` wrote.
+
+        Args:
+            arrays: What it wrote.
+
+        Returns:
+            The posterior.
+        """
+        noise, spread = (
+            Noise(free_run=float(arrays[name][0]), one_step=float(arrays[name][1])) for name in ("noise", "spread")
+        )
+        return cls(factor=arrays["factor"], noise=noise, spread=spread)
+
+
+def laplace(
+    state: State,
+    model: AbstractModel,
+    to_plain: NDArray[np.float64],
+    experiments: Sequence[Experiment],
+    *,
+    copies: int,
+    stride: int = 1,
+) -> Posterior | None:
+    """The posterior at the end of a fit.
+
+    Args:
+        state: Where the fit stands, in the basis of training.
+        model: The model there.
+        to_plain: From parameters in the basis to the model's, shape ``(n_parameters, n_directions)``.
+        experiments: The records that were fitted.
+        copies: How often each record is among them.
+        stride: Every so-manieth sample counted.
+
+    Returns:
+        The posterior, not calibrated; ``None`` where the evidence was never computed, or the model is no recursion.
+    """
+    form, evidence = model.recursion, state.evidence
+    if evidence is None or not isinstance(form, Recursion):
+        return None
+    root = 1.0 / np.sqrt(state.prior.precision)
+    M = (state.prior.beta / copies) * state.at.gauss_newton * root[:, None] * root[None, :]
+    M[np.diag_indices_from(M)] += 1.0
+    counted = sum(e.n_counted for e in experiments)
+    paid = copies * stride * evidence.correlation_time * evidence.total_effective_parameters
+    left = max(1.0 - paid / counted, LEAST_NOISE_SHARE)
+    variances = {}
+    for loop in Loop:
+        provider = RecursionProvider(template=form, experiments=tuple(experiments), closed=loop is Loop.CLOSED)
+        mse = 2.0 * provider.loss(form.theta) / counted * form.scaling.output_scale**2
+        variances[loop] = mse / left
+    noise = Noise(free_run=variances[Loop.CLOSED], one_step=variances[Loop.OPEN])
+    return Posterior(factor=to_plain @ (root[:, None] * _inverse_root(M)), noise=noise)
+
+
+def _inverse_root(M: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``R`` with ``R R^T`` the inverse of a matrix whose eigenvalues are at least 1."""
+    try:
+        factor = linalg.cholesky(M, lower=True)
+    except linalg.LinAlgError:
+        # As in the evidence: rounding can outweigh the identity, and the true eigenvalues are known to be 1 or more.
+        values, vectors = linalg.eigh(M)
+        return np.asarray(vectors / np.sqrt(np.maximum(values, 1.0)))
+    return np.asarray(linalg.solve_triangular(factor, np.eye(len(M)), lower=True).T)
+
+
+def calibrate(posterior: Posterior, model: AbstractModel, experiments: Sequence[Experiment]) -> Posterior:
+    """Widen the intervals to what the errors are on records that trained nothing.
+
+    Args:
+        posterior: The posterior.
+        model: Its model.
+        experiments: Such records; none leave the posterior as it is.
+
+    Returns:
+        The posterior with its spread.
+    """
+    if not experiments:
+        return posterior
+    spreads = {}
+    for loop in Loop:
+        ratios = [_standardised(posterior, model, experiment, loop) for experiment in experiments]
+        promised = float(stats.norm.ppf(0.5 + 0.5 * CALIBRATED_AT))
+        found = float(np.quantile(np.concatenate(ratios), CALIBRATED_AT)) / promised
+        spreads[loop] = max(1.0, found) if np.isfinite(found) else 1.0
+    return replace(posterior, spread=Noise(free_run=spreads[Loop.CLOSED], one_step=spreads[Loop.OPEN]))
+
+
+def _standardised(posterior: Posterior, model: AbstractModel, e: Experiment, loop: Loop) -> NDArray[np.float64]:
+    """Absolute errors over their standard deviations, where samples count."""
+    variance = posterior.parameter_variance(model, e, loop)
+    closed = loop is Loop.CLOSED
+    output = model.simulate(e.inputs, e.history) if closed else model.predict(e.inputs, e.output, e.history)
+    counted = np.ones(len(output), dtype=bool) if e.weights is None else e.weights > 0.0
+    deviation = np.sqrt(variance + posterior.noise.of(loop))
+    return np.asarray(np.abs(output - e.output)[counted] / np.maximum(deviation[counted], np.finfo(np.float64).tiny))

@@ -1,0 +1,1 @@
+"""Linear models: ARX, transfer functions, instrumental variables, order search."""

@@ -1,0 +1,213 @@
+"""ARX by least squares: one QR factorisation over several experiments, none of them concatenated."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import TraceError
+from sysid.estimation.linear.regression import Solution, deviation, solve, stack
+from sysid.estimation.linear.uncertainty import Uncertainty
+from sysid.estimation.networks.provider import Experiment, experiments_of
+from sysid.estimation.operating_point import OperatingPoint
+from sysid.estimation.result import FitResult, Loop, Status
+from sysid.models import ARX, ARXModel, Mapping, Start
+from sysid.traces import Trace
+
+
+def fit_arx(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    orders: ARX,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    operating_point: OperatingPoint | None = None,
+    ridge: float = 0.0,
+) -> FitResult:
+    """Fit an ARX model by least squares on the one-step prediction error.
+
+    Args:
+        traces: Estimation traces; a regression row never crosses from one into the next.
+        mapping: Which channels go in, which comes out.
+        orders: The structure.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        operating_point: Fit deviations from it; for orders without an intercept. The model speaks of the channels'
+            values all the same: its constant follows from the point and is not counted as a parameter.
+        ridge: Penalty on the coefficients relative to the length of their columns; 0 for none.
+
+    Returns:
+        The fit, with status ``EXACT`` and the uncertainty of its parameters.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If there are fewer samples than parameters, or the orders do not fit the inputs.
+    """
+    began = time.perf_counter()
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    experiments = arx_experiments(
+        traces, mapping, orders, start=start or Start(), rest_output=rest, operating_point=operating_point
+    )
+    X, y = stack(experiments, orders.lags, intercept=orders.intercept)
+    solution = solve(X, y, ridge=ridge)
+    residual = y - X @ solution.coefficients
+    model = arx_model(
+        solution.coefficients, orders, mapping, traces[0], rest_output=rest, operating_point=operating_point
+    )
+    n_counted = sum(experiment.n_counted for experiment in experiments)
+    return FitResult(
+        model=model,
+        status=Status.EXACT,
+        loop=Loop.OPEN,
+        history={"iteration": np.array([0.0]), "mse": np.array([residual @ residual / n_counted])},
+        train_time_s=time.perf_counter() - began,
+        uncertainty=arx_uncertainty(solution, residual, n_counted, orders, mapping),
+        notes=(*_rank_note(solution), stability_note(model)),
+    )
+
+
+def first_output(traces: Sequence[Trace], mapping: Mapping) -> float:
+    """The mean of the traces' first output samples: the rest value where none is declared.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Names the output.
+
+    Returns:
+        A value in the output's unit.
+    """
+    return float(np.mean([trace[mapping.output][0] for trace in traces]))
+
+
+def arx_experiments(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    orders: ARX,
+    *,
+    start: Start,
+    rest_output: float,
+    operating_point: OperatingPoint | None,
+) -> tuple[Experiment, ...]:
+    """The records of an ARX fit, as deviations where that is asked for.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which comes out.
+        orders: The structure.
+        start: What stands before each trace.
+        rest_output: Output at rest.
+        operating_point: What the records are counted from; ``None`` for the values themselves.
+
+    Returns:
+        One experiment per trace.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If the orders do not fit the inputs, or deviations go with an intercept.
+    """
+    if len(orders.nb) != len(mapping.inputs):
+        raise TraceError(
+            "the orders do not match the inputs",
+            expected=f"{len(mapping.inputs)} values of nb and nk for {mapping}",
+            got=f"{len(orders.nb)} values",
+            remedy="give one nb and one nk for each input",
+        )
+    if operating_point is not None and orders.intercept:
+        raise TraceError(
+            "deviations from an operating point leave nothing for an intercept to do",
+            expected="one of the two",
+            got="both",
+            remedy="set intercept: false, or give no operating point",
+        )
+    experiments = experiments_of(traces, mapping, start, rest_output)
+    return experiments if operating_point is None else tuple(deviation(e, operating_point) for e in experiments)
+
+
+def arx_model(
+    parameters: NDArray[np.float64],
+    orders: ARX,
+    mapping: Mapping,
+    example: Trace,
+    *,
+    rest_output: float,
+    operating_point: OperatingPoint | None,
+) -> ARXModel:
+    """The model with these parameters.
+
+    Args:
+        parameters: ``[b of input 1 | ... | a]`` and the intercept where it is fitted.
+        orders: The structure.
+        mapping: Which channels go in, which comes out.
+        example: A trace, for sample time and units.
+        rest_output: Output at rest.
+        operating_point: What the parameters' deviations are counted from.
+
+    Returns:
+        The model, in the channels' units.
+    """
+    coefficients = parameters[: orders.lags.n_regressors]
+    intercept = float(parameters[-1]) if orders.intercept else 0.0
+    if operating_point is not None:
+        intercept = operating_point.intercept(orders, coefficients)
+    return ARXModel(
+        orders=orders,
+        coefficients=coefficients,
+        intercept=intercept,
+        mapping=mapping,
+        sample_time=example.sample_time,
+        input_units=tuple(example.channel(name).unit for name in mapping.inputs),
+        output_unit=example.channel(mapping.output).unit,
+        rest_output=rest_output,
+    )
+
+
+def arx_uncertainty(
+    solution: Solution, residual: NDArray[np.float64], n_counted: int, orders: ARX, mapping: Mapping
+) -> Uncertainty:
+    """What the residuals say about the parameters (Ljung 1999, eq. 9.20: white residuals, true structure).
+
+    Args:
+        solution: The regression.
+        residual: Shape ``(n_samples,)``.
+        n_counted: Samples that count.
+        orders: The structure.
+        mapping: Names the inputs.
+
+    Returns:
+        The uncertainty, parameter by parameter.
+    """
+    variance = float(residual @ residual) / max(n_counted - solution.rank, 1)
+    lags = orders.lags
+    names = [f"b({name}, {lag})" for name, lags_i in zip(mapping.inputs, lags.inputs, strict=True) for lag in lags_i]
+    names += [f"a({lag})" for lag in lags.output] + ["intercept"] * orders.intercept
+    return Uncertainty(
+        names=tuple(names),
+        values=solution.coefficients,
+        covariance=variance * solution.unscaled_covariance,
+        noise_variance=variance,
+    )
+
+
+def _rank_note(solution: Solution) -> tuple[str, ...]:
+    n = len(solution.coefficients)
+    if solution.rank == n:
+        return ()
+    return (f"The data determine {solution.rank} of {n} parameters; the others are zero.",)
+
+
+def stability_note(model: ARXModel) -> str:
+    """Whether the free run is stable, as a sentence.
+
+    Args:
+        model: The model.
+
+    Returns:
+        The sentence, with the largest pole.
+    """
+    largest = float(np.abs(model.poles).max(initial=0.0))
+    verdict = "stable" if largest < 1.0 else "not stable"
+    return f"The free run is {verdict}: the largest pole has magnitude {largest:.6f}."

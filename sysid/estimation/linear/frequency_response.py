@@ -1,0 +1,243 @@
+"""Transfer functions from data over frequency: measured frequency responses, or input and output spectra."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import TraceError
+from sysid.estimation.least_squares.levenberg_marquardt import Iteration
+from sysid.estimation.linear.pole_starts import PoleStart
+from sysid.estimation.linear.poles import scattered, sections_of, stabilised
+from sysid.estimation.linear.records import SpectralRecord
+from sysid.estimation.linear.sanathanan_koerner import sk_poles
+from sysid.estimation.linear.transfer_function_search import AbstractProblem, Terms, TransferFunctionTraining
+from sysid.estimation.linear.variable_projection import SeparableProvider
+from sysid.estimation.result import FitResult
+from sysid.models import Mapping, Scaling, TransferFunction
+from sysid.models.orthonormal_basis import Domain
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Spectrum:
+    """One experiment over frequency, in the channels' units, in steady state.
+
+    Args:
+        frequency: In rad/s, shape ``(n_points,)``.
+        inputs: Input spectra, shape ``(n_points, n_inputs)``; for a measured frequency response 1 for its input and
+            0 for the others.
+        output: Output spectrum, shape ``(n_points,)``.
+        weights: Weight of each point's squared error, shape ``(n_points,)``; all ones if not given.
+
+    Raises:
+        TraceError: If shapes disagree or a value is not finite.
+    """
+
+    frequency: NDArray[np.float64]
+    inputs: NDArray[np.complex128]
+    output: NDArray[np.complex128]
+    weights: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frequency", np.asarray(self.frequency, dtype=np.float64))
+        object.__setattr__(self, "inputs", np.asarray(self.inputs, dtype=np.complex128))
+        object.__setattr__(self, "output", np.asarray(self.output, dtype=np.complex128))
+        n = len(self.frequency)
+        shapes = (self.inputs.shape[:1], self.output.shape, np.shape(self.point_weights))
+        finite = all(np.isfinite(part).all() for part in (self.frequency, self.inputs, self.output))
+        if self.inputs.ndim != 2 or set(shapes) != {(n,)} or not finite or n == 0:
+            raise TraceError(
+                "not a spectrum",
+                expected="finite values, inputs of shape (n_points, n_inputs), and one output and weight per frequency",
+                got=f"shapes {self.inputs.shape} and {self.output.shape} for {n} frequencies",
+                remedy="give one row per frequency",
+            )
+
+    @property
+    def point_weights(self) -> NDArray[np.float64]:
+        """The weights as an array."""
+        return np.ones(len(self.frequency)) if self.weights is None else np.asarray(self.weights, dtype=np.float64)
+
+    @classmethod
+    def of_response(
+        cls,
+        frequency: NDArray[np.float64],
+        response: NDArray[np.complex128],
+        *,
+        weights: NDArray[np.float64] | None = None,
+    ) -> tuple[Spectrum, ...]:
+        """Measured frequency responses, one experiment for each input.
+
+        Args:
+            frequency: In rad/s, shape ``(n_points,)``.
+            response: Output unit per input unit, shape ``(n_points, n_inputs)``.
+            weights: As in the class.
+
+        Returns:
+            One spectrum per input.
+        """
+        response = np.asarray(response, dtype=np.complex128)
+        unit = np.eye(response.shape[1], dtype=np.complex128)
+        return tuple(
+            cls(
+                frequency=frequency, inputs=np.tile(unit[j], (len(response), 1)), output=response[:, j], weights=weights
+            )
+            for j in range(response.shape[1])
+        )
+
+
+def _ignore(_: Iteration) -> None:
+    """The callback of those who do not watch."""
+
+
+def fit_spectra(
+    spectra: Sequence[Spectrum],
+    mapping: Mapping,
+    orders: TransferFunction,
+    training: TransferFunctionTraining | None = None,
+    *,
+    sample_time: float,
+    input_units: tuple[str, ...],
+    output_unit: str,
+    rest_output: float = 0.0,
+    on_iteration: Callable[[Iteration], None] = _ignore,
+) -> FitResult:
+    """Fit a transfer function to data over frequency.
+
+    Least squares on the complex output error, from Sanathanan-Koerner iterations. Dead times are multiples of the
+    sample time, also for a continuous transfer function.
+
+    Args:
+        spectra: Estimation data.
+        mapping: Which channels go in, which comes out.
+        orders: The structure, without an intercept; dead times that it leaves open are searched.
+        training: How to fit.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+        on_iteration: Called after every iteration of the final run.
+
+    Returns:
+        The fit; its mean squared error is that of real and imaginary parts.
+
+    Raises:
+        TraceError: If the orders do not fit the data.
+        FitDivergedError: If no start gives a finite model.
+    """
+    began = time.perf_counter()
+    m = len(mapping.inputs)
+    if orders.intercept or len(orders.poles) != m or any(s.inputs.shape[1] != m for s in spectra):
+        raise TraceError(
+            "the orders do not match the spectra",
+            expected=f"orders without an intercept and {m} inputs everywhere, as in {mapping}",
+            got=f"{len(orders.poles)} numbers of poles, {'an' if orders.intercept else 'no'} intercept",
+            remedy="set intercept: false, and give one number of poles and one input column for each input",
+        )
+    largest = [max(float(np.abs(s.inputs[:, j]).max()) for s in spectra) or 1.0 for j in range(m)]
+    scale = max(float(np.abs(s.output).max()) for s in spectra) or 1.0
+    problem = _Problem(
+        spectra=tuple(spectra),
+        scaling=Scaling(input_offset=(0.0,) * m, input_scale=tuple(largest), output_offset=0.0, output_scale=scale),
+        orders=orders,
+        training=training or TransferFunctionTraining(),
+        terms=Terms(
+            mapping=mapping,
+            sample_time=sample_time,
+            input_units=input_units,
+            output_unit=output_unit,
+            rest_output=rest_output,
+        ),
+    )
+    return problem.solve(began, on_iteration, None)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Problem(AbstractProblem):
+    """Records over frequency."""
+
+    spectra: tuple[Spectrum, ...]
+    scaling: Scaling
+    orders: TransferFunction
+    training: TransferFunctionTraining
+    terms: Terms
+
+    def provider(self, delays: tuple[int, ...]) -> SeparableProvider:
+        """The least-squares problem with these dead times; see the base class."""
+        return SeparableProvider(
+            poles=self.pole_parameters(self._span),
+            n_zeros=self.orders.zeros,
+            records=tuple(self._record(spectrum, delays) for spectrum in self.spectra),
+            constant=False,
+        )
+
+    def starts(self, provider: SeparableProvider, *, few: bool) -> list[PoleStart]:
+        """Sanathanan-Koerner iterations from scattered poles, and some of these as they are; see the base class."""
+        training, domain = self.training, self.orders.domain
+        records = [record for record in provider.records if isinstance(record, SpectralRecord)]
+        rng = np.random.default_rng(training.seed)
+        starts = []
+        for k in range(1 if few else 1 + training.scattered_starts):
+            first = tuple(self._scattered(n, rng) for n in self.orders.poles)
+            found = tuple(self._sk(records, j, poles) for j, poles in enumerate(first))
+            plain = tuple(sections_of(stabilised(poles, domain), domain) for poles in first)
+            starts.append(PoleStart(name=f"Sanathanan-Koerner from scattered poles {k + 1}", sections=found))
+            if k:
+                starts.append(PoleStart(name=f"scattered poles {k + 1}", sections=plain))
+        return starts
+
+    def _sk(
+        self, records: Sequence[SpectralRecord], j: int, first: NDArray[np.complex128]
+    ) -> tuple[NDArray[np.float64], ...]:
+        """Poles of one input, from the records in which it is the only one, or from all with common poles."""
+        alone = [r for r in records if not np.delete(r.inputs, j, axis=1).any() and r.inputs[:, j].any()]
+        chosen = alone or list(records)
+        inputs = np.concatenate([r.inputs[:, j : j + 1] if alone else r.inputs for r in chosen])
+        halves = [np.split(r.target, 2) for r in chosen]
+        output = np.concatenate([real + 1j * imaginary for real, imaginary in halves])
+        n = len(first)
+        zeros = (self.orders.zeros[j],) if alone else tuple(min(z, n - 1) for z in self.orders.zeros)
+        poles = sk_poles(
+            inputs,
+            output,
+            np.concatenate([r.variable for r in chosen]),
+            first,
+            zeros,
+            domain=self.orders.domain,
+            weights=np.concatenate([np.split(r.root_weights, 2)[0] for r in chosen]),
+        )
+        return sections_of(poles, self.orders.domain)
+
+    @property
+    def _span(self) -> float:
+        """Period of the lowest frequency, in samples."""
+        lowest = min(float(s.frequency[s.frequency > 0.0].min(initial=np.inf)) for s in self.spectra)
+        return 2.0 * np.pi / lowest / self.terms.sample_time if np.isfinite(lowest) else 1.0
+
+    def _scattered(self, n: int, rng: np.random.Generator) -> NDArray[np.complex128]:
+        """Random poles at the frequencies of the data."""
+        every = np.concatenate([s.frequency for s in self.spectra])
+        every = every[every > 0.0]
+        fastest, slowest = float(every.max()), float(every.min())
+        unit = 1.0 / fastest if self.orders.domain is Domain.CONTINUOUS else self.terms.sample_time
+        span = int(min(max(10.0 / (slowest * unit), 10.0), 1e9))
+        return scattered(n, span, unit, rng, self.orders.domain)
+
+    def _record(self, spectrum: Spectrum, delays: tuple[int, ...]) -> SpectralRecord:
+        s = 1j * spectrum.frequency
+        T = self.terms.sample_time
+        discrete = self.orders.domain is Domain.DISCRETE
+        dead = np.exp(-s[:, np.newaxis] * T * np.array(delays))
+        output = spectrum.output / self.scaling.output_scale
+        root = np.sqrt(spectrum.point_weights)
+        return SpectralRecord(
+            inputs=spectrum.inputs / np.array(self.scaling.input_scale) * dead,
+            variable=np.asarray(np.exp(-s * T) if discrete else s, dtype=np.complex128),
+            target=np.concatenate([output.real, output.imag]),
+            root_weights=np.concatenate([root, root]),
+            domain=self.orders.domain,
+        )

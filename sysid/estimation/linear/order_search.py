@@ -1,0 +1,312 @@
+"""ARX order search: the one-step loss of every candidate, exactly, from one factorisation."""
+
+from __future__ import annotations
+
+import enum
+import itertools
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.atomic import replacing
+from sysid.errors import ConfigError, TraceError
+from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.regression import stack
+from sysid.estimation.networks.provider import experiments_of
+from sysid.kernels import linear_orders as kernel
+from sysid.models import ARX, Lags, Mapping, Start
+from sysid.traces import Trace
+
+
+class Criterion(enum.Enum):
+    """What the loss is weighed against the number of parameters with; the value is its name in tables."""
+
+    LOSS = "loss"
+    """The mean squared one-step error alone; never chooses a smaller model."""
+    AIC = "AIC"
+    """Akaike 1974: ``N ln V + 2 p``."""
+    AICC = "AICc"
+    """Hurvich and Tsai 1989: AIC with ``2 p (p + 1) / (N - p - 1)`` added, for short records."""
+    BIC = "BIC"
+    """Schwarz 1978, Rissanen's MDL: ``N ln V + p ln N``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrderGrid:
+    """The candidates of a search: every combination of orders and dead times.
+
+    Args:
+        max_na: Largest number of past outputs; all from ``min_na`` on are tried.
+        max_nb: Largest number of past values, the same for each input; all from ``min_nb`` on are tried.
+        max_nk: Largest dead time; all from ``min_nk`` on are tried, for each input by itself.
+        min_na: Smallest number of past outputs.
+        min_nb: Smallest number of past values of each input.
+        min_nk: Smallest dead time.
+        intercept: Fit a constant beside the lags.
+
+    Raises:
+        ConfigError: If a range is empty or negative.
+
+    Example:
+        >>> OrderGrid(max_na=30, max_nb=30, max_nk=4).size(2)
+        675000
+    """
+
+    max_na: int
+    max_nb: int
+    max_nk: int
+    min_na: int = 1
+    min_nb: int = 1
+    min_nk: int = 0
+    intercept: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("na", "nb", "nk"):
+            low, high = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
+            if not 0 <= low <= high:
+                raise ConfigError(
+                    f"not a range of {name}",
+                    expected=f"0 <= min_{name} <= max_{name}",
+                    got=f"{low} to {high}",
+                    remedy="correct the range",
+                )
+
+    def size(self, n_inputs: int) -> int:
+        """Number of candidates.
+
+        Args:
+            n_inputs: Input channels.
+
+        Returns:
+            The number.
+        """
+        nb, nk = self.max_nb - self.min_nb + 1, self.max_nk - self.min_nk + 1
+        return int((self.max_na - self.min_na + 1) * (nb * nk) ** n_inputs)
+
+    def dead_times(self, n_inputs: int) -> list[tuple[int, ...]]:
+        """All combinations of dead times, the last input fastest.
+
+        Args:
+            n_inputs: Input channels.
+
+        Returns:
+            One tuple per combination.
+        """
+        return list(itertools.product(range(self.min_nk, self.max_nk + 1), repeat=n_inputs))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OrderLosses:
+    """The one-step loss of every candidate.
+
+    Args:
+        na: Shape ``(n_candidates,)``.
+        nb: Shape ``(n_candidates, n_inputs)``.
+        nk: Shape ``(n_candidates, n_inputs)``.
+        mse: Mean squared one-step error on the estimation traces, in the output's unit squared, shape
+            ``(n_candidates,)``.
+        n_samples: Samples that count.
+        intercept: Whether a constant is fitted.
+    """
+
+    na: NDArray[np.int16]
+    nb: NDArray[np.int16]
+    nk: NDArray[np.int16]
+    mse: NDArray[np.float64]
+    n_samples: int
+    intercept: bool
+
+    def __len__(self) -> int:
+        return len(self.mse)
+
+    @property
+    def n_parameters(self) -> NDArray[np.int64]:
+        """Number of fitted parameters of each candidate, shape ``(n_candidates,)``."""
+        return np.asarray(self.na + self.nb.sum(axis=1) + self.intercept, dtype=np.int64)
+
+    def orders(self, index: int) -> ARX:
+        """The structure of one candidate.
+
+        Args:
+            index: Which.
+
+        Returns:
+            The structure.
+        """
+        nb, nk = tuple(self.nb[index].tolist()), tuple(self.nk[index].tolist())
+        return ARX(na=int(self.na[index]), nb=nb, nk=nk, intercept=self.intercept)
+
+    def score(self, criterion: Criterion) -> NDArray[np.float64]:
+        """A criterion for every candidate; smaller is better.
+
+        Args:
+            criterion: Which.
+
+        Returns:
+            Shape ``(n_candidates,)``.
+        """
+        if criterion is Criterion.LOSS:
+            return self.mse
+        n, p = self.n_samples, self.n_parameters
+        fit = n * np.log(np.maximum(self.mse, np.finfo(np.float64).tiny))
+        if criterion is Criterion.BIC:
+            return np.asarray(fit + p * np.log(n))
+        correction = 2.0 * p * (p + 1) / np.maximum(n - p - 1, 1) if criterion is Criterion.AICC else 0.0
+        return np.asarray(fit + 2.0 * p + correction)
+
+    def best(self, criterion: Criterion = Criterion.BIC) -> ARX:
+        """The candidate with the least criterion.
+
+        Args:
+            criterion: Which.
+
+        Returns:
+            Its structure.
+        """
+        return self.orders(int(np.argmin(self.score(criterion))))
+
+    def shortlist(self, count: int) -> NDArray[np.int64]:
+        """Candidates worth a free run: the best few of every number of parameters.
+
+        The least one-step losses of all belong to the largest models, and they differ by next to nothing; the free
+        run is often better with few parameters. So each number of parameters sends its best, in turn.
+
+        Args:
+            count: How many.
+
+        Returns:
+            Indices of at most ``count`` candidates, by number of parameters.
+        """
+        p = self.n_parameters
+        by_size = np.lexsort((self.mse, p))
+        firsts = np.searchsorted(p[by_size], p[by_size], side="left")
+        place = np.arange(len(by_size)) - firsts
+        chosen = by_size[np.argsort(place, kind="stable")[:count]]
+        return np.asarray(chosen[np.lexsort((self.mse[chosen], p[chosen]))], dtype=np.int64)
+
+    def write(self, path: Path) -> None:
+        """Store all candidates as a compressed ``.npz`` file.
+
+        Args:
+            path: Where to.
+        """
+        columns = {"na": self.na, "nb": self.nb, "nk": self.nk, "mse": self.mse}
+        with replacing(Path(path)) as draft, draft.open("wb") as file:
+            np.savez_compressed(file, n_samples=self.n_samples, intercept=self.intercept, **columns)  # type: ignore[arg-type]  # numpy's stub takes its keyword for ours
+
+    @classmethod
+    def read(cls, path: Path) -> OrderLosses:
+        """Read what :meth:`write` wrote.
+
+        Args:
+            path: The file.
+
+        Returns:
+            The losses.
+        """
+        with np.load(path, allow_pickle=False) as file:
+            columns = {name: file[name] for name in ("na", "nb", "nk", "mse")}
+            return cls(**columns, n_samples=int(file["n_samples"]), intercept=bool(file["intercept"]))
+
+
+def _ignore(_done: int, _total: int) -> None:
+    """The callback of those who do not watch."""
+
+
+def search_orders(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    grid: OrderGrid,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    workers: int = 2,
+    on_progress: Callable[[int, int], None] = _ignore,
+) -> OrderLosses:
+    """The one-step least-squares loss of every candidate of a grid.
+
+    Each loss is that of :func:`sysid.estimation.fit_arx` on the same traces, computed from one QR factorisation.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which comes out.
+        grid: The candidates.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        workers: Threads.
+        on_progress: Told after each combination of dead times how many candidates are done, and of how many.
+
+    Returns:
+        All losses.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If there are fewer samples than parameters of the largest candidate.
+    """
+    m = len(mapping.inputs)
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    experiments = experiments_of(traces, mapping, start or Start(), rest)
+    reach = grid.max_nk + grid.max_nb - grid.min_nk
+    input_lags = tuple(range(grid.min_nk, grid.max_nk + grid.max_nb))
+    lags = Lags(inputs=(input_lags,) * m, output=tuple(range(1, grid.max_na + 1)))
+    X, y = stack(experiments, lags, intercept=False)
+    if len(X) <= lags.n_regressors + grid.intercept:
+        raise TraceError(
+            "fewer samples than the largest candidate has parameters",
+            expected=f"more than {lags.n_regressors + grid.intercept}",
+            got=len(X),
+            remedy="lower the orders, or use longer traces",
+        )
+    # The column of the intercept stands first: it is in every candidate.
+    root = np.sqrt(np.concatenate([np.ones(len(e.output)) if e.weights is None else e.weights for e in experiments]))
+    table = np.column_stack([root, X, y])
+    norms = np.linalg.norm(table, axis=0)
+    triangle = np.ascontiguousarray(linalg.qr(table, mode="r")[0][: table.shape[1]].T)
+    tolerance = len(table) * np.finfo(np.float64).eps * norms
+    rank = 0
+    target, everything = table.shape[1] - 1, np.arange(table.shape[1])
+    if grid.intercept:
+        rank = kernel.reflect(triangle, 0, everything[1:], target - 1, target, 0, tolerance[0])
+    outputs = everything[1 + m * reach : target]
+    dead_times = grid.dead_times(m)
+    per_block = grid.size(m) // len(dead_times)
+    n_leaves = (grid.max_nb - grid.min_nb + 1) ** m
+    least = np.full(m, grid.min_nb)
+
+    def block(dead: tuple[int, ...]) -> NDArray[np.float64]:
+        first = [1 + i * reach + nk - grid.min_nk for i, nk in enumerate(dead)]
+        columns = np.array([np.arange(at, at + grid.max_nb) for at in first])
+        losses = np.empty((n_leaves, grid.max_na + 1))
+        kernel.nested_losses(triangle, rank, columns, least, outputs, target, tolerance, losses)
+        return losses[:, grid.min_na :]
+
+    blocks = []
+    with ThreadPoolExecutor(workers) as pool:
+        for losses in pool.map(block, dead_times):
+            blocks.append(losses)
+            on_progress(len(blocks) * per_block, grid.size(m))
+    n_samples = sum(experiment.n_counted for experiment in experiments)
+    return _collected(np.array(blocks) / n_samples, grid, dead_times, n_samples)
+
+
+def _collected(
+    mse: NDArray[np.float64], grid: OrderGrid, dead_times: list[tuple[int, ...]], n_samples: int
+) -> OrderLosses:
+    """Candidates side by side: dead times, then numbers of past inputs, then of past outputs, the last fastest."""
+    m = len(dead_times[0])
+    nb = np.array(list(itertools.product(range(grid.min_nb, grid.max_nb + 1), repeat=m)), dtype=np.int16)
+    na = np.arange(grid.min_na, grid.max_na + 1, dtype=np.int16)
+    n_k, n_b, n_a = len(dead_times), len(nb), len(na)
+    return OrderLosses(
+        na=np.tile(na, n_k * n_b),
+        nb=np.tile(np.repeat(nb, n_a, axis=0), (n_k, 1)),
+        nk=np.repeat(np.array(dead_times, dtype=np.int16), n_b * n_a, axis=0),
+        mse=mse.reshape(-1),
+        n_samples=n_samples,
+        intercept=grid.intercept,
+    )

@@ -1,0 +1,223 @@
+"""Starts of a transfer-function fit: poles from a long ARX model in three ways, and scattered ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from scipy.signal import freqz
+
+from sysid.estimation.linear.poles import continuous_from, scattered, sections_of, stabilised
+from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.refined_iv import refined_sections
+from sysid.estimation.linear.regression import solve
+from sysid.estimation.linear.sanathanan_koerner import sk_poles
+from sysid.estimation.linear.variable_projection import Sections
+from sysid.models.orthonormal_basis import Domain, rungs
+from sysid.models.realisation import realise
+
+LONGEST_ARX = 40
+"""Lags of each channel in the long ARX model, at most; fewer where the records are short."""
+_GRID = 300
+"""Frequencies at which the long model's response is read."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PoleStart:
+    """Where a fit may begin.
+
+    Args:
+        name: How it was found.
+        sections: For each input its sections.
+    """
+
+    name: str
+    sections: Sections
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LongArx:
+    """A least-squares ARX model with many lags, as rational functions with one denominator.
+
+    Args:
+        a: Coefficients of the past outputs, shape ``(n_lags,)``.
+        b: For each input those of the input delayed by its dead time, from lag 0 on, shape ``(n_lags,)``.
+    """
+
+    a: NDArray[np.float64]
+    b: tuple[NDArray[np.float64], ...]
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """In the z plane, mirrored into the unit circle."""
+        poles = np.asarray(np.roots([1.0, *(-self.a)]), dtype=np.complex128)
+        return stabilised(poles, Domain.DISCRETE)
+
+
+def long_arx(records: Sequence[TimeRecord], n_lags: int) -> LongArx:
+    """Fit the long model.
+
+    Args:
+        records: Data in scaled numbers, inputs delayed by their dead times.
+        n_lags: Lags of each channel.
+
+    Returns:
+        The model.
+    """
+    tables, targets = [], []
+    for record in records:
+        n, m = record.inputs.shape
+        y, level = record.target, record.target[0]
+        past = [np.concatenate([np.full(lag, level), y[: n - lag]]) for lag in range(1, n_lags + 1)]
+        drive = [
+            np.concatenate([np.full(lag, record.past[j]), record.inputs[: n - lag, j]])
+            for j in range(m)
+            for lag in range(n_lags)
+        ]
+        root = record.root_weights
+        tables.append(np.column_stack([*past, *drive, np.ones(n)]) * root[:, np.newaxis])
+        targets.append(y * root)
+    solution = solve(np.concatenate(tables), np.concatenate(targets)).coefficients
+    m = records[0].inputs.shape[1]
+    b = tuple(solution[n_lags * (1 + j) : n_lags * (2 + j)] for j in range(m))
+    return LongArx(a=solution[:n_lags], b=b)
+
+
+def arx_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zeros: tuple[int, ...]) -> list[PoleStart]:
+    """Starts from ARX models.
+
+    Args:
+        records: Data in scaled numbers.
+        n_poles: For each input.
+        n_zeros: For each input.
+
+    Returns:
+        Two from a long model, reduced for each input, and one with the poles of a short one.
+    """
+    domain, sample_time = records[0].domain, records[0].sample_time
+    n_rows = sum(len(record.target) for record in records)
+    n_lags = max(2, min(LONGEST_ARX, max(2 * max(n_poles), 10), n_rows // (4 * (1 + len(n_poles)))))
+    model = long_arx(records, n_lags)
+    found = {
+        "long ARX, balanced truncation": [_balanced(model, j, n) for j, n in enumerate(n_poles)],
+        "long ARX, Sanathanan-Koerner": [
+            _sk(model, j, n, zeros, records) for j, (n, zeros) in enumerate(zip(n_poles, n_zeros, strict=True))
+        ],
+    }
+    short = long_arx(records, min(max(n_poles), n_lags))
+    found["ARX of that order"] = [_padded(short.poles, n) for n in n_poles]
+    starts: list[PoleStart] = []
+    for name, poles in found.items():
+        planes = [p if domain is Domain.DISCRETE else continuous_from(p, sample_time) for p in poles]
+        sections = tuple(sections_of(stabilised(p, domain), domain) for p in planes)
+        starts.append(PoleStart(name=name, sections=sections))
+    return starts
+
+
+def pole_starts(
+    records: Sequence[TimeRecord],
+    n_poles: tuple[int, ...],
+    n_zeros: tuple[int, ...],
+    *,
+    n_scattered: int,
+    seed: int,
+) -> list[PoleStart]:
+    """Starts worth trying, the most informed first.
+
+    Args:
+        records: Data in scaled numbers.
+        n_poles: For each input.
+        n_zeros: For each input.
+        n_scattered: Random starts added.
+        seed: Of those.
+
+    Returns:
+        The starts.
+    """
+    domain, sample_time = records[0].domain, records[0].sample_time
+    n_rows = sum(len(record.target) for record in records)
+    starts = arx_starts(records, n_poles, n_zeros)
+    if max(n_poles) <= MOST_REFINED:
+        refined = refined_sections(records, starts[0].sections, n_zeros)
+        starts.append(PoleStart(name="refined instrumental variables", sections=refined))
+    rng = np.random.default_rng(seed)
+    for k in range(n_scattered):
+        parts = tuple(sections_of(scattered(n, n_rows, sample_time, rng, domain), domain) for n in n_poles)
+        starts.append(PoleStart(name=f"scattered poles {k + 1}", sections=parts))
+    return starts
+
+
+MOST_REFINED = 8
+"""Poles up to which instrumental variables are tried: the filtered signals of more cannot be told apart."""
+
+
+def _padded(poles: NDArray[np.complex128], n: int) -> NDArray[np.complex128]:
+    """The slowest poles, none torn from its conjugate, filled up with fast real ones."""
+    order = np.argsort(-np.abs(poles), kind="stable")
+    chosen = poles[order][:n]
+    if len(chosen) and abs(chosen.imag.sum()) > 1e-9:
+        chosen = np.concatenate([chosen[:-1], [chosen[-1].real + 0j]])
+    fast = np.linspace(0.1, 0.3, n - len(chosen)) if len(chosen) < n else np.empty(0)
+    return np.concatenate([chosen, fast]).astype(np.complex128)
+
+
+def _balanced(model: LongArx, j: int, n: int) -> NDArray[np.complex128]:
+    """Poles of one input's response reduced to ``n`` states by balanced truncation (Moore 1981).
+
+    The Gramians are those of the long model in the ladder of its own poles, which is nearly orthonormal.
+    """
+    poles = model.poles
+    if n >= len(poles):
+        return _padded(poles, n)
+    sections = sections_of(poles, Domain.DISCRETE)
+    system = realise(rungs(sections, len(poles) - 1, Domain.DISCRETE), Domain.DISCRETE)
+    grid = np.linspace(0.0, np.pi, 4 * len(poles) + 1)[1:]
+    wanted = _response(model, j, grid)
+    z = np.exp(1j * grid)
+    inner = np.linalg.solve(
+        z[:, None, None] * np.eye(len(poles)) - system.A, np.broadcast_to(system.B, (len(z), len(poles)))[..., None]
+    )[..., 0]
+    table = np.concatenate([np.column_stack([inner, np.ones(len(z))])])
+    stacked, target = np.concatenate([table.real, table.imag]), np.concatenate([wanted.real, wanted.imag])
+    C = linalg.lstsq(stacked, target, cond=1e-12)[0][:-1]
+    reach = linalg.solve_discrete_lyapunov(system.A, np.outer(system.B, system.B))
+    seen = linalg.solve_discrete_lyapunov(system.A.T, np.outer(C, C))
+    root_reach, root_seen = _factor(reach), _factor(seen)
+    U, sizes, Vt = linalg.svd(root_seen.T @ root_reach)
+    scale = 1.0 / np.sqrt(np.maximum(sizes[:n], sizes[0] * 1e-14))
+    left = (root_seen @ U[:, :n]) * scale
+    right = (root_reach @ Vt[:n].T) * scale
+    return np.asarray(linalg.eigvals(left.T @ system.A @ right), dtype=np.complex128)
+
+
+def _factor(gramian: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A square root of a matrix that is positive but for rounding."""
+    values, vectors = linalg.eigh(0.5 * (gramian + gramian.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _response(model: LongArx, j: int, grid: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """The long model's response at some frequencies in rad per sample, its poles mirrored into the circle."""
+    denominator = np.real(np.poly(model.poles))
+    return np.asarray(freqz(model.b[j], denominator, worN=grid)[1], dtype=np.complex128)
+
+
+def _sk(model: LongArx, j: int, n: int, n_zeros: int, records: Sequence[TimeRecord]) -> NDArray[np.complex128]:
+    """Poles from the long model's response, weighted by how much of the input there is at each frequency."""
+    length = max(len(record.target) for record in records)
+    grid = np.exp(np.linspace(np.log(2.0 * np.pi / length), np.log(0.98 * np.pi), _GRID))
+    weights = np.zeros(_GRID)
+    for record in records:
+        x = record.inputs[:, j] - record.past[j]
+        spectrum = np.abs(np.fft.rfft(np.diff(x, prepend=0.0), 2 * len(x)))
+        axis = np.linspace(0.0, np.pi, len(spectrum))
+        smooth = np.convolve(spectrum, np.ones(9) / 9.0, mode="same")
+        weights += np.interp(grid, axis, smooth) / grid * np.sqrt(grid)  # the grid is dense at low frequencies
+    variable = np.exp(-1j * grid)
+    response = _response(model, j, grid)
+    start = _padded(_balanced(model, j, n), n)
+    ones = np.ones((_GRID, 1), dtype=np.complex128)
+    return sk_poles(ones, response, variable, start, (n_zeros,), domain=Domain.DISCRETE, weights=weights)

@@ -1,0 +1,320 @@
+r"""Records that a transfer function is fitted to, in the time or the frequency domain.
+
+A record turns the ladders of all inputs into columns, and the model's output is linear in them. The derivative of an
+output :math:`y_j = B/F\,u_j` with respect to the denominator of section :math:`i`, at a fixed numerator, is one more
+pass through that section alone,
+
+.. math:: \frac{\partial y_j}{\partial c_{i,k}} = -\frac{q^{-k}}{F_i}\,y_j \qquad(\text{or } s^k),
+
+because :math:`\partial F / \partial c_{i,k} = q^{-k} F/F_i`: the whole gradient costs as many passes as the output.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.kernels import linear as kernel
+from sysid.models.orthonormal_basis import Domain, Rung, responses, rungs
+from sysid.models.realisation import Realisation, realise
+
+Ladders = tuple[tuple[Rung, ...], ...]
+"""The ladder of each input."""
+
+
+class AbstractRecord(ABC):
+    """One experiment as columns."""
+
+    target: NDArray[np.float64]
+    """Shape ``(n_rows,)``."""
+    root_weights: NDArray[np.float64]
+    """Square root of each row's weight, shape ``(n_rows,)``."""
+
+    @abstractmethod
+    def private(self, ladders: Ladders) -> int:
+        """Number of columns that belong to this record alone, such as its initial state.
+
+        Args:
+            ladders: One per input.
+
+        Returns:
+            The number.
+        """
+
+    @abstractmethod
+    def columns(self, ladders: Ladders) -> NDArray[np.float64]:
+        """Every tap of every input, then the record's own columns.
+
+        Args:
+            ladders: One per input.
+
+        Returns:
+            Shape ``(n_rows, n_taps_of_all + n_private)``, unweighted.
+        """
+
+    @abstractmethod
+    def tangents(
+        self, ladders: Ladders, columns: NDArray[np.float64], weights: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Derivatives of the output with respect to the sections' coefficients, at fixed numerators.
+
+        Args:
+            ladders: One per input.
+            columns: From :meth:`columns`.
+            weights: What the columns are multiplied with, shape ``(n_taps_of_all + n_private,)``.
+
+        Returns:
+            Shape ``(n_rows, n_coefficients)``: input by input, section by section, ``c1`` before ``c2`` or ``c0``.
+        """
+
+
+def full(ladders: Ladders, domain: Domain) -> Ladders:
+    """The same sections with all numerators below the number of poles: the space of free responses.
+
+    Args:
+        ladders: One per input.
+        domain: Their domain.
+
+    Returns:
+        One ladder per input.
+    """
+    return tuple(
+        rungs([rung.denominator for rung in ladder], sum(rung.order for rung in ladder) - 1, domain)
+        for ladder in ladders
+    )
+
+
+def tap_slices(ladders: Ladders) -> list[slice]:
+    """Where each input's taps stand among all columns.
+
+    Args:
+        ladders: One per input.
+
+    Returns:
+        One slice per input.
+    """
+    ends = np.cumsum([sum(len(rung.taps) for rung in ladder) for ladder in ladders])
+    return [slice(int(end - n), int(end)) for end, n in zip(ends, np.diff([0, *ends]), strict=True)]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TimeRecord(AbstractRecord):
+    """A record over time, in scaled numbers.
+
+    Args:
+        inputs: Each input, delayed by its dead time, shape ``(n_rows, n_inputs)``.
+        past: Value that each input has had for ever before, shape ``(n_inputs,)``.
+        target: Measured output, shape ``(n_rows,)``.
+        root_weights: Square root of each sample's weight, shape ``(n_rows,)``.
+        domain: Of the ladders.
+        sample_time: Seconds; used for continuous ladders.
+        free_start: Whether the state before the first row is fitted, rather than the equilibrium at ``past``.
+    """
+
+    inputs: NDArray[np.float64]
+    past: NDArray[np.float64]
+    target: NDArray[np.float64]
+    root_weights: NDArray[np.float64]
+    domain: Domain
+    sample_time: float
+    free_start: bool
+
+    def private(self, ladders: Ladders) -> int:
+        """The initial state, if it is fitted; see the base class."""
+        return sum(rung.order for ladder in ladders for rung in ladder) if self.free_start else 0
+
+    def columns(self, ladders: Ladders) -> NDArray[np.float64]:
+        """Responses to the inputs, then to a pulse before the record; see the base class."""
+        parts = [self._pass(ladder, self.inputs[:, j], self.past[j]) for j, ladder in enumerate(ladders)]
+        if self.free_start:
+            pulse = np.eye(len(self.target), 1)[:, 0]
+            parts += [self._pass(ladder, pulse, 0.0) for ladder in full(ladders, self.domain)]
+        return np.concatenate(parts, axis=1)
+
+    def tangents(
+        self, ladders: Ladders, columns: NDArray[np.float64], weights: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """One more pass through each section; see the base class."""
+        parts = []
+        own = tap_slices(ladders)
+        free = tap_slices(full(ladders, self.domain)) if self.free_start else []
+        shared = own[-1].stop
+        for j, ladder in enumerate(ladders):
+            if self.domain is Domain.DISCRETE:
+                y = columns[:, own[j]] @ weights[own[j]]
+                past = float(_static_taps(ladder, self.past[j]) @ weights[own[j]])
+                if free:
+                    at = slice(shared + free[j].start, shared + free[j].stop)
+                    y = y + columns[:, at] @ weights[at]
+                parts.append(_discrete_tangents(ladder, y, past))
+            else:
+                part = self._continuous_tangents(ladder, self.inputs[:, j], self.past[j], weights[own[j]])
+                if free:
+                    at = slice(shared + free[j].start, shared + free[j].stop)
+                    pulse = np.eye(len(self.target), 1)[:, 0]
+                    part = part + self._continuous_tangents(full((ladder,), self.domain)[0], pulse, 0.0, weights[at])
+                parts.append(part)
+        return np.concatenate(parts, axis=1)
+
+    def _pass(self, ladder: tuple[Rung, ...], x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+        if self.domain is Domain.DISCRETE:
+            return _discrete_columns(ladder, x, past)
+        return _run_sampled(realise(ladder, self.domain), self.sample_time, x, past)
+
+    def _continuous_tangents(
+        self, ladder: tuple[Rung, ...], x: NDArray[np.float64], past: float, weights: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The ladder with every section once more behind its output, sampled as one system."""
+        main = realise(ladder, self.domain)
+        again = [realise((_bare(rung),), self.domain) for rung in ladder]
+        n = len(main.A)
+        A = linalg.block_diag(main.A, *(part.A for part in again))
+        B = np.concatenate([main.B, np.zeros(n)])
+        C = linalg.block_diag(*(part.C for part in again))
+        output = weights @ main.C
+        at = n
+        for part in again:
+            A[at : at + len(part.A), :n] = np.outer(part.B, output)
+            at += len(part.A)
+        C = np.concatenate([np.zeros((len(C), n)), C], axis=1)
+        whole = Realisation(A=A, B=B, C=-C, D=np.zeros(len(C)))
+        return _run_sampled(whole, self.sample_time, x, past)
+
+
+def _bare(rung: Rung) -> Rung:
+    """The section alone, tapped at ``s`` and 1 over its denominator, the coefficients ``c1`` and ``c0``."""
+    taps = np.array([[1.0, 0.0]]) if rung.order == 1 else np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    return Rung(denominator=rung.denominator, taps=taps, onward=np.eye(rung.order + 1)[0])
+
+
+_FASTEST = 1e8
+"""Rate times sample time above which a trial step has left what can be sampled."""
+
+
+def _run_sampled(system: Realisation, sample_time: float, x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+    """A continuous system's outputs at the samples; NaN where its rates cannot be computed with."""
+    y = np.full((len(x), len(system.C)), np.nan)
+    rates = np.abs(system.A) * sample_time
+    if not np.isfinite(rates).all() or rates.max() > _FASTEST:
+        return y
+    system = system.sampled(sample_time)
+    if not np.isfinite(system.A).all():
+        return y
+    state = system.equilibrium(past) if past != 0.0 else np.zeros(len(system.A))
+    kernel.state_space(system.A, system.B[:, np.newaxis], system.C, system.D[:, np.newaxis], x[:, np.newaxis], state, y)
+    return y
+
+
+def _coefficients(rung: Rung) -> tuple[float, float]:
+    d = rung.denominator
+    return float(d[1]), float(d[2]) if len(d) == 3 else 0.0
+
+
+def _discrete_columns(ladder: Sequence[Rung], x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+    n = len(x)
+    columns = np.empty((n, sum(len(rung.taps) for rung in ladder)), order="F")
+    x = np.ascontiguousarray(x)
+    v = np.empty(n + 2)
+    at = 0
+    for i, rung in enumerate(ladder):
+        before = past / float(rung.denominator.sum())
+        v[:2] = before
+        kernel.all_pole(x, *_coefficients(rung), before, v[2:])
+        delayed = (v[2:], v[1:-1], v[:-2])
+        for numerator in rung.taps:
+            columns[:, at] = _combined(numerator, delayed)
+            at += 1
+        if i + 1 < len(ladder):
+            x = _combined(rung.onward, delayed)
+            past = before * float(rung.onward.sum())
+    return columns
+
+
+def _combined(numerator: NDArray[np.float64], delayed: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
+    result = float(numerator[0]) * delayed[0]
+    for weight, signal in zip(numerator[1:].tolist(), delayed[1:], strict=False):
+        if weight:
+            result += weight * signal
+    return result
+
+
+def _static_taps(ladder: Sequence[Rung], past: float) -> NDArray[np.float64]:
+    """Every tap while the input is held."""
+    values: list[float] = []
+    for rung in ladder:
+        v = past / float(rung.denominator.sum())
+        values += [v * float(numerator.sum()) for numerator in rung.taps]
+        past = v * float(rung.onward.sum())
+    return np.array(values)
+
+
+def _discrete_tangents(ladder: Sequence[Rung], y: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+    n = len(y)
+    result = np.empty((n, sum(rung.order for rung in ladder)), order="F")
+    y = np.ascontiguousarray(-y)
+    v = np.empty(n + 2)
+    at = 0
+    for rung in ladder:
+        before = -past / float(rung.denominator.sum())
+        v[:2] = before
+        kernel.all_pole(y, *_coefficients(rung), before, v[2:])
+        for lag in range(1, rung.order + 1):
+            result[:, at] = v[2 - lag : n + 2 - lag]
+            at += 1
+    return result
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SpectralRecord(AbstractRecord):
+    """A record over frequency, in scaled numbers; real parts of all points, then imaginary parts.
+
+    Args:
+        inputs: Input spectra with their dead times, shape ``(n_points, n_inputs)``.
+        variable: ``1/z`` or ``s`` at each point, shape ``(n_points,)``.
+        target: Output spectrum, real then imaginary parts, shape ``(2 n_points,)``.
+        root_weights: Square root of each row's weight, shape ``(2 n_points,)``.
+        domain: Of the ladders.
+    """
+
+    inputs: NDArray[np.complex128]
+    variable: NDArray[np.complex128]
+    target: NDArray[np.float64]
+    root_weights: NDArray[np.float64]
+    domain: Domain
+
+    def private(self, ladders: Ladders) -> int:  # noqa: ARG002 - spectra are those of a steady state
+        """None; see the base class."""
+        return 0
+
+    def columns(self, ladders: Ladders) -> NDArray[np.float64]:
+        """Frequency responses of the taps; see the base class."""
+        return _stacked(np.concatenate([self._taps(j, ladder) for j, ladder in enumerate(ladders)], axis=1))
+
+    def tangents(
+        self, ladders: Ladders, columns: NDArray[np.float64], weights: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """One more factor per section; see the base class."""
+        parts = []
+        n = len(self.variable)
+        for ladder, at in zip(ladders, tap_slices(ladders), strict=True):
+            y = columns[:, at] @ weights[at]
+            complex_y = y[:n] + 1j * y[n:]
+            for rung in ladder:
+                powers = self.variable[:, np.newaxis] ** np.arange(rung.order + 1)
+                v = -complex_y / (powers @ rung.denominator)
+                discrete = self.domain is Domain.DISCRETE
+                chosen = range(1, rung.order + 1) if discrete else range(rung.order - 1, -1, -1)
+                parts += [v * powers[:, k] for k in chosen]
+        return _stacked(np.column_stack(parts))
+
+    def _taps(self, j: int, ladder: tuple[Rung, ...]) -> NDArray[np.complex128]:
+        return responses(ladder, self.variable) * self.inputs[:, j : j + 1]
+
+
+def _stacked(table: NDArray[np.complex128]) -> NDArray[np.float64]:
+    return np.concatenate([table.real, table.imag])

@@ -1,0 +1,177 @@
+r"""Refined instrumental variables: poles from records over time, discrete or continuous (SRIV, SRIVC).
+
+With the ladder of the poles found before, :math:`A/\hat A = 1 + d^T x` and
+:math:`B/\hat A = \sum_k n_k \psi_k`, so that
+
+.. math:: y + d^T x(y) = \sum_k n_k \psi_k(u)
+
+is linear. All signals pass through :math:`1/\hat A`, which is the state-variable filter at the first iteration and the
+optimal prefilter at the last (Young and Jakeman 1980, "Refined instrumental variable methods of recursive time-series
+analysis, part III"; Garnier and Young 2014). The first iterations are least squares (Steiglitz and McBride 1965); then
+:math:`x` of the noise-free model output is the instrument. Inputs are held between samples, the output is taken as
+linear between them. Several inputs with poles of their own are fitted in turn, each to what the others leave.
+
+Limits: of a multiple-input system only a neighbourhood of the minimum is reached; it is the start of a refinement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.estimation.linear.poles import sections_of, stabilised
+from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.variable_projection import Sections
+from sysid.kernels import linear as kernel
+from sysid.models.orthonormal_basis import Domain, rungs
+from sysid.models.realisation import realise
+
+PLAIN_ITERATIONS = 3
+"""Least-squares iterations before instruments are used: a model's output is one as soon as it resembles the data."""
+
+
+def refined_poles(
+    records: Sequence[TimeRecord], start: NDArray[np.complex128], n_zeros: int, *, iterations: int = 20
+) -> NDArray[np.complex128]:
+    """Poles of a transfer function with one input.
+
+    Args:
+        records: With one input each; the target is filtered from its first sample.
+        start: Poles to begin with, as many as are wanted; the state-variable filter.
+        n_zeros: Degree of the numerator.
+        iterations: How many at most.
+
+    Returns:
+        Stable poles, the same number.
+    """
+    domain, n = records[0].domain, len(start)
+    poles = stabilised(start, domain)
+    for iteration in range(iterations):
+        sections = sections_of(poles, domain)
+        ladder = realise(rungs(sections, n - 1, domain), domain)
+        rows = [_rows(record, sections, n_zeros) for record in records]
+        X, y = np.concatenate([row[0] for row in rows]), np.concatenate([row[1] for row in rows])
+        Z = X
+        if iteration >= PLAIN_ITERATIONS:
+            Z = np.concatenate(
+                [_rows(_noise_free(record, sections, n_zeros), sections, n_zeros)[0] for record in records]
+            )
+        scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+        span = linalg.qr(Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300), mode="economic")[0]
+        solution = linalg.lstsq(span.T @ (X / scale), span.T @ y, cond=1e-12)[0] / scale
+        following = stabilised(
+            np.asarray(linalg.eigvals(ladder.A - np.outer(ladder.B, solution[:n])), dtype=np.complex128), domain
+        )
+        moved = np.abs(np.sort_complex(following) - np.sort_complex(poles)).max()
+        poles = following
+        if moved < 1e-7 * float(np.abs(poles).max()):
+            break
+    return poles
+
+
+def _rows(
+    record: TimeRecord, sections: tuple[NDArray[np.float64], ...], n_zeros: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Regressors ``[-x(y) | taps(u) | 1]`` and target of one record, weighted."""
+    ladder = rungs(sections, n_zeros, record.domain)
+    level = record.target[0]
+    states = _states(sections, record.target - level, record)
+    taps = record.columns((ladder,))[:, : n_zeros + 1]
+    root = record.root_weights[:, np.newaxis]
+    table = np.column_stack([-states, taps, np.ones(len(states))]) * root
+    return table, (record.target - level) * record.root_weights
+
+
+def _states(
+    sections: tuple[NDArray[np.float64], ...], signal: NDArray[np.float64], record: TimeRecord
+) -> NDArray[np.float64]:
+    """The ladder's state driven by a sampled signal that begins at zero."""
+    n = sum(len(d) - 1 for d in sections)
+    system = realise(rungs(sections, n - 1, record.domain), record.domain)
+    A, B, D = system.A, system.B, np.zeros(n)
+    if record.domain is Domain.CONTINUOUS:
+        A, B, D = _linear_between(A, B, record.sample_time)
+    y = np.empty((len(signal), n))
+    kernel.state_space(A, B[:, np.newaxis], np.eye(n), D[:, np.newaxis], signal[:, np.newaxis], np.zeros(n), y)
+    return y
+
+
+def _linear_between(
+    A: NDArray[np.float64], B: NDArray[np.float64], sample_time: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Exact sampling of a system whose input is linear between samples (Van Loan 1978)."""
+    n = len(A)
+    block = np.zeros((n + 2, n + 2))
+    block[:n, :n], block[:n, n], block[n, n + 1] = A * sample_time, B * sample_time, 1.0
+    exponential = linalg.expm(block)
+    held, ramp = exponential[:n, n], exponential[:n, n + 1]
+    Ad = exponential[:n, :n]
+    return Ad, held - ramp + Ad @ ramp, ramp
+
+
+def _noise_free(record: TimeRecord, sections: tuple[NDArray[np.float64], ...], n_zeros: int) -> TimeRecord:
+    """The record with the output of the best model with these poles."""
+    ladder = rungs(sections, n_zeros, record.domain)
+    taps = np.column_stack([record.columns((ladder,))[:, : n_zeros + 1], np.ones(len(record.target))])
+    root = record.root_weights
+    weights = linalg.lstsq(taps * root[:, np.newaxis], record.target * root, cond=1e-12)[0]
+    return _with_target(record, taps @ weights)
+
+
+def _with_target(record: TimeRecord, target: NDArray[np.float64]) -> TimeRecord:
+    return TimeRecord(
+        inputs=record.inputs,
+        past=record.past,
+        target=target,
+        root_weights=record.root_weights,
+        domain=record.domain,
+        sample_time=record.sample_time,
+        free_start=False,
+    )
+
+
+def refined_sections(
+    records: Sequence[TimeRecord], start: Sections, n_zeros: tuple[int, ...], *, rounds: int = 3
+) -> Sections:
+    """Sections of several inputs, fitted in turn.
+
+    Args:
+        records: The data.
+        start: For each input its sections to begin with.
+        n_zeros: For each input.
+        rounds: How often all inputs are gone through; a single input needs one.
+
+    Returns:
+        For each input its sections.
+    """
+    domain = records[0].domain
+    current = list(start)
+    for _ in range(rounds if len(current) > 1 else 1):
+        for j, zeros in enumerate(n_zeros):
+            alone = [_left_for(record, j, tuple(current), n_zeros) for record in records]
+            poles = np.concatenate([np.roots(d if domain is Domain.DISCRETE else d[::-1]) for d in current[j]])
+            current[j] = sections_of(refined_poles(alone, poles.astype(np.complex128), zeros), domain)
+    return tuple(current)
+
+
+def _left_for(record: TimeRecord, j: int, sections: Sections, n_zeros: tuple[int, ...]) -> TimeRecord:
+    """What the other inputs, with their poles as they are, leave of the output for one."""
+    ladders = tuple(rungs(part, zeros, record.domain) for part, zeros in zip(sections, n_zeros, strict=True))
+    ends = np.cumsum([zeros + 1 for zeros in n_zeros])
+    columns = record.columns(ladders)[:, : ends[-1]]
+    table = np.column_stack([columns, np.ones(len(columns))]) * record.root_weights[:, np.newaxis]
+    weights = linalg.lstsq(table, record.target * record.root_weights, cond=1e-12)[0][:-1]
+    weights[ends[j] - n_zeros[j] - 1 : ends[j]] = 0.0
+    alone = _with_target(record, record.target - columns @ weights)
+    return TimeRecord(
+        inputs=alone.inputs[:, j : j + 1],
+        past=alone.past[j : j + 1],
+        target=alone.target,
+        root_weights=alone.root_weights,
+        domain=alone.domain,
+        sample_time=alone.sample_time,
+        free_start=False,
+    )

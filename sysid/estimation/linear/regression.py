@@ -1,0 +1,162 @@
+"""Linear regression over several experiments, none of them concatenated: rows, solution, covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.errors import TraceError
+from sysid.estimation.networks.provider import Experiment
+from sysid.estimation.operating_point import OperatingPoint
+from sysid.models import Lags
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solution:
+    """A least-squares solution.
+
+    Args:
+        coefficients: Shape ``(n_columns,)``; zero in directions that the data do not determine.
+        unscaled_covariance: Inverse of the normal matrix, shape ``(n_columns, n_columns)``; NaN where it is singular.
+        rank: Number of coefficients that the data determine.
+    """
+
+    coefficients: NDArray[np.float64]
+    unscaled_covariance: NDArray[np.float64]
+    rank: int
+
+
+def regressor_matrix(experiment: Experiment, lags: Lags) -> NDArray[np.float64]:
+    """Lagged inputs and lagged measured outputs of one experiment, history included.
+
+    Args:
+        experiment: The record.
+        lags: The regressors.
+
+    Returns:
+        Shape ``(n_samples, n_regressors)``, in the channels' units.
+    """
+    past_inputs, past_output = experiment.history.padded(lags.depth)
+    u = np.concatenate([past_inputs, experiment.inputs])
+    y = np.concatenate([past_output, experiment.output])
+    return lagged(u, y, lags, len(experiment.output))
+
+
+def lagged(u: NDArray[np.float64], y: NDArray[np.float64], lags: Lags, n: int) -> NDArray[np.float64]:
+    """Columns of lagged signals that carry their history.
+
+    Args:
+        u: Inputs with history, shape ``(depth + n, n_inputs)``; ``depth`` is at least that of the lags.
+        y: Output with history, shape ``(depth + n,)``.
+        lags: The regressors.
+        n: Rows wanted.
+
+    Returns:
+        Shape ``(n, n_regressors)``.
+    """
+    depth = len(y) - n
+    columns = [u[depth - lag : depth - lag + n, i] for i, lags_i in enumerate(lags.inputs) for lag in lags_i]
+    columns += [y[depth - lag : depth - lag + n] for lag in lags.output]
+    return np.column_stack(columns) if columns else np.empty((n, 0))
+
+
+def deviation(experiment: Experiment, point: OperatingPoint) -> Experiment:
+    """The same experiment counted from an operating point.
+
+    Args:
+        experiment: The record.
+        point: What to subtract.
+
+    Returns:
+        The record of deviations.
+    """
+    history = type(experiment.history)(
+        inputs=experiment.history.inputs - np.array(point.inputs), output=experiment.history.output - point.output
+    )
+    return Experiment(
+        inputs=experiment.inputs - np.array(point.inputs),
+        output=experiment.output - point.output,
+        history=history,
+        weights=experiment.weights,
+    )
+
+
+def root_weights(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
+    """Square roots of all samples' weights, one experiment after the other.
+
+    Args:
+        experiments: The records.
+
+    Returns:
+        Shape ``(n_samples_of_all,)``.
+    """
+    return np.concatenate([np.ones(len(e.output)) if e.weights is None else np.sqrt(e.weights) for e in experiments])
+
+
+def stack(
+    experiments: Sequence[Experiment], lags: Lags, *, intercept: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weighted regressors and targets of several experiments; no row crosses from one into the next.
+
+    Args:
+        experiments: The records.
+        lags: The regressors.
+        intercept: Add a column of ones after them.
+
+    Returns:
+        Matrix of shape ``(n_samples_of_all, n_columns)`` and target of shape ``(n_samples_of_all,)``.
+    """
+    X = np.concatenate([regressor_matrix(experiment, lags) for experiment in experiments])
+    y = np.concatenate([experiment.output for experiment in experiments])
+    if intercept:
+        X = np.column_stack([X, np.ones(len(X))])
+    root = root_weights(experiments)
+    return X * root[:, None], y * root
+
+
+def solve(X: NDArray[np.float64], y: NDArray[np.float64], *, ridge: float = 0.0) -> Solution:
+    r"""Least squares by QR with column pivoting on columns of unit length.
+
+    Args:
+        X: Shape ``(n_rows, n_columns)``.
+        y: Shape ``(n_rows,)``.
+        ridge: Weight :math:`\rho` of the penalty :math:`\rho\sum_i \|x_i\|^2\theta_i^2`, which does not depend on
+            the units of the columns; 0 for none.
+
+    Returns:
+        The solution.
+
+    Raises:
+        TraceError: If there are fewer rows than columns and no penalty.
+    """
+    if len(X) < X.shape[1] and ridge == 0.0:
+        raise TraceError(
+            "fewer samples than parameters",
+            expected=f"at least {X.shape[1]} samples that count",
+            got=len(X),
+            remedy="lower the orders, or use longer traces",
+        )
+    n = X.shape[1]
+    norms = np.linalg.norm(X, axis=0)
+    scale = np.where(norms > 0.0, norms, 1.0)
+    A = X / scale
+    if ridge > 0.0:
+        A, y = np.concatenate([A, np.sqrt(ridge) * np.eye(n)]), np.concatenate([y, np.zeros(n)])
+    Q, R, order = linalg.qr(A, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(R))
+    rank = int(np.count_nonzero(diagonal > len(X) * np.finfo(np.float64).eps * diagonal[0])) if n else 0
+    coefficients, covariance = np.zeros(n), np.full((n, n), np.nan)
+    kept = order[:rank]
+    coefficients[kept] = linalg.solve_triangular(R[:rank, :rank], Q.T[:rank] @ y)
+    inverse = linalg.solve_triangular(R[:rank, :rank], np.eye(rank))
+    spread = inverse @ inverse.T
+    if ridge > 0.0:  # white noise through a shrinking estimator
+        spread = spread @ (np.eye(rank) - ridge * spread)
+    covariance[np.ix_(kept, kept)] = spread
+    return Solution(
+        coefficients=coefficients / scale, unscaled_covariance=covariance / np.outer(scale, scale), rank=rank
+    )

@@ -1,0 +1,96 @@
+r"""Sanathanan-Koerner iterations: poles from frequency responses or spectra by a sequence of linear problems.
+
+Each iteration solves :math:`\min \sum_k w_k^2 |(D\,y - \sum_j N_j u_j) / D_{m-1}|^2` (Sanathanan and Koerner 1963),
+with :math:`D/D_{m-1} = 1 + \sum_k d_k x_k` and :math:`N_j/D_{m-1}` in the orthonormal ladder of the poles found before
+(Drmač, Gugercin and Beattie 2015, "Vector fitting for matrix-valued rational approximation"): the monomials of a
+denominator of degree 20 would be numerically dependent. The new poles are the zeros of :math:`1 + d^T x`, eigenvalues
+of :math:`A - B d^T`.
+
+Limits: all inputs share the poles; converges to a good start rather than to a minimum.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.estimation.linear.poles import sections_of, stabilised
+from sysid.models.orthonormal_basis import Domain, responses, rungs
+from sysid.models.realisation import realise
+
+MAX_ITERATIONS = 20
+"""As in the estimators of the field (MATLAB's ``tfest``)."""
+
+
+def sk_poles(
+    inputs: NDArray[np.complex128],
+    output: NDArray[np.complex128],
+    variable: NDArray[np.complex128],
+    start: NDArray[np.complex128],
+    n_zeros: tuple[int, ...],
+    *,
+    domain: Domain,
+    weights: NDArray[np.float64] | None = None,
+    iterations: int = MAX_ITERATIONS,
+) -> NDArray[np.complex128]:
+    """Common poles of all inputs.
+
+    Args:
+        inputs: Input spectra with their dead times, shape ``(n_points, n_inputs)``; ones for a frequency response.
+        output: Output spectrum, shape ``(n_points,)``.
+        variable: ``1/z`` or ``s`` at each point, shape ``(n_points,)``.
+        start: Poles to begin with, as many as are wanted.
+        n_zeros: Degree of the numerator of each input, below the number of poles.
+        domain: Of the poles.
+        weights: Of each point's error, shape ``(n_points,)``; all ones by default.
+        iterations: How many at most.
+
+    Returns:
+        Stable poles, the same number.
+    """
+    w = np.ones(len(output)) if weights is None else weights
+    poles = start
+    for _ in range(iterations):
+        sections = sections_of(stabilised(poles, domain), domain)
+        ladder = rungs(sections, len(start) - 1, domain)
+        states = state_responses(sections, variable, domain)
+        blocks = [-states * output[:, np.newaxis]]
+        for j, zeros in enumerate(n_zeros):
+            blocks.append(responses(rungs(sections, zeros, domain), variable) * inputs[:, j : j + 1])
+        table = np.concatenate(blocks, axis=1) * w[:, np.newaxis]
+        target = output * w
+        table, target = (np.concatenate([part.real, part.imag]) for part in (table, target))
+        scale = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
+        solution = linalg.lstsq(table / scale, target, cond=1e-12)[0] / scale
+        system = realise(ladder, domain)
+        following = linalg.eigvals(system.A - np.outer(system.B, solution[: len(start)]))
+        moved = np.abs(np.sort_complex(following) - np.sort_complex(poles)).max()
+        poles = following
+        if moved < 1e-8 * max(float(np.abs(poles).max()), 1e-300):
+            break
+    return stabilised(np.asarray(poles, dtype=np.complex128), domain)
+
+
+def state_responses(
+    sections: tuple[NDArray[np.float64], ...], variable: NDArray[np.complex128], domain: Domain
+) -> NDArray[np.complex128]:
+    """The state of a ladder as functions of frequency: all strictly proper functions with its poles.
+
+    Args:
+        sections: Denominators.
+        variable: ``1/z`` or ``s``, shape ``(n_points,)``.
+        domain: Of the poles.
+
+    Returns:
+        Shape ``(n_points, n_poles)``.
+    """
+    system = realise(rungs(sections, sum(len(d) - 1 for d in sections) - 1, domain), domain)
+    n = len(system.A)
+    if domain is Domain.DISCRETE:
+        matrices = np.eye(n) - variable[:, np.newaxis, np.newaxis] * system.A
+        drive = variable[:, np.newaxis] * system.B
+    else:
+        matrices = variable[:, np.newaxis, np.newaxis] * np.eye(n) - system.A
+        drive = np.broadcast_to(system.B.astype(np.complex128), (len(variable), n))
+    return np.asarray(np.linalg.solve(matrices, drive[:, :, np.newaxis])[:, :, 0])

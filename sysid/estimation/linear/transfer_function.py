@@ -1,0 +1,172 @@
+"""Transfer functions by least squares on the simulation error, from several starts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from sysid.errors import TraceError
+from sysid.estimation.least_squares.levenberg_marquardt import Iteration
+from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, pole_starts
+from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.transfer_function_search import AbstractProblem, Terms, TransferFunctionTraining
+from sysid.estimation.linear.variable_projection import SeparableProvider
+from sysid.estimation.networks.provider import Experiment, experiments_of
+from sysid.estimation.result import FitResult
+from sysid.models import AbstractModel, Mapping, Scaling, Start, TransferFunction
+from sysid.traces import Trace
+
+
+def _ignore(_: Iteration) -> None:
+    """The callback of those who do not watch."""
+
+
+def fit_transfer_function(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    orders: TransferFunction,
+    training: TransferFunctionTraining | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    selection: Sequence[Trace] = (),
+    on_iteration: Callable[[Iteration], None] = _ignore,
+) -> FitResult:
+    """Fit a transfer function to the free run.
+
+    The state before each trace is the equilibrium at its first inputs for a start at rest, or with the first sample
+    held; for a measured start it is fitted beside the parameters, and the measured samples count.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which comes out.
+        orders: The structure; dead times that it leaves open are searched.
+        training: How to fit.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        selection: Traces that choose among starts and how far to refine them, by the free run; without them the
+            estimation loss chooses, which favours what has been refined the longest.
+        on_iteration: Called after every iteration of the final run.
+
+    Returns:
+        The fit, the spread over starts among its notes, and the uncertainty of numerators and denominators.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If the orders do not fit the inputs, or there are fewer samples than parameters.
+        FitDivergedError: If no start gives a finite free run.
+    """
+    began = time.perf_counter()
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    experiments = experiments_of(traces, mapping, start or Start(), rest)
+    _check(orders, mapping, experiments)
+    problem = _Problem(
+        experiments=experiments,
+        scaling=Scaling.to_unit_range([e.inputs for e in experiments], [e.output for e in experiments]),
+        orders=orders,
+        training=training or TransferFunctionTraining(),
+        terms=Terms(
+            mapping=mapping,
+            sample_time=traces[0].sample_time,
+            input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
+            output_unit=traces[0].channel(mapping.output).unit,
+            rest_output=rest,
+        ),
+    )
+    chosen_on = experiments_of(selection, mapping, start or Start(), rest)
+    # BLAS threads that wake for matrices of some ten columns cost more than they give: beside one other process on two
+    # cores a fit took four times as long with them.
+    with threadpool_limits(1, "blas"):
+        return problem.solve(began, on_iteration, (lambda model: _mean_mse(model, chosen_on)) if selection else None)
+
+
+def _mean_mse(model: AbstractModel, experiments: Sequence[Experiment]) -> float:
+    """Mean over records of the free run's mean squared error; infinite where a free run is not finite."""
+    errors = []
+    for experiment in experiments:
+        error = model.simulate(experiment.inputs, experiment.history) - experiment.output
+        weights = np.ones(len(error)) if experiment.weights is None else experiment.weights
+        errors.append(float(np.sum(weights * error**2) / experiment.n_counted))
+    return float(np.mean(errors)) if np.isfinite(errors).all() else np.inf
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Problem(AbstractProblem):
+    """Records over time."""
+
+    experiments: tuple[Experiment, ...]
+    scaling: Scaling
+    orders: TransferFunction
+    training: TransferFunctionTraining
+    terms: Terms
+
+    def provider(self, delays: tuple[int, ...]) -> SeparableProvider:
+        """The least-squares problem with these dead times; see the base class."""
+        return SeparableProvider(
+            poles=self.pole_parameters(max(len(e.output) for e in self.experiments)),
+            n_zeros=self.orders.zeros,
+            records=tuple(self._record(experiment, delays) for experiment in self.experiments),
+            constant=self.orders.intercept,
+        )
+
+    def starts(self, provider: SeparableProvider, *, few: bool) -> list[PoleStart]:
+        """From ARX models and instrumental variables, and scattered ones; see the base class."""
+        records = [record for record in provider.records if isinstance(record, TimeRecord)]
+        if few:
+            return arx_starts(records, self.orders.poles, self.orders.zeros)
+        return pole_starts(
+            records,
+            self.orders.poles,
+            self.orders.zeros,
+            n_scattered=self.training.scattered_starts,
+            seed=self.training.seed,
+        )
+
+    def _record(self, experiment: Experiment, delays: tuple[int, ...]) -> TimeRecord:
+        """A record with its history put before it where that is longer than one sample at rest."""
+        measured = len(experiment.history.output) > 1
+        inputs, output = experiment.inputs, experiment.output
+        weights = np.ones(len(output)) if experiment.weights is None else experiment.weights
+        past = experiment.history.inputs[0]
+        if measured:
+            inputs = np.concatenate([experiment.history.inputs, inputs])
+            output = np.concatenate([experiment.history.output, output])
+            weights = np.concatenate([np.ones(len(experiment.history.output)), weights])
+        scaled, held = self.scaling.scale_inputs(inputs), self.scaling.scale_inputs(past[np.newaxis])[0]
+        columns = [
+            np.concatenate([np.full(min(k, len(scaled)), held[j]), scaled[: max(len(scaled) - k, 0), j]])
+            for j, k in enumerate(delays)
+        ]
+        return TimeRecord(
+            inputs=np.asfortranarray(np.column_stack(columns)),
+            past=held,
+            target=self.scaling.scale_output(output),
+            root_weights=np.sqrt(weights),
+            domain=self.orders.domain,
+            sample_time=self.terms.sample_time,
+            free_start=measured,
+        )
+
+
+def _check(orders: TransferFunction, mapping: Mapping, experiments: Sequence[Experiment]) -> None:
+    if len(orders.poles) != len(mapping.inputs):
+        raise TraceError(
+            "the orders do not match the inputs",
+            expected=f"{len(mapping.inputs)} numbers of poles and zeros for {mapping}",
+            got=f"{len(orders.poles)} numbers",
+            remedy="give one number of poles and of zeros for each input",
+        )
+    needed = sum(orders.poles) + sum(orders.zeros) + len(orders.zeros) + orders.intercept
+    counted = sum(experiment.n_counted for experiment in experiments)
+    if counted < needed:
+        raise TraceError(
+            "fewer samples than parameters",
+            expected=f"at least {needed} samples that count",
+            got=counted,
+            remedy="lower the orders, or use longer traces",
+        )

@@ -1,0 +1,98 @@
+"""How well data determine the numerators and denominators of a transfer function."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.estimation.linear.uncertainty import Uncertainty
+from sysid.estimation.linear.variable_projection import SeparableProvider, Separated
+from sysid.models import TransferFunctionModel
+from sysid.models import orthonormal_basis as ladders
+from sysid.models.orthonormal_basis import Domain
+
+
+def transfer_function_uncertainty(
+    model: TransferFunctionModel, provider: SeparableProvider, solution: Separated
+) -> Uncertainty:
+    """What white simulation errors say about numerators, denominators and the constant, in the channels' units.
+
+    Args:
+        model: The fitted model.
+        provider: The least-squares problem.
+        solution: Its linear part at the minimum.
+
+    Returns:
+        The uncertainty: ``B(input, power)``, ``F(input, power)``, ``constant``.
+    """
+    linear = provider.design(solution.columns)
+    J = np.concatenate([linear, provider.tangents(solution)], axis=1)
+    variance = float(solution.residual @ solution.residual) / max(provider.n_samples - J.shape[1], 1)
+    scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(np.float64).tiny)
+    R = linalg.qr(J / scale, mode="r")[0][: J.shape[1]]
+    _, sizes, Vt = linalg.svd(R)
+    kept = sizes > 1e-13 * sizes[0]
+    root = (Vt[kept].T / sizes[kept]) / scale[:, np.newaxis]
+    names, values, rows = _polynomials(model, J.shape[1])
+    spread = rows @ root
+    unit = model.scaling.output_scale**2
+    covariance = variance * (spread @ spread.T)
+    lost = np.abs(rows @ (Vt[~kept].T / scale[:, np.newaxis])).max(axis=1, initial=0.0)
+    unknown = lost > 1e-6 * np.linalg.norm(rows / scale, axis=1)
+    covariance[unknown] = covariance[:, unknown] = np.nan
+    return Uncertainty(names=names, values=values, covariance=covariance, noise_variance=variance * unit)
+
+
+def _polynomials(
+    model: TransferFunctionModel, width: int
+) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
+    """Names, values and derivatives of all polynomial coefficients with respect to taps and sections."""
+    names: list[str] = []
+    values: list[float] = []
+    rows: list[NDArray[np.float64]] = []
+    tap, coefficient = 0, width - sum(model.orders.poles)
+    for j, name in enumerate(model.mapping.inputs):
+        ladder = model.ladder(j)
+        gain = model.scaling.output_scale / model.scaling.input_scale[j]
+        numerators = gain * ladders.numerators(ladder)[:, : model.orders.zeros[j] + 1]
+        for power, value in enumerate(model.numerator(j)):
+            row = np.zeros(width)
+            row[tap : tap + len(numerators)] = numerators[:, power]
+            names.append(f"B({name}, {power})")
+            values.append(float(value))
+            rows.append(row)
+        tap += len(numerators)
+        slopes = _denominator_slopes(model.sections[j], model.orders.domain)
+        kept = range(1, len(slopes[0])) if model.orders.domain is Domain.DISCRETE else range(len(slopes[0]) - 1)
+        for power in kept:
+            row = np.zeros(width)
+            row[coefficient : coefficient + len(slopes)] = slopes[:, power]
+            names.append(f"F({name}, {power})")
+            values.append(float(model.denominator(j)[power]))
+            rows.append(row)
+        coefficient += len(slopes)
+    if model.orders.intercept:
+        row = np.zeros(width)
+        row[tap] = model.scaling.output_scale
+        names.append("constant")
+        values.append(model.scaling.output_offset + model.scaling.output_scale * model.constant)
+        rows.append(row)
+    return tuple(names), np.array(values), np.array(rows)
+
+
+def _denominator_slopes(sections: tuple[NDArray[np.float64], ...], domain: Domain) -> NDArray[np.float64]:
+    """Derivatives of the product of all sections with respect to each section's coefficients."""
+    n = sum(len(d) - 1 for d in sections)
+    rows = []
+    for i, d in enumerate(sections):
+        others = np.ones(1)
+        for k, other in enumerate(sections):
+            others = np.convolve(others, other) if k != i else others
+        order = len(d) - 1
+        powers = range(1, order + 1) if domain is Domain.DISCRETE else range(order - 1, -1, -1)
+        for power in powers:
+            row = np.zeros(n + 1)
+            row[power : power + len(others)] = others
+            rows.append(row)
+    return np.array(rows)

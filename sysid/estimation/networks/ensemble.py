@@ -1,0 +1,328 @@
+r"""Several networks of one structure, united into one: what their errors do not share cancels.
+
+Networks that began at different starts, and the same start earlier and later, are wrong in different ways where the
+record did not show them what to do. The mean of their one-step maps
+
+.. math:: \bar f(x) = \sum_m \tfrac{n_m}{n} f_m(x), \qquad n = \sum_m n_m,
+
+with :math:`n_m` votes of member :math:`m`, is itself a network: the members' neurons side by side, readouts and gates
+multiplied by their share of the votes, constants and linear parts averaged. In free run, with the members' errors one
+step ahead :math:`\delta_m(x)` and the sensitivity :math:`a = \partial f / \partial y` that they nearly share,
+
+.. math:: e(t) = a\,e(t-1) + \sum_m \tfrac{n_m}{n}\,\delta_m(x_t) :
+
+to first order its error is the mean of theirs, and where those are independent its square falls with the number of
+members (Perrone and Cooper 1993, "When networks disagree", for networks without feedback). One network comes out, which
+is exported, checked and timed like any other.
+
+Who sits in it is found by forward selection with replacement (Caruana et al. 2004, "Ensemble selection from libraries
+of models", section 2.1) from the best candidates of the race: the vote that lowers the error of the united free run on
+the selection traces most is cast next, until none lowers it by :data:`WORTH`. A network that sticks or runs away on
+some inputs takes the mean with it, though: the united network has to pass the check of its free run, where there is
+one, and where it does not, votes are cast once more and it has to after every vote.
+
+Limits: the price of a free run grows with the members; all must agree on what a regressor means, so that hidden states,
+which have no common coordinates, cannot be united; the selection traces choose more often than between single starts,
+so that their score is the less a figure of accuracy; the united network does not stand at a minimum of its own loss, so
+that the posterior there is wider than that of a single fit.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from sysid.errors import ConfigError
+from sysid.estimation.least_squares.evidence import update
+from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Solution
+from sysid.estimation.networks import multistart as starts
+from sysid.estimation.networks.initialise import Layout
+from sysid.estimation.networks.provider import AbstractProvider
+from sysid.estimation.networks.training import FitProgress, Training
+from sysid.models import NARXModel
+from sysid.traces import Trace
+
+ELIGIBLE = 40
+"""Candidates that may be voted for, best on the selection traces first."""
+
+WORTH = 0.01
+"""Least share by which a vote has to lower the error: neurons that bring less are not worth their run time."""
+
+EVIDENCE_ROUNDS = 5
+"""Steps of the evidence's fixed-point iteration at the united parameters, which do not move meanwhile."""
+
+
+def check(training: Training, selection: Sequence[Trace]) -> None:
+    """Refuse a committee that nobody could elect.
+
+    Args:
+        training: How to train.
+        selection: Traces that choose.
+
+    Raises:
+        ConfigError: If a committee is asked for and no traces choose.
+    """
+    if training.committee > 1 and (training.choose_by != "selection" or not selection):
+        raise ConfigError(
+            "nobody can elect a committee",
+            where="committee",
+            expected="selection traces, and choose_by: selection",
+            got=f"{len(selection)} selection traces, choose_by: {training.choose_by}",
+            remedy="give traces that train nothing, or leave committee out",
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Committee:
+    """Who was elected.
+
+    Args:
+        votes: For each member its place among the candidates and its votes, in the order of their first vote.
+        model: The united network.
+        score: Its error on the selection traces.
+    """
+
+    votes: dict[int, int]
+    model: NARXModel
+    score: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Task:
+    """What is minimised, for the network that the committee makes.
+
+    Args:
+        provider: Residuals in the basis of training.
+        layout: Where the parameters stand.
+        to_plain: From parameters in the basis to plain ones, shape ``(n_parameters, n_parameters)``.
+    """
+
+    provider: AbstractProvider
+    layout: Layout
+    to_plain: NDArray[np.float64]
+
+
+def elected(
+    race: starts.Race,
+    candidates: Sequence[starts.Candidate],
+    vet: Callable[[starts.Network], bool] | None = None,
+) -> tuple[Committee, list[starts.Candidate]] | None:
+    """The committee of the candidates of a race.
+
+    Args:
+        race: The race; its training says how many votes there are.
+        candidates: Every start at every look.
+        vet: Whether a model's free run is stable; a committee must be.
+
+    Returns:
+        The committee and those whom its votes count; ``None`` where no second vote helps.
+    """
+    usable = [c for c in candidates if c.solution.status.usable and isinstance(c.model, NARXModel)]
+    models = [c.model for c in usable if isinstance(c.model, NARXModel)]
+    if not usable:
+        return None
+    training = race.training
+    scale = race.template.scaling.output_scale**2
+
+    def report(vote: int) -> None:
+        race.on_progress(
+            FitProgress(
+                stage=f"vote {vote} of {training.committee}",
+                start=training.starts,
+                starts=training.starts,
+                iteration=training.max_iterations,
+                max_iterations=training.max_iterations,
+                mse=2.0 * min(c.loss for c in usable) / race.provider.n_samples * scale,
+                elapsed_s=0.0,
+                fraction=1.0,
+            )
+        )
+
+    found = elect(
+        models,
+        [c.score for c in usable],
+        lambda model: starts.score(race, model),
+        votes=training.committee,
+        origins=[c.number for c in usable],
+        accept=vet or (lambda _: True),
+        workers=training.workers,
+        on_vote=report,
+    )
+    return (found, usable) if found and sum(found.votes.values()) > 1 else None
+
+
+def seated(
+    race: starts.Race, committee: Committee, members: Sequence[starts.Candidate], task: Task
+) -> starts.Candidate:
+    """The committee as one more candidate of its race.
+
+    Its learning curve is that of its first member, with the united network as the last point; precisions and evidence
+    are those at the united parameters, where no step is taken.
+
+    Args:
+        race: The race.
+        committee: Whom the votes elected.
+        members: The candidates that the votes count.
+        task: What is minimised, for the united network.
+
+    Returns:
+        The candidate.
+    """
+    theta, centre = (
+        np.asarray(np.linalg.solve(task.to_plain, plain), dtype=np.float64)
+        for plain in (committee.model.theta, task.layout.centre())
+    )
+    prior, evidence = starts.first_prior(race.training, task.layout, task.provider, theta, centre), None
+    with threadpool_limits(1, "blas"):
+        at = task.provider.linearise(theta)
+        for _ in range(EVIDENCE_ROUNDS if race.training.regularisation is None else 0):
+            prior, evidence = update(prior, theta, at, task.provider.n_samples)
+    lead = members[next(iter(committee.votes))].solution
+    last = lead.curve[-1]
+    entry = Iteration(
+        iteration=last.iteration,
+        mse=2.0 * at.loss / task.provider.n_samples,
+        damping=last.damping,
+        effective_parameters=evidence.total_effective_parameters if evidence else float("nan"),
+        elapsed_s=last.elapsed_s,
+    )
+    state = replace(lead.state, theta=theta, at=at, prior=prior, evidence=evidence, curve=(*lead.curve, entry))
+    return starts.Candidate(
+        number=race.training.starts,
+        seed=None,
+        solution=Solution(state=state, status=lead.status),
+        model=committee.model,
+        score=committee.score,
+        members=tuple(members[i].number for i, votes in committee.votes.items() for _ in range(votes)),
+    )
+
+
+def elect(
+    models: Sequence[NARXModel],
+    scores: Sequence[float],
+    score: Callable[[NARXModel], float],
+    *,
+    votes: int,
+    origins: Sequence[int] | None = None,
+    accept: Callable[[NARXModel], bool] = lambda _: True,
+    workers: int = 1,
+    on_vote: Callable[[int], None] = lambda _: None,
+) -> Committee | None:
+    """Cast the votes one after the other, each for the member that helps most.
+
+    A check of a free run costs as much as a vote. The one that matters is that of the network that comes out: votes are
+    first cast unchecked, and only where that network fails they are cast once more, with a check after every one.
+
+    Args:
+        models: The candidates, all of one structure and scaling.
+        scores: Error of each on the selection traces; one that is not finite is not eligible.
+        score: The error of a model on them.
+        votes: At most so many.
+        origins: The start that each candidate comes from; by default each is its own.
+        accept: Whether a united network may stand; where votes are cast once more, whoever would make it one that may
+            not is passed over from then on, and with him all that come from the same start.
+        workers: Models that are run at the same time.
+        on_vote: Called with the number of each vote that is about to be cast.
+
+    Returns:
+        The committee, of one member where no second vote helps; ``None`` where not even one may stand.
+    """
+    ballot = partial(
+        _cast,
+        models,
+        scores,
+        score,
+        votes=votes,
+        origins=origins or range(len(models)),
+        workers=workers,
+        on_vote=on_vote,
+    )
+    unchecked = ballot(accept=lambda _: True)
+    return unchecked if unchecked is None or accept(unchecked.model) else ballot(accept=accept)
+
+
+def _cast(
+    models: Sequence[NARXModel],
+    scores: Sequence[float],
+    score: Callable[[NARXModel], float],
+    *,
+    votes: int,
+    origins: Sequence[int],
+    accept: Callable[[NARXModel], bool],
+    workers: int,
+    on_vote: Callable[[int], None],
+) -> Committee | None:
+    """The votes cast, each checked; see :func:`elect`."""
+    order = sorted((i for i, value in enumerate(scores) if np.isfinite(value)), key=lambda i: scores[i])
+    eligible, found, committee = order[:ELIGIBLE], dict(enumerate(scores)), None
+    with ThreadPoolExecutor(workers) as pool:
+        for vote in range(1, votes + 1):
+            on_vote(vote)
+            elected = Counter(committee.votes) if committee else Counter[int]()
+            networks = {i: _of(models, elected + Counter([i])) for i in eligible}
+            if committee:
+                found = dict(zip(eligible, pool.map(score, networks.values()), strict=True))
+            bar = (1.0 - WORTH) * committee.score if committee else np.inf
+            better = sorted((i for i in eligible if found[i] < bar), key=found.__getitem__)
+            cast, barred = _first_accepted(better, origins, networks, accept)
+            if cast is None:
+                break
+            # the very network that was accepted: a check that knows it need not run again
+            tally = dict(elected + Counter([cast]))
+            committee = Committee(votes=tally, model=networks[cast], score=found[cast])
+            eligible = [i for i in eligible if origins[i] not in barred]
+    return committee
+
+
+def _first_accepted(
+    ranked: Sequence[int],
+    origins: Sequence[int],
+    networks: Mapping[int, NARXModel],
+    accept: Callable[[NARXModel], bool],
+) -> tuple[int | None, set[int]]:
+    """Who is voted for, and the starts that are passed over from now on."""
+    barred: set[int] = set()
+    for i in ranked:
+        if origins[i] in barred:
+            continue
+        if accept(networks[i]):
+            return i, barred
+        barred.add(origins[i])
+    return None, barred
+
+
+def _of(models: Sequence[NARXModel], votes: Counter[int]) -> NARXModel:
+    return united([models[i] for i in votes], list(votes.values()))
+
+
+def united(members: Sequence[NARXModel], votes: Sequence[int]) -> NARXModel:
+    """The network whose one-step map is the mean of the members'.
+
+    Args:
+        members: Of one structure, mapping and scaling.
+        votes: Of each.
+
+    Returns:
+        The network, with the neurons of all; a single member comes back as it is.
+    """
+    first = members[0]
+    if len(members) == 1:
+        return first
+    layout = Layout.of(first.network, len(first.mapping.inputs))
+    hidden = layout.neurons * layout.lags.n_regressors
+    shares = np.array(votes) / sum(votes)
+    thetas = [member.theta for member in members]
+    parts = [theta[:hidden] for theta in thetas]
+    parts += [theta[hidden : layout.hidden.stop] for theta in thetas]
+    parts += [share * theta[layout.readout] for share, theta in zip(shares, thetas, strict=True)]
+    parts += [shares @ np.array([theta[layout.affine] for theta in thetas])]
+    parts += [share * theta[layout.gates] for share, theta in zip(shares, thetas, strict=True)]
+    network = replace(first.network, neurons=len(members) * layout.neurons)
+    return replace(first, network=network, theta=np.concatenate(parts))

@@ -1,0 +1,328 @@
+"""Training of whole cascades: how, from where, and which of the states on the way is kept."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.estimation.least_squares.basis import RebasedProvider
+from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.estimation.networks.member_layout import JointLayout
+from sysid.estimation.networks.multistart import INITIAL_ALPHA
+from sysid.estimation.networks.training import FitProgress
+from sysid.estimation.result import Evidence, Status
+from sysid.models import Cascade, cascade_from_dict
+from sysid.traces import Trace
+
+NEGLIGIBLE = 1e-6
+"""Squared residual below which a target counts as met: that of a thousandth of the error that counts as one. Without it
+a target that is exactly right on a trace, such as a channel held at its bound, would outweigh all others."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTraining:
+    """How the members of a cascade are trained together, in free run of the whole.
+
+    Args:
+        max_iterations: Levenberg-Marquardt iterations of a start that is never dropped.
+        max_time_s: Wall time of the whole fit in seconds. A fit that it ends cannot be repeated exactly.
+        tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
+        patience: Iterations over which improvement is judged.
+        looks: How often the selection traces are looked at on the way; the best state seen is kept.
+        starts: Random starts, for networks that are fitted from nothing; half of them are dropped at each look.
+        seed: Seed of the first start; the others count up from it.
+        stride: Every so-manieth sample counts in the loss.
+        moves: A sample counts as well where a target has moved by more than so many of its errors since the last that
+            counted, and so does the one before it: what comes with a jump is not missed (``counted_rows.py``).
+        leverage: How many times as long as their median, at the start, a row of the Jacobian may be before it counts
+            less: where sensitivities explode, the few rows that do would forbid every step (``leverage.py``).
+        soft_margin: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
+            its logarithm, so that a few traces on which the free run is lost do not rule the loss (``soft_margin.py``).
+        workers: Records that are worked on at the same time.
+        basis: ``levels and rates`` or ``plain``, as for a network alone.
+        evidence_after: Iterations before the evidence first moves the precisions of the priors.
+    """
+
+    max_iterations: int = 100
+    max_time_s: float = float("inf")
+    tolerance: float = 1e-3
+    patience: int = 20
+    looks: int = 10
+    starts: int = 1
+    seed: int = 0
+    stride: int = 1
+    moves: float = float("inf")
+    leverage: float = float("inf")
+    soft_margin: float = float("inf")
+    workers: int = 2
+    basis: str = "levels and rates"
+    evidence_after: int = 20
+
+    def __post_init__(self) -> None:
+        for name in ("max_iterations", "patience", "looks", "starts", "stride", "workers"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
+        for name in ("moves", "leverage", "soft_margin"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
+        if self.basis not in {"levels and rates", "plain"}:
+            raise ConfigError(
+                "unknown value of basis",
+                where="basis",
+                expected="levels and rates or plain",
+                got=repr(self.basis),
+                remedy="write for example basis: levels and rates",
+            )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CascadeFit:
+    """A trained cascade and how it came about; what a ``FitResult`` is for one model.
+
+    Args:
+        model: The cascade with the best parameters.
+        status: How the fit ended.
+        errors: For each target output the error in its unit that counted as one.
+        history: Learning curve: columns of equal length, among them ``iteration`` and ``loss`` (mean squared residual
+            over targets, in those errors).
+        train_time_s: Wall time in seconds.
+        seed: Seed of its random start; ``None`` where the fit began with the members as they were.
+        evidence: From Bayesian regularisation.
+        notes: Sentences worth knowing: which state was chosen among which, and by what.
+    """
+
+    model: Cascade
+    status: Status
+    errors: dict[str, float]
+    history: dict[str, NDArray[np.float64]]
+    train_time_s: float
+    seed: int | None = None
+    evidence: Evidence | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as JSON values."""
+        return {
+            "model": self.model.to_dict(),
+            "status": self.status.name,
+            "errors": dict(self.errors),
+            "history": {name: column.tolist() for name, column in self.history.items()},
+            "train_time_s": self.train_time_s,
+            "seed": self.seed,
+            "evidence": None
+            if self.evidence is None
+            else {name: getattr(self.evidence, name) for name in Evidence.__dataclass_fields__},
+            "notes": list(self.notes),
+        }
+
+    @classmethod
+    def from_dict(cls, fields: dict[str, Any]) -> CascadeFit:
+        """The result that :meth:`to_dict` wrote.
+
+        Args:
+            fields: What it wrote.
+
+        Returns:
+            The result.
+        """
+        return cls(
+            model=cascade_from_dict(fields["model"]),
+            status=Status[fields["status"]],
+            errors=dict(fields["errors"]),
+            history={name: np.asarray(column, dtype=np.float64) for name, column in fields["history"].items()},
+            train_time_s=fields["train_time_s"],
+            seed=fields["seed"],
+            evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
+            notes=tuple(fields["notes"]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Candidate:
+    """One start as it stood at a look; without a solution, as it was given."""
+
+    seed: int | None
+    model: Cascade
+    score: float
+    loss: float
+    solution: Solution | None = None
+
+    @property
+    def iteration(self) -> int:
+        return self.solution.state.iteration if self.solution else 0
+
+    @property
+    def origin(self) -> str:
+        return "the members as they were" if self.seed is None else f"seed {self.seed}"
+
+    @property
+    def sentence(self) -> str:
+        seconds = self.solution.curve[-1].elapsed_s if self.solution else 0.0
+        return (
+            f"from {self.origin} after {self.iteration} iterations ({seconds:.1f} s): mean squared residual "
+            f"{self.loss:.4g}, on the selection traces {self.score:.4g}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Joint:
+    """One fit of a cascade: what its starts have in common.
+
+    Args:
+        provider: Residuals and Jacobians, over plain parameters.
+        layout: Priors and basis.
+        training: How to train.
+        selection: Traces that choose among the states looked at, by the geometric mean over traces and targets of the
+            squared error; without them the least loss chooses.
+        on_progress: Called after every iteration.
+    """
+
+    provider: CascadeProvider
+    layout: JointLayout
+    training: JointTraining
+    selection: Sequence[Trace] = ()
+    on_progress: Callable[[FitProgress], None] = lambda _: None
+
+    def fit(self, starts: Sequence[tuple[int | None, NDArray[np.float64]]]) -> CascadeFit:
+        """Train from some starts, dropping half of them at each look.
+
+        Args:
+            starts: Seed, or ``None`` for the provider's own cascade, and parameters in the basis.
+
+        Returns:
+            The best state seen; a start that was given is one of them.
+        """
+        began, training = time.perf_counter(), self.training
+        seen = [self._candidate(None, theta, None) for seed, theta in starts if seed is None]
+        alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
+        interrupted = False
+        for look in range(1, training.looks + 1):
+            reached: list[tuple[int | None, Solution]] = []
+            for number, (seed, where) in enumerate(alive):
+                solution = self._advance(where, look, began, f"{number + 1}/{len(alive)}")
+                if not isinstance(where, Solution) or solution.state is not where.state:
+                    seen.append(self._candidate(seed, solution.theta, solution))
+                reached.append((seed, solution))
+                interrupted = solution.status is Status.INTERRUPTED
+                if interrupted:
+                    break
+            reached.sort(key=lambda entry: entry[1].at.loss)
+            alive = list(reached[: max(1, (len(reached) + 1) // 2)])
+            late = time.perf_counter() - began > training.max_time_s
+            if interrupted or late or not any(_unfinished(one) for _, one in reached):
+                break
+        return self._result(seen, interrupted=interrupted, seconds=time.perf_counter() - began)
+
+    def _advance(self, where: Solution | NDArray[np.float64], look: int, began: float, which: str) -> Solution:
+        provider = RebasedProvider(inner=self.provider, to_plain=self.layout.to_plain)
+        engine = self._engine(look, began, which)
+        if isinstance(where, Solution):
+            return engine.resume(provider, where.state) if _unfinished(where) else where
+        # As for a network alone: the noise is taken to be as large as the start's error.
+        beta = 0.5 * provider.n_samples / max(provider.loss(where), np.finfo(np.float64).tiny)
+        return engine.minimise(provider, where, self.layout.prior(alpha=INITIAL_ALPHA, beta=beta))
+
+    def _engine(self, look: int, began: float, which: str) -> LevenbergMarquardt:
+        training = self.training
+        start, _, starts = which.partition("/")
+
+        def report(entry: Iteration) -> None:
+            self.on_progress(
+                FitProgress(
+                    stage="whole cascade",
+                    start=int(start),
+                    starts=int(starts),
+                    iteration=entry.iteration,
+                    max_iterations=training.max_iterations,
+                    mse=entry.mse,
+                    elapsed_s=entry.elapsed_s,
+                    fraction=min(1.0, entry.iteration / training.max_iterations),
+                )
+            )
+
+        limits = Termination(
+            max_iterations=max(1, round(training.max_iterations * look / training.looks)),
+            max_time_s=max(0.0, training.max_time_s - (time.perf_counter() - began)),
+            tolerance=training.tolerance,
+            patience=training.patience,
+        )
+        return LevenbergMarquardt(termination=limits, evidence_after=training.evidence_after, on_iteration=report)
+
+    def _candidate(self, seed: int | None, theta: NDArray[np.float64], solution: Solution | None) -> _Candidate:
+        plain = self.layout.to_plain @ theta
+        # A given start is kept to the last digit, which the way into the basis and back would change.
+        model = self.provider.at(plain) if solution else self.provider.cascade
+        loss = solution.at.loss if solution else self.provider.loss(plain)
+        mse = 2.0 * loss / self.provider.n_samples
+        return _Candidate(seed=seed, model=model, score=self._score(model), loss=mse, solution=solution)
+
+    def _score(self, model: Cascade) -> float:
+        """As between the starts of a network: one trace on which all fail must not choose alone."""
+        scores = []
+        for trace in self.selection:
+            run, usable = model.simulate_trace(trace), trace.usable_samples
+            for name, error in self.provider.errors.items():
+                scores.append(float(np.mean((run[name] - trace[name])[usable] ** 2)) / error**2)
+        return float(np.exp(np.mean(np.log(np.maximum(scores, NEGLIGIBLE))))) if scores else float("nan")
+
+    def _result(self, seen: Sequence[_Candidate], *, interrupted: bool, seconds: float) -> CascadeFit:
+        chosen = min(seen, key=lambda one: _last(one.score if self.selection else one.loss))
+        curve = chosen.solution.curve if chosen.solution else ()
+        how = "by the selection traces" if self.selection else "by its loss on the estimation traces"
+        return CascadeFit(
+            model=chosen.model,
+            status=self._status(chosen, seen, interrupted=interrupted),
+            errors=dict(self.provider.errors),
+            history={
+                "iteration": np.array([entry.iteration for entry in curve], dtype=np.float64),
+                "loss": np.array([entry.mse for entry in curve]),
+                "effective_parameters": np.array([entry.effective_parameters for entry in curve]),
+                "elapsed_s": np.array([entry.elapsed_s for entry in curve]),
+            },
+            train_time_s=seconds,
+            seed=chosen.seed,
+            evidence=chosen.solution.evidence if chosen.solution else None,
+            notes=(
+                f"Chosen {how} among {len(seen)} states: {chosen.sentence}.",
+                *_others([one for one in seen if one is not chosen]),
+            ),
+        )
+
+    def _status(self, chosen: _Candidate, seen: Sequence[_Candidate], *, interrupted: bool) -> Status:
+        if interrupted:
+            return Status.INTERRUPTED
+        runs = [chosen.model.simulate_trace(trace) for trace in (*self.provider.traces, *self.selection)]
+        if any(activity.lost for run in runs for activity in run.activity.values()):
+            return Status.UNSTABLE
+        if chosen.solution is None:
+            return Status.NOT_IMPROVED
+        later = any(one.seed == chosen.seed and one.iteration > chosen.iteration for one in seen)
+        return Status.STOPPED_EARLY if later else chosen.solution.status
+
+
+def _others(seen: Sequence[_Candidate]) -> list[str]:
+    """One sentence for each start: how the selection error went on the way."""
+    by_origin: dict[str, list[str]] = {}
+    for one in seen:
+        by_origin.setdefault(one.origin, []).append(f"{one.score:.4g} ({one.iteration})")
+    return [
+        f"The other states from {origin}, error on the selection traces (iterations): {', '.join(looks)}."
+        for origin, looks in by_origin.items()
+    ]
+
+
+def _last(value: float) -> float:
+    """A sorting key by which what is not finite comes last."""
+    return value if np.isfinite(value) else np.inf
+
+
+def _unfinished(solution: Solution) -> bool:
+    return solution.status in {Status.MAX_ITERATIONS, Status.TIME_LIMIT}

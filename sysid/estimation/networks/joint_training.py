@@ -1,0 +1,150 @@
+"""A cascade trained end to end: all members together, for the error of the whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
+from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.estimation.networks.member_layout import JointLayout
+from sysid.estimation.networks.training import FitProgress
+from sysid.models import Cascade, Ends
+from sysid.traces import Channel, Trace, TraceSet
+
+SMALLEST_ERROR = 1e-3
+"""Least error that counts as one, as a share of the target's spread: a target that fits perfectly already must not
+outweigh all others."""
+
+
+def fit_cascade(
+    cascade: Cascade,
+    traces: Sequence[Trace],
+    *,
+    targets: Sequence[str] | Dict[str, float] | None = None,
+    trained: Sequence[str] | None = None,
+    training: JointTraining | None = None,
+    selection: Sequence[Trace] = (),
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> CascadeFit:
+    """Train the members of a cascade together, from where they are, for the free run of the whole.
+
+    Sensitivities go through the wiring: the loss on a downstream output moves the parameters upstream. Each member
+    keeps the prior that it would have alone.
+
+    Args:
+        cascade: The start; its members have been fitted before.
+        traces: Estimation traces with the cascade's inputs and the targets; a run over each begins at rest.
+        targets: Outputs whose error counts, all by default; given with numbers, the error of each in its unit that
+            counts as one, otherwise the start's root mean square error, so that all targets count alike.
+        trained: Outputs of the members that are trained; all by default.
+        training: How to train.
+        selection: Traces that choose among the states on the way, the start among them.
+        on_progress: Called after every iteration.
+
+    Returns:
+        The best cascade seen; never one that does worse on the selection traces than the start.
+
+    Raises:
+        ChannelError: If a trace lacks an input or a target, or a name is no output of the cascade.
+        ConfigError: If a member that is trained, or lies between trained ones and a target, has no flat parameters.
+    """
+    training = training or JointTraining()
+    provider = CascadeProvider(
+        cascade=cascade,
+        traces=tuple(traces),
+        errors=unit_errors(cascade, traces, targets),
+        trained=None if trained is None else tuple(trained),
+        stride=training.stride,
+        moves=training.moves,
+        leverage=training.leverage,
+        soft_margin=training.soft_margin,
+        workers=training.workers,
+    )
+    records = [_channels(cascade, trace) for trace in traces]
+    layout = JointLayout.of(provider.members, records, plain=training.basis == "plain")
+    joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)
+    return joint.fit([(None, layout.in_basis(provider.theta))])
+
+
+def unit_errors(
+    cascade: Cascade, traces: Sequence[Trace], targets: Sequence[str] | Dict[str, float] | None
+) -> dict[str, float]:
+    """The error of each target that counts as one.
+
+    Args:
+        cascade: The start.
+        traces: Estimation traces.
+        targets: As for :func:`fit_cascade`.
+
+    Returns:
+        By output, in its unit.
+
+    Raises:
+        ChannelError: If a trace lacks an input or a target, or a target is no output.
+    """
+    if isinstance(targets, Dict):
+        return {name: float(error) for name, error in targets.items()}
+    names = cascade.outputs if targets is None else tuple(targets)
+    runs = [cascade.simulate_trace(trace) for trace in traces]
+    errors = {}
+    for name in names:
+        differences = np.concatenate(
+            [(run[name] - t[name])[t.usable_samples] for run, t in zip(runs, traces, strict=True)]
+        )
+        spread = float(np.std(np.concatenate([trace[name] for trace in traces])))
+        errors[name] = max(float(np.sqrt(np.mean(differences**2))), SMALLEST_ERROR * spread, np.finfo(np.float64).tiny)
+    return errors
+
+
+def with_upstream_outputs(traces: TraceSet, cascade: Cascade, output: str) -> TraceSet:
+    """Traces for retraining one member on what its upstream members really put out.
+
+    Every channel that members before it write holds their free run instead of the measured signal; the member's own
+    output stays measured. A fit on them learns to make up for what comes from upstream (all estimators take them).
+
+    Args:
+        traces: Measured traces.
+        cascade: The whole, with the upstream members as they will be.
+        output: An output of the member that is to be retrained.
+
+    Returns:
+        The traces with the channels of that member: its inputs, simulated where the cascade computes them, and its
+        outputs as measured. Roles are kept.
+
+    Raises:
+        ChannelError: If a trace lacks an input of the cascade or an output of the member, or nothing writes ``output``.
+    """
+    ends = Ends.of(cascade.member(output))
+    changed = []
+    for trace in traces:
+        run = cascade.simulate_trace(trace)
+        measured = [name for name in ends.inputs if name not in cascade.outputs] + list(ends.outputs)
+        columns = {name: trace[name] for name in measured}
+        columns |= {name: run[name] for name in ends.inputs if name in cascade.outputs}
+        names = (*ends.inputs, *ends.outputs)
+        channels = tuple(
+            trace.channel(name) if name in trace.channel_names else Channel(name=name, unit=cascade.units[name])
+            for name in names
+        )
+        changed.append(
+            Trace(
+                name=trace.name,
+                sample_time=trace.sample_time,
+                channels=channels,
+                values=np.column_stack([columns[name] for name in names]),
+                start_time=trace.start_time,
+                usable=trace.usable,
+                provenance=(*trace.provenance, f"Inputs of the model of {output} simulated by the members before it."),
+            )
+        )
+    return TraceSet(name=traces.name, traces=tuple(changed), roles=traces.roles, source=traces.source)
+
+
+def _channels(cascade: Cascade, trace: Trace) -> dict[str, NDArray[np.float64]]:
+    """What the members will see: measured where the trace has it, simulated otherwise."""
+    run = cascade.simulate_trace(trace)
+    return {name: trace[name] if name in trace.channel_names else run[name] for name in cascade.wiring.channels}

@@ -1,0 +1,360 @@
+"""Several random starts of one network: raced, halved, and chosen between on traces that train nothing.
+
+A free-run fit has many local minima. Starts of equal error on the estimation record can differ by orders of magnitude
+on the next one, so that how one chooses matters as much as how one trains. The starts run side by side for a part of
+the iterations; the better half goes on; and every state at which a start was looked at stays a candidate, which makes
+the choice an early stopping too. What chooses is the selection traces: they train nothing, and no score on them is
+published as one on unseen data.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from sysid.estimation.least_squares.checkpoint import Checkpoint
+from sysid.estimation.least_squares.evidence import Prior
+from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.networks.gpu_starts import Scout
+from sysid.estimation.networks.initialise import AbstractLayout
+from sysid.estimation.networks.pretraining import StepSamples
+from sysid.estimation.networks.provider import AbstractProvider
+from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.result import Loop, Status
+from sysid.models import NARXModel, NeuralStateSpaceModel, Start
+from sysid.traces import Trace
+
+RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
+"""Shares of the iterations after which the starts are looked at and, but for the last, half of them dropped
+(successive halving, Jamieson and Talwalkar 2016). Who stays is decided by the error on the estimation traces: early
+on, what the selection traces say of a start is noise; they choose at the end, among all states looked at."""
+
+INITIAL_ALPHA = 1e-2
+"""Precision of the weights before the evidence has spoken: weak, but enough to keep the first steps of an
+underdetermined network small."""
+
+
+Network: TypeAlias = NARXModel | NeuralStateSpaceModel
+"""What is raced here."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Race:
+    """Everything that the starts of one fit have in common.
+
+    Args:
+        training: How to train.
+        layout: Where the parameters stand.
+        provider: Residuals and Jacobians, in the basis of training.
+        to_plain: From the parameters that are trained to the model's, shape ``(n_model, n_trained)``: a change of
+            basis, or what leaves out what belongs to the records.
+        template: The model to fill with parameters.
+        selection: Traces that choose.
+        start: How a free run begins.
+        initial: Plain parameters of the first start; ``None`` for a random one.
+        on_progress: Called after every iteration, from the threads that train.
+        resume: Where the first start was put aside; ``None`` to begin it.
+        prelude: Where a random start is drawn and trained one step ahead before anything else; ``None`` for none.
+        curriculum: Providers over shorter horizons, which a random start is trained on first, in this order.
+    """
+
+    training: Training
+    layout: AbstractLayout
+    provider: AbstractProvider
+    to_plain: NDArray[np.float64]
+    template: Network
+    selection: Sequence[Trace]
+    start: Start
+    initial: NDArray[np.float64] | None
+    on_progress: Callable[[FitProgress], None]
+    resume: Checkpoint | None = None
+    prelude: StepSamples | None = None
+    curriculum: Sequence[AbstractProvider] = ()
+    stop: threading.Event = field(default_factory=threading.Event)
+    scouted: Sequence[Scout] = ()
+    """Starts that were found among many; by default each is drawn."""
+    iterations: dict[int, int] = field(default_factory=dict)
+    """Iterations done by each start, for the progress bar."""
+
+    def model(self, theta: NDArray[np.float64]) -> Network:
+        """The model with these parameters of the basis."""
+        return replace(self.template, theta=self.to_plain @ theta)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """One start, as it stood when it was looked at.
+
+    Args:
+        number: Which start, from 0 on.
+        seed: Its seed; ``None`` for the one that was given.
+        solution: Where its fit stands.
+        model: The model there.
+        score: Geometric mean over the selection traces of the mean squared error; NaN without such traces.
+        members: Starts that a committee unites, once for each vote; empty for a single start.
+        without: Inputs that it does without.
+    """
+
+    number: int
+    seed: int | None
+    solution: Solution
+    model: Network
+    score: float
+    members: tuple[int, ...] = ()
+    without: tuple[str, ...] = ()
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the evidence; minus infinity where none was computed."""
+        evidence = self.solution.evidence
+        return evidence.log_evidence if evidence else -np.inf
+
+    @property
+    def loss(self) -> float:
+        """Loss on the estimation traces."""
+        return self.solution.at.loss
+
+
+def run(race: Race) -> list[Candidate]:
+    """Race the starts; an interruption from the keyboard ends the race, and what there is comes back.
+
+    Threads suffice: the kernels and BLAS release the interpreter.
+
+    Args:
+        race: What they have in common.
+
+    Returns:
+        Every start at every rung that it reached.
+    """
+    training = race.training
+    rungs = _rungs(training)
+    numbers = list(range(training.starts))
+    latest: dict[int, Candidate] = {}
+    seen: list[Candidate] = []
+    total = _work(training.starts, rungs)
+    # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
+    with threadpool_limits(1, "blas"):
+        for rung, share in enumerate(rungs):
+            before = rungs[rung - 1] if rung else 0.0
+            seconds = training.max_time_s * (share - before) * training.workers / total
+            reached = _rung(race, numbers, latest, share, seconds)
+            seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
+            if race.stop.is_set():
+                break
+            latest = reached
+            order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
+            numbers = [candidate.number for candidate in order[: max(1, (len(order) + 1) // 2)]]
+    return seen
+
+
+def _rung(
+    race: Race, numbers: Sequence[int], latest: dict[int, Candidate], share: float, seconds: float
+) -> dict[int, Candidate]:
+    """One rung of the race. The workers leave what they reach in a table: an interruption at any moment loses none."""
+    reached: dict[int, Candidate] = {}
+
+    def work(number: int) -> None:
+        if not race.stop.is_set():
+            reached[number] = _advance(race, number, latest.get(number), share, seconds)
+
+    with ThreadPoolExecutor(min(race.training.workers, len(numbers))) as pool:  # leaving it waits for those that run
+        try:
+            for future in [pool.submit(work, number) for number in numbers]:
+                future.result()
+        except KeyboardInterrupt:
+            race.stop.set()
+    if not reached and not latest:  # interrupted before anything had begun: the start as it is
+        reached[numbers[0]] = _advance(race, numbers[0], None, share, seconds)
+    return reached
+
+
+def _rungs(training: Training) -> tuple[float, ...]:
+    return RUNGS if training.starts > 1 else RUNGS[-1:]
+
+
+def planned_iterations(training: Training) -> float:
+    """Iterations of the whole race, all starts together, if none of them converges early.
+
+    Args:
+        training: How to train.
+
+    Returns:
+        Their number.
+
+    Example:
+        >>> planned_iterations(Training(max_iterations=100))
+        100.0
+        >>> round(planned_iterations(Training(max_iterations=100, starts=8)))
+        176
+    """
+    return training.max_iterations * _work(training.starts, _rungs(training))
+
+
+def _work(starts: int, rungs: Sequence[float]) -> float:
+    """Iterations of the whole race, in units of one start's."""
+    work, before, n = 0.0, 0.0, starts
+    for share in rungs:
+        work, before, n = work + n * (share - before), share, max(1, (n + 1) // 2)
+    return work
+
+
+def _advance(race: Race, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
+    training = race.training
+    iterations = max(1, round(share * training.max_iterations))
+    engine = _engine(race, number, iterations, seconds)
+    if before is None and number == 0 and race.resume is not None:
+        prior = race.layout.prior(_in_basis(race, race.layout.centre()), alpha=INITIAL_ALPHA, beta=1.0)
+        seed: int | None = training.seed
+        solution = engine.resume(race.provider, race.resume.state(race.provider, prior))
+    elif before is None:
+        seed, theta, centre = _begin(race, number)
+        if race.prelude is not None and seed is not None:
+            theta = _prelude(race, race.prelude, number, seed, centre)
+        for provider in race.curriculum:
+            first = replace(engine, termination=Termination(max_iterations=training.curriculum_iterations))
+            first = replace(first, on_iteration=lambda _: None)
+            theta = first.minimise(provider, theta, first_prior(training, race.layout, provider, theta, centre)).theta
+        solution = engine.minimise(
+            race.provider, theta, first_prior(training, race.layout, race.provider, theta, centre)
+        )
+    elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
+        seed, solution = before.seed, engine.resume(race.provider, before.solution.state)
+    else:
+        return before
+    model = race.model(solution.theta)
+    return Candidate(number=number, seed=seed, solution=solution, model=model, score=score(race, model))
+
+
+def _prelude(
+    race: Race, prelude: StepSamples, number: int, seed: int, centre: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A random start after its prelude."""
+    training = race.training
+    scale = race.template.scaling.output_scale**2
+
+    def report(entry: Iteration) -> None:
+        race.on_progress(
+            FitProgress(
+                stage=f"prelude {entry.iteration} of {training.prelude_iterations}",
+                start=number + 1,
+                starts=training.starts,
+                iteration=0,  # the free run's, which have not begun
+                max_iterations=training.max_iterations,
+                mse=entry.mse * scale,
+                elapsed_s=entry.elapsed_s,
+                fraction=min(1.0, sum(race.iterations.values()) / planned_iterations(training)),
+            )
+        )
+
+    engine = LevenbergMarquardt(
+        termination=Termination(
+            max_iterations=training.prelude_iterations, tolerance=training.tolerance, patience=training.patience
+        ),
+        on_iteration=report,
+        should_stop=race.stop.is_set,
+    )
+    theta = prelude.draw(np.random.default_rng(seed), centre)
+    return engine.minimise(prelude, theta, first_prior(training, race.layout, prelude, theta, centre)).theta
+
+
+def first_prior(
+    training: Training,
+    layout: AbstractLayout,
+    provider: AbstractProvider,
+    theta: NDArray[np.float64],
+    centre: NDArray[np.float64],
+) -> Prior:
+    """The prior that a fit begins with.
+
+    Args:
+        training: How to train.
+        layout: Where the parameters stand.
+        provider: Residuals.
+        theta: Where the fit begins, in the provider's parameters.
+        centre: What they are drawn to.
+
+    Returns:
+        The prior.
+    """
+    # The noise is taken to be as large as the start's error: a prior weighed against residuals of size 1 would hold
+    # an open-loop fit, whose residuals are a thousand times smaller, at its start.
+    beta = 0.5 * provider.n_samples / max(provider.loss(theta), np.finfo(np.float64).tiny)
+    # A precision given from outside is relative to that of the residuals, and stays.
+    given = training.regularisation
+    return layout.prior(centre, alpha=INITIAL_ALPHA if given is None else given * beta, beta=beta)
+
+
+def _begin(race: Race, number: int) -> tuple[int | None, NDArray[np.float64], NDArray[np.float64]]:
+    centre = _in_basis(race, race.layout.centre())
+    if number == 0 and race.initial is not None:
+        return None, _in_basis(race, race.initial), centre
+    if race.scouted:
+        return race.scouted[number].seed, race.scouted[number].theta, centre
+    seed = race.training.seed + number
+    return seed, race.layout.draw(np.random.default_rng(seed), centre), centre
+
+
+def _in_basis(race: Race, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    if race.to_plain.shape[0] == race.to_plain.shape[1]:
+        return np.asarray(np.linalg.solve(race.to_plain, theta), dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(race.to_plain, theta, rcond=None)[0], dtype=np.float64)
+
+
+def _engine(race: Race, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
+    training = race.training
+    scale = race.template.scaling.output_scale**2
+    work = training.max_iterations * _work(training.starts, _rungs(training))
+
+    def report(entry: Iteration) -> None:
+        race.iterations[number] = entry.iteration
+        race.on_progress(
+            FitProgress(
+                stage="free run" if training.loop is Loop.CLOSED else "one step ahead",
+                start=number + 1,
+                starts=training.starts,
+                iteration=entry.iteration,
+                max_iterations=training.max_iterations,
+                mse=entry.mse * scale,
+                elapsed_s=entry.elapsed_s,
+                fraction=min(1.0, sum(race.iterations.values()) / work),
+            )
+        )
+
+    limits = Termination(
+        max_iterations=iterations, max_time_s=seconds, tolerance=training.tolerance, patience=training.patience
+    )
+    if training.regularisation is not None:
+        return LevenbergMarquardt(
+            termination=limits, on_iteration=report, should_stop=race.stop.is_set, evidence_after=None
+        )
+    return LevenbergMarquardt(termination=limits, on_iteration=report, should_stop=race.stop.is_set)
+
+
+def score(race: Race, model: Network) -> float:
+    """Geometric mean over the selection traces: one trace on which every start fails must not choose alone.
+
+    Args:
+        race: The race, for its selection traces.
+        model: A model.
+
+    Returns:
+        Of the mean squared errors, in the output's unit squared; NaN without selection traces.
+    """
+    errors = []
+    for trace in race.selection:
+        inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
+        n, history = race.start.n_measured, race.start.history(inputs, target, model.rest_output)
+        if race.training.loop is Loop.CLOSED:
+            output = model.simulate(inputs[n:], history)
+        else:
+            output = model.predict(inputs[n:], target[n:], history)
+        errors.append(float(np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2)))
+    return float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")

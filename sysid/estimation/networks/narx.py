@@ -1,0 +1,292 @@
+"""NARX networks: open loop, closed loop, several starts, and an honest choice between them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ChannelError, ConfigError
+from sysid.estimation.least_squares.basis import RebasedProvider, RegressorBasis
+from sysid.estimation.least_squares.checkpoint import Checkpoint
+from sysid.estimation.least_squares.posterior import calibrate, laplace
+from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.regression import lagged
+from sysid.estimation.networks import ensemble as committee
+from sysid.estimation.networks import multistart as starts
+from sysid.estimation.networks.choosing import choose
+from sysid.estimation.networks.gpu_recursion import device_named
+from sysid.estimation.networks.gpu_starts import Patrol, Scout
+from sysid.estimation.networks.initialise import Layout
+from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
+from sysid.estimation.networks.pretraining import StepSamples
+from sysid.estimation.networks.provider import Experiment, RecursionProvider, experiments_of
+from sysid.estimation.networks.raced import raced_result, raced_status
+from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.networks.warm_start import grown
+from sysid.estimation.result import FitResult, Loop
+from sysid.models import NARX, ARXModel, History, Mapping, NARXModel, Scaling, Start
+from sysid.traces import Trace
+
+
+def fit_narx(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    network: NARX,
+    training: Training | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    selection: Sequence[Trace] = (),
+    initial: FitResult | None = None,
+    resume: Checkpoint | None = None,
+    on_checkpoint: Callable[[Checkpoint], None] = lambda _: None,
+    vet: Callable[[starts.Network], bool] | None = None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> FitResult:
+    """Fit a NARX network by Levenberg-Marquardt with Bayesian regularisation.
+
+    An interruption from the keyboard keeps the best model so far (status ``INTERRUPTED``).
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which comes out.
+        network: The structure.
+        training: How to train.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        selection: Traces that choose between starts; without them the evidence chooses.
+        initial: A fit whose parameters are the first start: of the same structure, of a smaller network over some of
+            its lags, or of a linear model over them.
+        resume: Where the fit of a single start was put aside; it goes on as if it had not been.
+        on_checkpoint: Given the checkpoint from which the chosen start can go on.
+        vet: Whether a model's free run is stable; the best stable one of the ten best candidates is then chosen.
+        on_progress: Called after every iteration, from the threads that train.
+
+    Returns:
+        The best start's model, with the spread over starts in its attempts.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        ConfigError: If the structure does not fit the mapping, or ``initial`` has another structure.
+    """
+    began = time.perf_counter()
+    training, start = training or Training(), start or Start()
+    committee.check(training, selection)
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    experiments = experiments_of(traces, mapping, start, rest)
+    experiments = (*experiments, *_offset(experiments, mapping, training))
+    task = _Task.of(_template(traces[0], mapping, network, experiments, rest), experiments, training)
+    race = starts.Race(
+        training=training,
+        layout=task.layout,
+        provider=task.provider,
+        to_plain=task.to_plain,
+        template=task.template,
+        selection=selection,
+        start=start,
+        initial=_initial_parameters(initial, task.template, task.layout, task.to_plain, training.seed),
+        on_progress=on_progress,
+        resume=resume,
+        prelude=_prelude(training, task, experiments),
+        scouted=_scouted(training, task),
+        curriculum=[task.within(horizon) for horizon in training.curriculum],
+    )
+    tasks = _raced(race, task, experiments)
+    on_checkpoint(Checkpoint.of(choose(list(tasks), training.choose_by).chosen.solution.state))
+    tasks |= _with_committee(race, list(tasks), experiments, vet)
+    choice = choose(list(tasks), training.choose_by, vet)
+    chosen = choice.chosen
+    records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
+    records += [(t.columns(mapping.inputs), None) for t in selection]
+    status = raced_status(chosen, list(tasks), records, interrupted=race.stop.is_set())
+    posterior = laplace(
+        chosen.solution.state,
+        chosen.model,
+        tasks[chosen].to_plain,
+        experiments,
+        copies=1 + len(training.offsets),
+        stride=training.stride,
+    )
+    if posterior is not None:
+        posterior = calibrate(posterior, chosen.model, experiments_of(selection, mapping, start, rest))
+    fit = raced_result(choice, list(tasks), training, status, time.perf_counter() - began)
+    return replace(fit, posterior=posterior)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Task(committee.Task):
+    """What is minimised for one size of the network and one set of its inputs.
+
+    Args:
+        template: The model but for its parameters.
+        basis: The regressors' basis in training.
+        inner: Residuals over plain parameters.
+    """
+
+    template: NARXModel
+    basis: RegressorBasis
+    inner: RecursionProvider
+
+    @classmethod
+    def of(
+        cls, template: NARXModel, experiments: Sequence[Experiment], training: Training, without: tuple[str, ...] = ()
+    ) -> _Task:
+        whole = Layout.of(template.network, len(template.mapping.inputs))
+        layout = part_of(whole, template.mapping, without)
+        basis = _basis(training, template, experiments, layout)
+        inner = RecursionProvider(
+            template=template.recursion,
+            experiments=tuple(experiments),
+            closed=training.loop is Loop.CLOSED,
+            stride=training.stride,
+        )
+        to_plain = embedding(layout, whole) @ basis.to_plain(layout)
+        provider = RebasedProvider(inner=inner, to_plain=to_plain)
+        return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider, inner=inner)
+
+    def within(self, horizon: int) -> RebasedProvider:
+        """Residuals of free runs over so many samples."""
+        return RebasedProvider(inner=replace(self.inner, horizon=horizon), to_plain=self.to_plain)
+
+
+def _raced(race: starts.Race, task: _Task, experiments: Sequence[Experiment]) -> dict[starts.Candidate, _Task]:
+    """Every start at every look with what it minimises; those that do without some inputs race among themselves."""
+    tasks: dict[starts.Candidate, _Task] = {}
+    for view in views(race.training, task.template.mapping):
+        own = replace(race, training=view.training, on_progress=view.report(race.on_progress), iterations={})
+        if view.without:
+            part = _Task.of(task.template, experiments, race.training, view.without)
+            own = replace(
+                own,
+                layout=PartLayout(part=part.layout, whole=task.layout),
+                provider=part.provider,
+                to_plain=part.to_plain,
+                initial=None,
+                resume=None,
+                prelude=_prelude(view.training, part, experiments),
+                curriculum=[part.within(horizon) for horizon in race.training.curriculum],
+            )
+        found = starts.run(own)
+        named = [replace(one, number=one.number + view.first, without=view.without) for one in found]
+        tasks |= dict.fromkeys(named, part if view.without else task)
+        if race.stop.is_set():
+            break
+    return tasks
+
+
+def _with_committee(
+    race: starts.Race,
+    candidates: Sequence[starts.Candidate],
+    experiments: Sequence[Experiment],
+    vet: Callable[[starts.Network], bool] | None,
+) -> dict[starts.Candidate, _Task]:
+    """The committee as one more candidate, with its task; none where no second vote helps, or nobody waits for it."""
+    if race.training.committee == 1 or race.stop.is_set():
+        return {}
+    try:
+        found = committee.elected(race, candidates, vet)
+    except KeyboardInterrupt:  # the starts are there, and the best of them stands
+        race.stop.set()
+        return {}
+    if found is None:
+        return {}
+    task = _Task.of(found[0].model, experiments, race.training)
+    return {committee.seated(race, *found, task): task}
+
+
+def _scouted(training: Training, task: _Task) -> list[Scout]:
+    """The best of the scouts as starts; none where none are asked for, or no device is there to send them out on."""
+    if not training.scouts or (training.device == "auto" and device_named("auto") == "cpu"):
+        return []
+    patrol = Patrol(
+        provider=task.inner,
+        to_plain=task.to_plain,
+        layout=task.layout,
+        centre=np.asarray(np.linalg.solve(task.to_plain, task.layout.centre())),
+        regularisation=training.regularisation,
+        device=training.device,
+    )
+    return patrol.scouts(range(training.seed, training.seed + training.scouts))[: training.starts]
+
+
+def _prelude(training: Training, task: _Task, experiments: Sequence[Experiment]) -> StepSamples | None:
+    if not training.prelude or not task.layout.linear or not task.layout.neurons:
+        return None
+    return StepSamples.of(
+        task.template, experiments, task.layout, task.basis, samples=training.prelude, seed=training.seed
+    )
+
+
+def _offset(experiments: Sequence[Experiment], mapping: Mapping, training: Training) -> list[Experiment]:
+    """The experiments once more with each offset of their channels."""
+    copies = []
+    channels = (*mapping.inputs, mapping.output)
+    for offset in training.offsets:
+        strangers = sorted(set(offset) - set(channels))
+        if strangers:
+            raise ChannelError(strangers, channels, where="offsets")
+        *by, up = (float(offset.get(name, 0.0)) for name in channels)
+        for e in experiments:
+            history = History(inputs=e.history.inputs + np.array(by), output=e.history.output + up)
+            copies.append(replace(e, inputs=e.inputs + np.array(by), output=e.output + up, history=history))
+    return copies
+
+
+def _template(
+    first: Trace, mapping: Mapping, network: NARX, experiments: Sequence[Experiment], rest: float
+) -> NARXModel:
+    """The model but for its parameters."""
+    layout = Layout.of(network, len(mapping.inputs))
+    return NARXModel(
+        network=network,
+        theta=layout.centre(),
+        scaling=Scaling.to_unit_range([e.inputs for e in experiments], [e.output for e in experiments]),
+        mapping=mapping,
+        sample_time=first.sample_time,
+        input_units=tuple(first.channel(name).unit for name in mapping.inputs),
+        output_unit=first.channel(mapping.output).unit,
+        rest_output=rest,
+    )
+
+
+def _basis(
+    training: Training, template: NARXModel, experiments: Sequence[Experiment], layout: Layout
+) -> RegressorBasis:
+    if training.basis == "plain" or not layout.linear:
+        # The constant and linear part absorb the shift of the basis; without them the plain regressors remain.
+        return RegressorBasis.identity(layout.lags)
+    records = []
+    for experiment in experiments:
+        u, y = template.recursion.extended(experiment.inputs, experiment.history)
+        y[-len(experiment.output) :] = template.scaling.scale_output(experiment.output)
+        records.append(lagged(u, y, layout.lags, len(experiment.output)))
+    return RegressorBasis.levels_and_rates(layout.lags, np.concatenate(records))
+
+
+def _initial_parameters(
+    initial: FitResult | None, template: NARXModel, layout: Layout, to_plain: NDArray[np.float64], seed: int
+) -> NDArray[np.float64] | None:
+    """Plain parameters of the first start; what the initial fit lacks is drawn as a random start draws it."""
+    if initial is None:
+        return None
+    if not isinstance(initial.model, ARXModel | NARXModel):
+        raise ConfigError(
+            "the initial fit is neither a network nor an ARX model",
+            where="initial",
+            expected=f"{template.network.label}, a smaller network, or an ARX model over its lags",
+            got=initial.model.structure.label,
+            remedy="name such a fit, or leave initial out",
+        )
+    if isinstance(initial.model, NARXModel) and _same(initial.model, template):
+        return initial.model.theta
+    centre = np.linalg.solve(to_plain, layout.centre())
+    fresh = to_plain @ layout.draw(np.random.default_rng(seed), np.asarray(centre, dtype=np.float64))
+    return grown(initial.model.recursion, template.recursion, fresh)
+
+
+def _same(model: NARXModel, template: NARXModel) -> bool:
+    return model.network == template.network and model.scaling == template.scaling

@@ -1,0 +1,209 @@
+"""Residuals and Jacobians of the free run of a neural state space, for the Levenberg-Marquardt engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.least_squares.correlation import correlation_time
+from sysid.estimation.networks.provider import BLOCK, AbstractProvider, Experiment, Linearisation
+from sysid.kernels import neural_state_space as kernel
+from sysid.models import NeuralForm
+
+
+@dataclass(frozen=True, eq=False)
+class _Record:
+    """An experiment in scaled numbers, the samples of its history included.
+
+    ``oldest`` is what the map to the initial state reads: scaled inputs, scaled output, 1. ``free`` says where the
+    record's own initial state stands among the parameters; ``None`` where the map gives it.
+    """
+
+    u: NDArray[np.float64]
+    target: NDArray[np.float64]
+    root_weights: NDArray[np.float64] | None
+    oldest: NDArray[np.float64]
+    free: slice | None
+
+    def weighted(self, values: NDArray[np.float64], rows: slice = slice(None)) -> NDArray[np.float64]:
+        if self.root_weights is None:
+            return values
+        roots = self.root_weights[rows]
+        return values * (roots if values.ndim == 1 else roots[:, None])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NeuralProvider(AbstractProvider):
+    """Residuals of a :class:`NeuralForm` in free run.
+
+    The parameters are the form's, followed by the initial states of those records whose history holds more than one
+    sample: such a record begins where its history does, its state there is estimated, and the history's samples count
+    like the others. Where the history is a single sample, the state is the form's for a system that has stood there.
+
+    Args:
+        template: Sizes, flags, scaling and bounds; its parameters are ignored.
+        experiments: The records.
+    """
+
+    template: NeuralForm
+    experiments: tuple[Experiment, ...]
+    n_samples: int = field(init=False)
+    n_parameters: int = field(init=False)
+    """Those of the model and of the records' initial states."""
+    _records: tuple[_Record, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "experiments", tuple(self.experiments))
+        records, at = [], self.template.sizes.count
+        for experiment in self.experiments:
+            record = self._record(experiment, at)
+            records.append(record)
+            at = at if record.free is None else record.free.stop
+        object.__setattr__(self, "_records", tuple(records))
+        object.__setattr__(self, "n_parameters", at)
+        counted = [len(r.target) if r.root_weights is None else np.count_nonzero(r.root_weights) for r in records]
+        object.__setattr__(self, "n_samples", int(sum(counted)))
+
+    def _record(self, experiment: Experiment, at: int) -> _Record:
+        history, scaling = experiment.history, self.template.scaling
+        n_past = 0 if len(history.output) == 1 else len(history.output)
+        u = np.concatenate([history.inputs[:n_past], experiment.inputs])
+        target = np.concatenate([history.output[:n_past], experiment.output])
+        roots = None
+        if experiment.weights is not None:
+            roots = np.sqrt(np.concatenate([np.ones(n_past), experiment.weights]))
+        oldest = np.concatenate(
+            [scaling.scale_inputs(history.inputs[:1])[0], scaling.scale_output(history.output[:1]), [1.0]]
+        )
+        return _Record(
+            u=self.template.scaled(u),
+            target=scaling.scale_output(target),
+            root_weights=roots,
+            oldest=oldest,
+            free=slice(at, at + self.template.sizes.states) if n_past else None,
+        )
+
+    @property
+    def signals(self) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...]:
+        """Scaled inputs and scaled output of each record, the history's samples included."""
+        return tuple((record.u, record.target) for record in self._records)
+
+    def states(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """Every state that the records visit.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            One array of shape ``(n_samples, n_states)`` per record.
+        """
+        found = []
+        for record in self._records:
+            x = self._begin(record, theta)
+            path = np.empty((len(record.u), len(x)))
+            y = np.empty(1)
+            for t in range(len(path)):
+                path[t] = x
+                kernel.free_run(record.u[t : t + 1], x, *self.template.arguments(theta), y)
+            found.append(path)
+        return tuple(found)
+
+    def loss(self, theta: NDArray[np.float64]) -> float:
+        """Half the weighted sum of squared residuals; see the base class."""
+        total = 0.0
+        for record in self._records:
+            y = np.empty(len(record.target))
+            kernel.free_run(record.u, self._begin(record, theta), *self.template.arguments(theta), y)
+            residual = record.weighted(y - record.target)
+            total += 0.5 * float(residual @ residual)
+        return total if np.isfinite(total) else np.inf
+
+    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+        """Loss, gradient and Gauss-Newton matrix; see the base class."""
+        gradient, matrix = np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
+        loss, correlated = 0.0, 0.0
+        for record in self._records:
+            residuals = []
+            for rows, y, block in self._blocks(record, theta):
+                residual = record.weighted(y - record.target[rows], rows)
+                weighted = record.weighted(block, rows)
+                loss += 0.5 * float(residual @ residual)
+                gradient += weighted.T @ residual
+                matrix += weighted.T @ weighted  # one array twice: NumPy calls syrk, half the flops
+                residuals.append(residual)
+            whole = np.concatenate(residuals)
+            correlated += len(whole) * correlation_time(whole)
+        return Linearisation(
+            loss=loss,
+            gradient=gradient,
+            gauss_newton=matrix,
+            correlation_time=correlated / sum(len(record.target) for record in self._records),
+        )
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The whole Jacobian of the scaled output, unweighted, records one after the other.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            Shape ``(n_samples_of_all_records, n_parameters)``.
+        """
+        return np.concatenate([block.copy() for r in self._records for _, _, block in self._blocks(r, theta)])
+
+    def outputs(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The scaled free runs, records one after the other.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            Shape ``(n_samples_of_all_records,)``.
+        """
+        return np.concatenate([y.copy() for record in self._records for _, y, _ in self._blocks(record, theta)])
+
+    def at(self, theta: NDArray[np.float64]) -> NeuralForm:
+        """The form with these parameters.
+
+        Args:
+            theta: Flat parameters, those of the records' initial states included or not.
+
+        Returns:
+            The form.
+        """
+        return replace(self.template, theta=theta[: self.template.sizes.count])
+
+    def _begin(self, record: _Record, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """State before the record's first sample. Not bounded: a bound here would hide the way back."""
+        if record.free is not None:
+            return theta[record.free].copy()
+        E = theta[self.template.sizes.start].reshape(self.template.sizes.states, -1)
+        return np.asarray(E @ record.oldest)
+
+    def _blocks(
+        self, record: _Record, theta: NDArray[np.float64]
+    ) -> Iterator[tuple[slice, NDArray[np.float64], NDArray[np.float64]]]:
+        sizes = self.template.sizes
+        n, dynamic = sizes.states, sizes.dynamic.stop
+        x = self._begin(record, theta)
+        S = np.zeros((n, dynamic + n))
+        S[:, dynamic:] = np.eye(n)
+        raw = np.empty((BLOCK, sizes.output.stop + n))
+        J = np.zeros((BLOCK, len(theta)))
+        y = np.empty(BLOCK)
+        for first in range(0, len(record.target), BLOCK):
+            rows = min(BLOCK, len(record.target) - first)
+            kernel.sensitivities(
+                record.u[first : first + rows], x, S, *self.template.arguments(theta), y[:rows], raw[:rows]
+            )
+            J[:rows, :dynamic] = raw[:rows, :dynamic]
+            J[:rows, sizes.output] = raw[:rows, dynamic + n :]
+            begun = raw[:rows, dynamic : dynamic + n]
+            if record.free is None:
+                J[:rows, sizes.start] = (begun[:, :, None] * record.oldest).reshape(rows, -1)
+            else:
+                J[:rows, record.free] = begun
+            yield slice(first, first + rows), y[:rows], J[:rows]

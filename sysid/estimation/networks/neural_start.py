@@ -1,0 +1,237 @@
+"""Where the fit of a neural state space starts: the best linear model, and a random hidden layer over its states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from threadpoolctl import threadpool_limits
+
+from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.linear.regression import lagged
+from sysid.estimation.networks.initialise import AbstractLayout
+from sysid.estimation.networks.neural_provider import NeuralProvider
+from sysid.kernels import linear as linear_kernel
+from sysid.models import Lags, NeuralForm
+from sysid.models.neural_form import Sizes
+
+ARX_ORDERS = (2, 4, 10)
+"""Orders of the regressions whose impulse responses are realised: a regression suits noise in the equation, which a
+free run does not have, so several are tried and the free run decides."""
+
+HORIZON = 150
+"""Samples of impulse response in each direction of the Hankel matrix."""
+
+LARGEST_POLE = 0.999
+"""Poles of the linear start are drawn inside this radius: a start must be stable, the fit need not stay inside."""
+
+SIGN_ROUNDS = 10
+"""Times that the signs of a rectified output are guessed anew from the model that the last guess gave."""
+
+LINEAR_ITERATIONS = 60
+
+READOUT_SPREAD = 1e-4
+"""Standard deviation of the initial readouts: so small that the first free run is the linear model's, even where a
+state sums up what it is given over thousands of samples."""
+
+FLAT_ALPHA = 1e-6
+"""Precision of the prior while the linear model is fitted: enough to hold directions that change nothing, as any change
+of coordinates of the state does."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NeuralLayout(AbstractLayout):
+    """Where the parameters of one fit stand, and where they start.
+
+    Args:
+        sizes: States, inputs, neurons.
+        base: The linear model with neurons that do nothing, the records' initial states behind it, shape
+            ``(n_parameters,)``.
+    """
+
+    sizes: Sizes
+    base: NDArray[np.float64]
+
+    def centre(self) -> NDArray[np.float64]:
+        """What the prior draws the model's parameters to: the linear model, and neurons that do nothing."""
+        return self.base[: self.sizes.count].copy()
+
+    def prior(self, centre: NDArray[np.float64], *, alpha: float, beta: float) -> Prior:
+        """The prior a fit begins with; one group for each column of the hidden weights, as for NARX.
+
+        Args:
+            centre: Ignored but for its shape: the records' initial states are drawn to the linear model's too.
+            alpha: Precision of every group but those of initial states, which are nearly free.
+            beta: Precision of the residuals.
+
+        Returns:
+            The prior.
+        """
+        s = self.sizes
+        places = np.arange(len(centre))
+        members = {"linear": places[s.linear], "readout": places[s.readout], "output": places[s.output_linear]}
+        for name, part in (("hidden", s.hidden), ("output hidden", s.output_hidden)):
+            members |= {f"{name} {i}": places[part].reshape(-1, s.row)[:, i] for i in range(s.row)}
+        members |= {"output readout": places[s.output_readout], "start": places[s.start], "records": places[s.count :]}
+        groups = tuple(Group(name=name, members=where) for name, where in members.items() if len(where))
+        alphas = [
+            FLAT_ALPHA * beta if name in {"start", "records"} else alpha for name in members if len(members[name])
+        ]
+        return Prior(centre=self.base, groups=groups, alphas=np.array(alphas), beta=beta)
+
+    def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A random start: hidden weights after Nguyen and Widrow 1990 over states and inputs of range 1.
+
+        Args:
+            rng: Source of randomness.
+            centre: The linear model, shape ``(n_parameters,)``; the records' own states are the base's.
+
+        Returns:
+            Flat parameters.
+        """
+        s = self.sizes
+        theta = np.concatenate([centre[: s.count], self.base[s.count :]])
+        for hidden, readout, k in (
+            (s.hidden, s.readout, s.neurons),
+            (s.output_hidden, s.output_readout, s.output_neurons),
+        ):
+            if k == 0:
+                continue
+            directions = rng.uniform(-1.0, 1.0, (k, s.row - 1))
+            length = 0.7 * k ** (1.0 / (s.row - 1))
+            weights = length * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+            biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
+            theta[hidden] = np.column_stack([weights, biases]).ravel()
+            theta[readout] = READOUT_SPREAD * rng.standard_normal(readout.stop - readout.start)
+        return theta
+
+
+def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
+    """The best linear model of the records in free run, in the parameters of a provider with neurons.
+
+    A regression of high order gives an impulse response; the largest singular vectors of its Hankel matrix give the
+    states (Ho and Kalman 1966); Levenberg-Marquardt then fits matrices and initial states to the free run.
+
+    Args:
+        provider: The records, and the sizes wanted.
+
+    Returns:
+        Flat parameters, shape ``(provider.n_parameters,)``; the neurons' are zero.
+    """
+    whole = provider.template
+    s = Sizes(states=whole.sizes.states, inputs=whole.sizes.inputs, neurons=0, output_neurons=0)
+    template = NeuralForm(
+        sizes=s, theta=np.zeros(s.count), scaling=whole.scaling, rectified=whole.rectified, bound=np.inf,
+        low=whole.low, high=whole.high,
+    )  # fmt: skip
+    linear = NeuralProvider(template=template, experiments=provider.experiments)
+    with threadpool_limits(1, "blas"):  # more threads than one cost more than they give at these sizes
+        fits = [_fitted(linear, _realised(linear, order)) for order in ARX_ORDERS]
+    theta = _unit_states(linear, min(fits, key=linear.loss))
+    base = np.zeros(provider.n_parameters)
+    for to, of in ((whole.sizes.linear, s.linear), (whole.sizes.output_linear, s.output), (whole.sizes.start, s.start)):
+        base[to] = theta[of]
+    base[whole.sizes.count :] = theta[s.count :]
+    return base
+
+
+def _realised(provider: NeuralProvider, order: int) -> NDArray[np.float64]:
+    """A linear model from a regression; with a rectified output, from one on the signs that the last one found."""
+    s = provider.template.sizes
+    signals = list(provider.signals)
+    rounds = SIGN_ROUNDS if provider.template.rectified else 1
+    signed = [(u, y * np.sign(u[:, 0])) for u, y in signals] if rounds > 1 else signals
+    for _ in range(rounds):
+        theta = np.zeros(provider.n_parameters)
+        A, B, C, D, constant = _realise(*_regression(signed, s.inputs, order), s)
+        theta[s.linear] = np.column_stack([A, B, np.zeros(s.states)]).ravel()
+        theta[s.output] = np.concatenate([C, D, [constant]])
+        gain = np.linalg.lstsq(np.eye(s.states) - A, B, rcond=None)[0]
+        theta[s.start] = np.column_stack([gain, np.zeros((s.states, 2))]).ravel()
+        if rounds > 1:
+            runs = [_simulate(A, B, C, D, u) + constant for u, _ in signals]
+            signed = [(u, y * np.sign(run)) for (u, y), run in zip(signals, runs, strict=True)]
+    return theta
+
+
+def _regression(
+    signals: list[tuple[NDArray[np.float64], NDArray[np.float64]]], n_inputs: int, order: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Coefficients of the past outputs, of the inputs (lags in columns), and the constant."""
+    order = min([order, *(len(y) // 4 for _, y in signals)])
+    lags = Lags(inputs=(tuple(range(order + 1)),) * n_inputs, output=tuple(range(1, order + 1)))
+    rows = np.concatenate([lagged(u, y, lags, len(y) - order) for u, y in signals])
+    target = np.concatenate([y[order:] for _, y in signals])
+    found = np.linalg.lstsq(np.column_stack([rows, np.ones(len(rows))]), target, rcond=None)[0]
+    past = found[-1 - order : -1]
+    share = 1.0 - past.sum()
+    return past, found[: -1 - order].reshape(n_inputs, order + 1), float(found[-1] / share) if share > 1e-3 else 0.0
+
+
+def _realise(
+    past: NDArray[np.float64], inputs: NDArray[np.float64], constant: float, s: Sizes
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
+    """Ho-Kalman realisation of the regression's impulse responses."""
+    responses = np.zeros((2 * HORIZON + 1, s.inputs))
+    companion = np.eye(len(past), k=-1)
+    companion[0] = past
+    radius = float(np.abs(linalg.eigvals(companion)).max())
+    # An unstable regression is slowed down to the edge; what is wanted is the shape of its first samples.
+    shrink = min(1.0, LARGEST_POLE / radius)
+    past = past * shrink ** np.arange(1, len(past) + 1)
+    for t in range(len(responses)):
+        fresh = inputs[:, t] if t < inputs.shape[1] else np.zeros(s.inputs)
+        responses[t] = fresh + sum(past[i] * responses[t - 1 - i] for i in range(min(len(past), t)))
+    places = 1 + np.arange(HORIZON)[:, None] + np.arange(HORIZON)
+    hankel = responses[places].reshape(HORIZON, -1)
+    left, values, right = linalg.svd(hankel, full_matrices=False)
+    root = np.sqrt(np.maximum(values[: s.states], 1e-12 * values[0]))
+    observable = left[:, : s.states] * root
+    A = np.linalg.lstsq(observable[:-1], observable[1:], rcond=None)[0]
+    A *= min(1.0, LARGEST_POLE / max(float(np.abs(linalg.eigvals(A)).max()), 1e-12))
+    B = root[:, None] * right[: s.states, : s.inputs]
+    return A, B, observable[0], responses[0], constant
+
+
+def _simulate(
+    A: NDArray[np.float64], B: NDArray[np.float64], C: NDArray[np.float64], D: NDArray[np.float64],
+    u: NDArray[np.float64],
+) -> NDArray[np.float64]:  # fmt: skip
+    y = np.empty((len(u), 1))
+    x = np.linalg.lstsq(np.eye(len(A)) - A, B @ u[0], rcond=None)[0]
+    linear_kernel.state_space(A, B, C[None], D[None], u, x, y)
+    return y[:, 0]
+
+
+def _fitted(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    engine = LevenbergMarquardt(
+        termination=Termination(max_iterations=LINEAR_ITERATIONS, tolerance=1e-3), evidence_after=None
+    )
+    everything = Group(name="all", members=np.arange(len(theta)))
+    prior = Prior(centre=theta, groups=(everything,), alphas=np.array([FLAT_ALPHA]), beta=1.0)
+    return engine.minimise(provider, theta, prior).theta
+
+
+def _unit_states(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same model with states that range to 1 over the records, where the hidden layer expects them."""
+    s = provider.template.sizes
+    paths = np.concatenate(provider.states(theta))
+    low, high = paths.min(axis=0), paths.max(axis=0)
+    scale, centre = np.maximum((high - low) / 2.0, 1e-9), (high + low) / 2.0
+    M = theta[s.linear].reshape(s.states, s.row).copy()
+    A, L = M[:, : s.states].copy(), theta[s.output].copy()
+    M[:, : s.states] = A * scale / scale[:, None]
+    M[:, s.states :] /= scale[:, None]
+    M[:, -1] += (A @ centre - centre) / scale
+    changed = theta.copy()
+    changed[s.linear] = M.ravel()
+    changed[s.output] = np.concatenate([L[: s.states] * scale, L[s.states : -1], [L[-1] + L[: s.states] @ centre]])
+    E = theta[s.start].reshape(s.states, -1) / scale[:, None]
+    E[:, -1] -= centre / scale
+    changed[s.start] = E.ravel()
+    changed[s.count :] = ((theta[s.count :].reshape(-1, s.states) - centre) / scale).ravel()
+    return changed

@@ -1,0 +1,214 @@
+r"""The prelude to a free run: one step ahead on samples that fill the space of the regressors.
+
+A free run is dear to train from a random start: each iteration runs over every sample of every record, most of which
+say the same (a system at rest, held, slowly charging), and far from a minimum the errors of all earlier samples stand
+in the way of each one. The step that the recursion makes is a function of its regressors, though, and a function can be
+learnt from few samples if they are the right ones. The prelude therefore
+
+1. takes ``samples`` of all records, with probability falling with the root of how many others stand in the same cell
+   of the regressors' space. Cells are spaced by :math:`\operatorname{arsinh}(x / 0.01)`: what drives a system is often
+   small most of the time, and its sign matters there;
+2. draws hidden weights of very different sharpness, log-uniform from :data:`SMOOTHEST` to :data:`SHARPEST`, each
+   neuron's kink through one of the samples: valves, limits and friction switch within a hundredth of the range, where a
+   layer that tiles the unit cube evenly (Nguyen and Widrow 1990) has no neuron;
+3. minimises the one-step error on them, with the same engine and priors.
+
+What comes out is not yet a simulator, since errors one step ahead say little of how they add up, but it is a start from
+which the free run converges in tens of iterations instead of hundreds.
+
+Limits: with measured noise the one-step minimum is biased (errors in the regressors), and a prelude of many iterations
+leads away from where a short one does; the samples chosen are in memory with their Jacobian block by block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.least_squares.basis import RegressorBasis
+from sysid.estimation.linear.regression import lagged
+from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
+from sysid.estimation.networks.provider import BLOCK, AbstractProvider, Experiment, Linearisation
+from sysid.models import NARXModel
+
+SMOOTHEST, SHARPEST = 0.7, 100.0
+"""Least and greatest length of a neuron's weights at the start, over regressors of size 1. At 100 a neuron switches
+within a hundredth of the range."""
+
+CELLS = 14
+"""Cells along each regressor in which samples are counted."""
+
+FINEST = 1e-2
+"""Size of a scaled regressor below which cells are evenly spaced, and above which they widen in proportion."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StepSamples(AbstractProvider):
+    """One-step residuals at chosen samples, as a function of parameters in the basis of training.
+
+    Args:
+        layout: Where the parameters stand; with a linear part.
+        regressors: In the basis, shape ``(n_samples, n_regressors)``.
+        target: Scaled output, shape ``(n_samples,)``.
+    """
+
+    layout: Layout
+    regressors: NDArray[np.float64]
+    target: NDArray[np.float64]
+    n_samples: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "n_samples", len(self.target))
+
+    @classmethod
+    def of(
+        cls,
+        template: NARXModel,
+        experiments: Sequence[Experiment],
+        layout: Layout,
+        basis: RegressorBasis,
+        *,
+        samples: int,
+        seed: int,
+    ) -> StepSamples:
+        """Choose samples of some records.
+
+        Args:
+            template: The model, for its scaling and lags.
+            experiments: The records; samples of weight zero are never chosen.
+            layout: Where the parameters stand.
+            basis: The basis of training.
+            samples: How many to choose; all of them where there are fewer.
+            seed: Of the choice.
+
+        Returns:
+            The provider.
+        """
+        rows, targets = [], []
+        for experiment in experiments:
+            u, y = template.recursion.extended(experiment.inputs, experiment.history)
+            target = template.scaling.scale_output(experiment.output)
+            y[-len(target) :] = target
+            counted = np.ones(len(target), dtype=bool) if experiment.weights is None else experiment.weights > 0.0
+            rows.append(lagged(u, y, layout.lags, len(target))[counted])
+            targets.append(target[counted])
+        regressors = (np.concatenate(rows) - basis.centre) @ basis.matrix.T
+        chosen = space_filling(regressors, samples, np.random.default_rng(seed))
+        return cls(
+            layout=layout,
+            regressors=np.ascontiguousarray(regressors[chosen]),
+            target=np.concatenate(targets)[chosen],
+        )
+
+    def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A random start with kinks of every sharpness, where the samples are.
+
+        Args:
+            rng: Source of randomness.
+            centre: Where the linear part starts, shape ``(n_parameters,)``.
+
+        Returns:
+            Flat parameters in the basis.
+        """
+        k, r = self.layout.neurons, self.regressors.shape[1]
+        theta = centre.copy()
+        directions = rng.standard_normal((k, r))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        sharpness = np.exp(rng.uniform(np.log(SMOOTHEST), np.log(SHARPEST), k))
+        weights = sharpness[:, None] * directions
+        through = self.regressors[rng.integers(len(self.regressors), size=k)]
+        theta[self.layout.hidden] = np.concatenate([weights.ravel(), -np.sum(weights * through, axis=1)])
+        theta[self.layout.readout] = READOUT_SPREAD * rng.standard_normal(k) / sharpness
+        if self.layout.gated:
+            theta[self.layout.gates] = (READOUT_SPREAD * rng.standard_normal((k, r)) / sharpness[:, None]).ravel()
+        return theta
+
+    def loss(self, theta: NDArray[np.float64]) -> float:
+        """Half the sum of squared residuals; see the base class."""
+        total = 0.0
+        for rows in self._blocks():
+            residual = self._pass(theta, rows).residual
+            total += 0.5 * float(residual @ residual)
+        return total if np.isfinite(total) else np.inf
+
+    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+        """Loss, gradient and Gauss-Newton matrix; see the base class.
+
+        Samples that were chosen for being different are independent, so that the correlation time is 1.
+        """
+        loss, gradient, matrix = 0.0, np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
+        for rows in self._blocks():
+            passed = self._pass(theta, rows)
+            J = self._jacobian(passed, len(theta))
+            loss += 0.5 * float(passed.residual @ passed.residual)
+            gradient += J.T @ passed.residual
+            matrix += J.T @ J
+        return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix)
+
+    def _blocks(self) -> list[slice]:
+        return [slice(first, first + BLOCK) for first in range(0, self.n_samples, BLOCK)]
+
+    def _pass(self, theta: NDArray[np.float64], rows: slice) -> _Pass:
+        layout, x = self.layout, self.regressors[rows]
+        k, r = layout.neurons, x.shape[1]
+        affine = theta[layout.affine]
+        h = np.tanh(x @ theta[: k * r].reshape(k, r).T + theta[k * r : k * (r + 1)])
+        g = np.broadcast_to(theta[layout.readout], h.shape)
+        if layout.gated:
+            g = g + x @ theta[layout.gates].reshape(k, r).T
+        return _Pass(x, h, g, np.sum(g * h, axis=1) + affine[0] + x @ affine[1:] - self.target[rows])
+
+    def _jacobian(self, passed: _Pass, n_parameters: int) -> NDArray[np.float64]:
+        layout, x, h = self.layout, passed.x, passed.h
+        k, r = layout.neurons, x.shape[1]
+        slopes = (1.0 - h * h) * passed.g
+        J = np.empty((len(x), n_parameters))
+        J[:, : k * r] = (slopes[:, :, None] * x[:, None, :]).reshape(len(x), -1)
+        J[:, k * r : k * (r + 1)] = slopes
+        J[:, layout.readout] = h
+        J[:, layout.affine.start] = 1.0
+        J[:, layout.affine.start + 1 : layout.affine.stop] = x
+        if layout.gated:
+            J[:, layout.gates] = (h[:, :, None] * x[:, None, :]).reshape(len(x), -1)
+        return J
+
+
+@dataclass(frozen=True, eq=False)
+class _Pass:
+    """Some samples: regressors, activations, what stands before each activation, residuals."""
+
+    x: NDArray[np.float64]
+    h: NDArray[np.float64]
+    g: NDArray[np.float64]
+    residual: NDArray[np.float64]
+
+
+def space_filling(regressors: NDArray[np.float64], samples: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Samples that fill the space of the regressors more evenly than all of them do.
+
+    Args:
+        regressors: Scaled to size 1, shape ``(n_samples, n_regressors)``.
+        samples: How many to choose; all of them where there are fewer.
+        rng: Source of randomness.
+
+    Returns:
+        Their positions in ascending order.
+
+    Example:
+        >>> crowd = np.zeros((1000, 1))
+        >>> crowd[500:510, 0] = np.linspace(-1.0, 1.0, 10)
+        >>> chosen = space_filling(crowd, 40, np.random.default_rng(0))
+        >>> len(chosen), int(np.isin(np.arange(500, 510), chosen).sum())  # 1 % of the samples, 10 % of the choice
+        (40, 4)
+    """
+    if len(regressors) <= samples:
+        return np.arange(len(regressors))
+    spread = np.arcsinh(regressors / FINEST) / np.arcsinh(1.0 / FINEST)
+    cells = np.clip(((spread + 1.0) * (CELLS / 2)).astype(np.int64), 0, CELLS - 1)
+    _, place, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    probability = 1.0 / np.sqrt(counts[place.ravel()])
+    chosen = rng.choice(len(regressors), samples, replace=False, p=probability / probability.sum())
+    return np.sort(chosen).astype(np.int64)

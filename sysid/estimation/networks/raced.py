@@ -1,0 +1,133 @@
+"""What a race of starts found, as the result of a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.attempts import Attempt
+from sysid.estimation.networks import multistart as starts
+from sysid.estimation.networks.choosing import Choice
+from sysid.estimation.networks.training import Training
+from sysid.estimation.result import FitResult, Status
+from sysid.models import History
+
+
+def raced_status(
+    chosen: starts.Candidate,
+    candidates: Sequence[starts.Candidate],
+    records: Sequence[tuple[NDArray[np.float64], History | None]],
+    *,
+    interrupted: bool,
+) -> Status:
+    """How a race ended.
+
+    Args:
+        chosen: The candidate chosen.
+        candidates: All of them.
+        records: Inputs and history of each record over which the free run must stay within its bounds.
+        interrupted: Whether the race was.
+
+    Returns:
+        The status.
+    """
+    if interrupted:
+        return Status.INTERRUPTED
+    if any(_leaves_its_bounds(chosen.model, inputs, history) for inputs, history in records):
+        return Status.UNSTABLE
+    iteration = chosen.solution.state.iteration
+    later = any(c.number == chosen.number and c.solution.state.iteration > iteration for c in candidates)
+    return Status.STOPPED_EARLY if later else chosen.solution.status
+
+
+def _leaves_its_bounds(model: starts.Network, inputs: NDArray[np.float64], history: History | None) -> bool:
+    scaled = model.scaling.scale_output(model.simulate(inputs, history))
+    return not bool(np.all(np.abs(scaled) < model.clamp * (1.0 - 1e-9)))
+
+
+def raced_result(
+    choice: Choice,
+    candidates: Sequence[starts.Candidate],
+    training: Training,
+    status: Status,
+    seconds: float,
+) -> FitResult:
+    """What a race found.
+
+    Args:
+        choice: The candidate chosen.
+        candidates: All of them, for the attempts.
+        training: How they were trained.
+        status: How it ended.
+        seconds: Wall time.
+
+    Returns:
+        The result.
+    """
+    chosen = choice.chosen
+    curve = chosen.solution.curve
+    scale = chosen.model.scaling.output_scale**2
+    return FitResult(
+        model=chosen.model,
+        status=status,
+        loop=training.loop,
+        history={
+            "iteration": np.array([entry.iteration for entry in curve], dtype=np.float64),
+            "mse": np.array([entry.mse * scale for entry in curve]),
+            "effective_parameters": np.array([entry.effective_parameters for entry in curve]),
+            "elapsed_s": np.array([entry.elapsed_s for entry in curve]),
+        },
+        train_time_s=seconds,
+        seed=chosen.seed,
+        evidence=chosen.solution.evidence,
+        attempts=_attempts(choice, candidates),
+        notes=_notes(choice, candidates, training),
+    )
+
+
+def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[Attempt, ...]:
+    scale = choice.chosen.model.scaling.output_scale**2
+    found = [
+        Attempt(
+            start=candidate.number + 1,
+            seed=candidate.seed,
+            iterations=candidate.solution.state.iteration,
+            elapsed_s=candidate.solution.curve[-1].elapsed_s,
+            estimation_mse=candidate.solution.curve[-1].mse * scale,
+            selection_mse=candidate.score,
+            log_evidence=candidate.log_evidence,
+            effective_parameters=candidate.solution.curve[-1].effective_parameters,
+            stable=stable,
+            chosen=candidate is choice.chosen,
+            members=tuple(number + 1 for number in candidate.members),
+            without=candidate.without,
+        )
+        for candidate, stable in zip(candidates, choice.stable, strict=True)
+    ]
+    return tuple(sorted(found, key=lambda attempt: (attempt.start, attempt.iterations)))
+
+
+def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
+    notes = []
+    if training.starts > 1:
+        by_selection = training.choose_by == "selection" and np.isfinite(choice.chosen.score)
+        by_evidence = choice.chosen.solution.evidence is not None
+        how = "the largest evidence" if by_evidence else "the least error on the estimation traces"
+        how = "the least error on the selection traces (geometric mean)" if by_selection else how
+        notes.append(f"Chosen by {how} among {training.starts} starts looked at {len(candidates)} times.")
+    if choice.chosen.members:
+        single = [
+            c.score
+            for c, stable in zip(candidates, choice.stable, strict=True)
+            if not c.members and stable is not False and np.isfinite(c.score)
+        ]
+        notes.append(
+            f"A committee: the mean of {len(choice.chosen.members)} one-step maps as one network. Its error on the "
+            f"selection traces is {choice.chosen.score:.3g}, that of the best single start {min(single):.3g}."
+        )
+    refused = sum(stable is False for stable in choice.stable)
+    if refused and any(choice.stable):
+        notes.append(f"{refused} that ranked higher were passed over: their free run is not stable.")
+    return tuple(notes)

@@ -1,0 +1,1 @@
+"""The train in motion: vehicles, couplers, brakes at every car."""

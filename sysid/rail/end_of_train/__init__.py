@@ -1,0 +1,1 @@
+"""The two-way end-of-train device: head end and tail unit."""

@@ -1,0 +1,153 @@
+"""Stops by the deceleration controller as command vectors: what an automatic driver asks of the brake.
+
+The controller's signal is a share of the full service brake. A direct-release brake cannot be let off in part: its
+handle goes down with the signal in steps and up in one move, when the controller no longer asks for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models import ARX, ARXModel, Mapping
+from sysid.rail.constants import MPH
+from sysid.rail.transit.deceleration import COAST, FULL_SERVICE, Characteristic, identify_characteristic
+from sysid.rail.transit.transit import DecelerationController, TransitVehicle, stop_trace
+from sysid.traces import Channel, Trace
+
+SAMPLE_TIME = 0.1
+"""In s."""
+
+LAGS = (0.15, 0.25)
+"""Of the cylinder behind the commanded pressure in s, one after the other (ours)."""
+
+
+def servo(sample_time: float = SAMPLE_TIME) -> ARXModel:
+    """The vehicle's brake: two lags from the commanded pressure to the cylinder.
+
+    Args:
+        sample_time: In s.
+
+    Returns:
+        A model with the mapping ``PC -> BC`` in psi.
+
+    Example:
+        >>> import numpy as np
+        >>> model = servo()
+        >>> float(np.round(model.coefficients.sum(), 9))  # a gain of one: b0 + a1 + a2 = 1
+        1.0
+    """
+    fast, slow = (float(np.exp(-sample_time / lag)) for lag in LAGS)
+    return ARXModel(
+        orders=ARX(na=2, nb=(1,), nk=(1,)),
+        coefficients=np.array([(1.0 - fast) * (1.0 - slow), fast + slow, -fast * slow]),
+        intercept=0.0,
+        mapping=Mapping.parse("PC -> BC"),
+        sample_time=sample_time,
+        input_units=("psi",),
+        output_unit="psi",
+        rest_output=0.0,
+    )
+
+
+def characteristic_of(model: ARXModel) -> Characteristic:
+    """The brake characteristic, found from a slow application of a fast vehicle.
+
+    Args:
+        model: Its brake.
+
+    Returns:
+        The characteristic.
+    """
+    vehicle = TransitVehicle(model=model, speed=2000.0)
+    signals = np.concatenate([np.full(50, COAST), np.linspace(COAST, FULL_SERVICE, 2000)])
+    rates = np.empty(len(signals))
+    for k, signal in enumerate(signals):
+        vehicle.step(float(signal))
+        rates[k] = -vehicle.acceleration
+    channels = (Channel(name="P", unit="mA"), Channel(name="A", unit="m/s^2"))
+    values = np.column_stack([signals, rates])
+    trace = Trace(name="slow", sample_time=model.sample_time, channels=channels, values=values)
+    return identify_characteristic(trace)
+
+
+def speed_commands(
+    seed: int,
+    duration: float,
+    *,
+    speeds: tuple[float, ...] = (40.0, 30.0, 20.0, 10.0),
+    hold: tuple[float, float] = (20, 90),
+) -> NDArray[np.float64]:
+    """Random speed commands in m/s: each other than the one before, held for a random time.
+
+    Args:
+        seed: Any integer of at least 0.
+        duration: In s.
+        speeds: That may be commanded, in mph; the first is where it begins.
+        hold: Shortest and longest time in s.
+
+    Returns:
+        Shape ``(n_samples,)``.
+    """
+    rng = np.random.default_rng(seed)
+    parts, present, filled = [], speeds[0], 0
+    total = round(duration / SAMPLE_TIME)
+    while filled < total:
+        count = round(float(rng.uniform(*hold)) / SAMPLE_TIME)
+        parts.append(np.full(count, present * MPH))
+        filled += count
+        present = float(rng.choice([speed for speed in speeds if speed != present]))
+    return np.concatenate(parts)[:total]
+
+
+def handle_of_signal(
+    signal: NDArray[np.float64],
+    *,
+    running: float = 90.0,
+    first: float = 5.8,
+    deepest: float = 25.8,
+    step: float = 2.0,
+) -> NDArray[np.float64]:
+    """The handle of a direct-release brake that follows the controller's signal.
+
+    Args:
+        signal: P in mA, shape ``(n_samples,)``.
+        running: Released handle in psi gauge.
+        first: Smallest reduction in psi.
+        deepest: Of full service in psi, at 20 mA.
+        step: Between further reductions in psi (ours).
+
+    Returns:
+        Handle in psi gauge, same shape.
+
+    Example:
+        >>> handle_of_signal(np.array([70.0, 58.0, 45.0, 50.0, 20.0, 60.0])).tolist()
+        [90.0, 84.2, 82.2, 82.2, 64.2, 90.0]
+    """
+    handle, depth = np.empty(len(signal)), 0.0
+    for k, value in enumerate(signal):
+        share = (COAST - min(float(value), COAST)) / (COAST - FULL_SERVICE)
+        if share <= 0.0:
+            depth = 0.0
+        else:
+            asked = first + step * np.floor(max(0.0, share * deepest - first) / step)
+            depth = max(depth, deepest if share >= 1.0 else float(asked))
+        handle[k] = round(running - depth, 6)
+    return handle
+
+
+def stop_cycle(seed: int, duration: float, *, friction: float = 1.0) -> NDArray[np.float64]:
+    """The handle of a vehicle whose controller follows random speed commands.
+
+    Args:
+        seed: Of the commands.
+        duration: In s.
+        friction: Of the shoes, 1 being nominal.
+
+    Returns:
+        Handle in psi gauge, one per 0.1 s.
+    """
+    model, commands = servo(), speed_commands(seed, duration)
+    controller = DecelerationController(characteristic=characteristic_of(model), sample_time=SAMPLE_TIME)
+    vehicle = TransitVehicle(model=model, friction=friction, speed=float(commands[0]))
+    return handle_of_signal(np.array(stop_trace(vehicle, controller, commands)["P"]))

@@ -1,0 +1,1 @@
+"""The line: profile, terrain features, the driver's track card."""

@@ -1,0 +1,145 @@
+"""What to do about a crest or a sag: the handling that the source of the terrain features suggests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid.errors import ConfigError
+from sysid.rail.constants import GRAVITY, KMH
+from sysid.rail.dynamics.train import Train
+from sysid.rail.track.features import Feature, Severity
+from sysid.rail.track.terrain import Shape, effective_grade, quasi_static_forces
+from sysid.rail.track.track import TrackProfile
+
+SPEED_GAINS = {Severity.LOW: 8.0 * KMH, Severity.MEDIUM: 5.0 * KMH, Severity.HIGH: 3.0 * KMH, Severity.NONE: np.inf}
+"""Largest gain of speed in m/s over a crest (the source: predetermined, falling with severity; values ours)."""
+
+SAG_SHARE = 1.0
+"""Share of the natural acceleration that the locomotives hold through a sag (the source: preferably near unity)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrestHandling:
+    """Over a crest: cut power until at least half of the train is past the apex, and hold the gain of speed.
+
+    Args:
+        power_allowed: Whether half of the train's mass is past the apex.
+        share_past: Share of the mass past the apex, 0 to 1.
+        largest_speed_gain: In m/s since the leading end reached the apex.
+        car_at_apex: Number from 1 of the vehicle on the apex; 0 before it, one more than the last behind it.
+        mass_before: Mass in kg still on the way up.
+        mass_past: Mass in kg on the way down.
+    """
+
+    power_allowed: bool
+    share_past: float
+    largest_speed_gain: float
+    car_at_apex: int
+    mass_before: float
+    mass_past: float
+
+
+def crest_handling(feature: Feature, shape: Shape, x: float) -> CrestHandling:
+    """What the source suggests at a crest, and what it shows the driver.
+
+    Args:
+        feature: The crest.
+        shape: The train.
+        x: Of its leading end in m.
+
+    Returns:
+        The handling.
+
+    Raises:
+        ConfigError: If the feature is not a crest.
+    """
+    if feature.kind != "crest":
+        raise ConfigError("not a crest", where="feature", expected="a crest", got=feature.kind)
+    past = shape.mass_ahead(max(0.0, x - feature.apex))
+    return CrestHandling(
+        power_allowed=past >= 0.5 * shape.mass,
+        share_past=past / shape.mass,
+        largest_speed_gain=SPEED_GAINS[feature.severity],
+        car_at_apex=int(np.searchsorted(shape.edges, x - feature.apex, side="left")),
+        mass_before=shape.mass - past,
+        mass_past=past,
+    )
+
+
+def sag_acceleration(track: TrackProfile, shape: Shape, x: float, *, share: float = SAG_SHARE) -> float:
+    """Acceleration in m/s2 that the leading locomotives should hold through a sag.
+
+    It is a share of the train's natural acceleration, which is that of the grade under the whole train.
+
+    Args:
+        track: The line.
+        shape: The train.
+        x: Of its leading end in m.
+        share: Of the natural acceleration.
+
+    Returns:
+        In m/s2.
+    """
+    return float(-share * GRAVITY * effective_grade(track, shape, np.array([x]))[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceEstimate:
+    """The largest quasi-static coupler force at one place of the train.
+
+    Args:
+        force: In N, positive in draft.
+        coupler: Number from 1, the one behind vehicle ``coupler``.
+    """
+
+    force: float
+    coupler: int
+
+
+def peak_force(track: TrackProfile, train: Train, x: float) -> ForceEstimate:
+    """The largest coupler force that grades alone make, as the display shows it.
+
+    Args:
+        track: The line.
+        train: The train.
+        x: Of the first vehicle in m.
+
+    Returns:
+        The estimate.
+    """
+    forces = quasi_static_forces(track, train, x)
+    at = int(np.argmax(np.abs(forces)))
+    return ForceEstimate(force=float(forces[at]), coupler=at + 1)
+
+
+def sub_trains(train: Train) -> tuple[Shape, ...]:
+    """The parts of a distributed-power train, one for each group of locomotives.
+
+    The wagons between two groups are shared so that every group has mass in proportion to its locomotives; a node
+    never lies inside a group.
+
+    Args:
+        train: The train.
+
+    Returns:
+        One shape per group, front first; the whole train if there is one group or none.
+    """
+    groups: list[list[int]] = []
+    for index in train.powered:
+        if groups and groups[-1][-1] == index - 1:
+            groups[-1].append(index)
+        else:
+            groups.append([index])
+    if len(groups) < 2:
+        return (Shape.of(train),)
+    shares = np.cumsum([len(group) for group in groups]) / sum(len(group) for group in groups)
+    masses = np.cumsum(train.masses)
+    shapes, first = [], 0
+    for k, group in enumerate(groups[:-1]):
+        wanted = int(np.searchsorted(masses, shares[k] * train.mass, side="left"))
+        last = int(np.clip(wanted, group[-1], groups[k + 1][0] - 1))
+        shapes.append(Shape.of(train, first, last))
+        first = last + 1
+    return (*shapes, Shape.of(train, first))

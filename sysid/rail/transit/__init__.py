@@ -1,0 +1,1 @@
+"""Transit vehicles and automatic operation."""

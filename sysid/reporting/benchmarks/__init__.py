@@ -1,0 +1,1 @@
+"""Benchmarks in a report: their findings and their page."""

@@ -1,0 +1,1 @@
+"""Beside others: published figures, and one run against another."""

@@ -1,0 +1,1 @@
+"""Pictures: plain functions of stored numbers."""

@@ -1,0 +1,163 @@
+"""Pictures of linear models: Bode and step responses and poles and zeros, with what is uncertain about them."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy import signal
+
+from sysid.estimation.linear.uncertainty import Uncertainty
+from sysid.models.to_control import state_space
+from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
+from sysid.reporting.linear_view import LinearModel, LinearView, linear_views
+
+BAND = (2.5, 97.5)
+"""Percentiles of a band."""
+BAND_COLOUR = "#DDDDDD"
+CLOUD = 600
+"""Poles shown of a cloud: more cannot be told apart, and each costs a hundred characters of the page."""
+REACH = 1.5
+"""How far from the origin the z plane is shown."""
+SHOWN = 400
+"""Samples shown of a step response."""
+
+
+def bode_figure(model: LinearModel, uncertainty: Uncertainty | None, *, seed: int = 0, points: int = 200) -> Figure:
+    """Magnitude and phase of every input, with 95 % bands.
+
+    Args:
+        model: The model.
+        uncertainty: Of its parameters, as its fit gives it; without it there are no bands.
+        seed: Of the draws for the bands.
+        points: Frequencies, up to the Nyquist frequency.
+
+    Returns:
+        One column per input.
+    """
+    frequency = np.pi / model.sample_time * np.logspace(-4.0, 0.0, points)
+    views = linear_views(model, uncertainty, seed)
+    with styled():
+        figure = new_figure(7.6, 4.2)
+        axes = figure.subplots(2, len(views), sharex=True, squeeze=False)
+        for j, view in enumerate(views):
+            responses = view.responses(frequency)
+            shown, drawn = responses[0], responses[1:]
+            above, below = axes[0, j], axes[1, j]
+            phase = np.unwrap(np.angle(shown))
+            if len(drawn):
+                gains = np.percentile(np.abs(drawn), BAND, axis=0)
+                above.fill_between(frequency, *gains, color=BAND_COLOUR, label="95 %")
+                around = np.percentile(phase + np.angle(drawn / shown), BAND, axis=0)
+                below.fill_between(frequency, *np.degrees(around), color=BAND_COLOUR)
+            above.loglog(frequency, np.abs(shown), color=PALETTE[0], label=view.name)
+            below.semilogx(frequency, np.degrees(phase), color=PALETTE[0])
+            above.set_ylabel(f"gain [{model.output_unit}/{view.unit}]")
+            below.set_ylabel("phase [degrees]")
+            below.set_xlabel("frequency [rad/s]")
+            above.legend(loc="lower left")
+        return figure
+
+
+def step_figure(
+    model: LinearModel, uncertainty: Uncertainty | None = None, *, samples: int | None = None, seed: int = 0
+) -> Figure:
+    """Response of the output to a step of one unit in every input, through python-control, with 95 % bands.
+
+    Args:
+        model: The model.
+        uncertainty: Of its parameters; without it there are no bands.
+        samples: Length; by default until the slowest pole has settled, 3000 at most.
+        seed: Of the draws for the bands.
+
+    Returns:
+        One panel per input.
+    """
+    import control
+
+    system = state_space(model)
+    views = linear_views(model, uncertainty, seed)
+    with styled():
+        figure = new_figure(7.6, 2.8)
+        axes = figure.subplots(1, len(views), squeeze=False)[0]
+        for place, view in zip(axes, views, strict=True):
+            n = samples or _settling(view)
+            time = np.arange(n) * model.sample_time
+            response = control.step_response(system[0, model.mapping.inputs.index(view.name)], time)
+            y = np.squeeze(response.outputs)
+            every = -(-n // SHOWN)
+            if len(view.B) > 1:
+                # A draw that is not stable must not take the picture with it.
+                room = max(float(np.ptp(y)), 1e-12)
+                band = np.percentile(_step_responses(view, n), BAND, axis=0)[:, ::every]
+                low, high = np.clip(band, y.min() - room, y.max() + room)
+                place.fill_between(time[::every], low, high, color=BAND_COLOUR, label="95 %")
+            shape = "steps-post" if every == 1 else "default"
+            place.plot(
+                time[::every], y[::every], drawstyle=shape, color=PALETTE[0], label=f"{view.name}, 1 {view.unit}"
+            )
+            place.set_xlabel("time [s]")
+            place.set_ylabel(f"{model.mapping.output} [{model.output_unit}]")
+            place.legend()
+        return figure
+
+
+def pole_zero_figure(model: LinearModel, uncertainty: Uncertainty | None, *, seed: int = 0) -> Figure:
+    """Poles and zeros of every input, with the cloud of poles that the uncertainty allows.
+
+    Args:
+        model: The model.
+        uncertainty: Of its parameters; without it there is no cloud.
+        seed: Of the draws.
+
+    Returns:
+        One panel per input.
+    """
+    views = linear_views(model, uncertainty, seed)
+    with styled():
+        figure = new_figure(7.6, 3.8)
+        axes = figure.subplots(1, len(views), squeeze=False)[0]
+        for place, view in zip(axes, views, strict=True):
+            poles, zeros = view.roots(view.F[0]), view.roots(view.B[0])
+            draws = view.F[1 : 1 + CLOUD // max(len(poles), 1)]
+            if len(draws):
+                cloud = np.concatenate([view.roots(f) for f in draws])
+                place.plot(cloud.real, cloud.imag, ".", color="#BBBBBB", markersize=2, label=f"{len(draws)} draws")
+            for roots, marker, kind in ((poles, "x", "poles"), (zeros, "o", "zeros")):
+                far = int(np.count_nonzero(np.abs(roots) > REACH)) if view.discrete else 0
+                label = f"{kind} ({far} outside)" if far else kind
+                place.plot(roots.real, roots.imag, marker, color=PALETTE[0], fillstyle="none", label=label)
+            if view.discrete:
+                angle = np.linspace(0.0, 2.0 * np.pi, 200)
+                place.plot(np.cos(angle), np.sin(angle), color=TARGET, linewidth=0.6)
+                place.set_aspect("equal")
+                # A zero of fast sampling may lie a hundred units off, and would shrink the circle to a dot.
+                place.set_xlim(-REACH, REACH)
+                place.set_ylim(-REACH, REACH)
+            else:
+                place.axvline(0.0, color=TARGET, linewidth=0.6)
+            place.set_title(view.name)
+            place.legend(loc="lower left")
+        return figure
+
+
+def _settling(view: LinearView) -> int:
+    """Samples until the slowest pole has settled to a hundredth, 50 to 3000; 300 where it never does."""
+    poles = view.roots(view.F[0])
+    rate = poles.real * view.sample_time if not view.discrete else np.log(np.maximum(np.abs(poles), 1e-6))
+    slowest = float(rate.max(initial=-1.0))
+    return int(np.clip(np.ceil(-5.0 / slowest), 50, 3000)) + view.delay if slowest < 0.0 else 300
+
+
+def _step_responses(view: LinearView, n: int) -> NDArray[np.float64]:
+    """Step responses of the drawn models, shape ``(n_draws, n)``; inputs of continuous ones are held."""
+    found = np.zeros((len(view.B) - 1, n))
+    step = np.ones(max(n - view.delay, 0))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for row, b, f in zip(found, view.B[1:], view.F[1:], strict=True):
+            if view.discrete:
+                row[view.delay :] = signal.lfilter(b, f, step)
+            else:
+                time = np.arange(len(step)) * view.sample_time
+                row[view.delay :] = signal.step((b[::-1], f[::-1]), T=time)[1]
+    return np.nan_to_num(found)

@@ -1,0 +1,1 @@
+"""A judgement in a report: its stored results and its tables."""

@@ -1,0 +1,1 @@
+"""A sweep in a report: its record, tables, pictures and section."""

@@ -1,0 +1,1 @@
+"""Pipelines of kind fits: configuration, data, steps, stored results."""

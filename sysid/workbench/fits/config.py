@@ -1,0 +1,338 @@
+"""The pipeline's YAML: what is fitted to which data, how, and what comes out; every field checked by name."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
+
+from sysid.content import content_folders
+from sysid.errors import ConfigError
+from sysid.estimation import Training
+from sysid.models import ARX, NARX, NeuralStateSpace, Start, TransferFunction
+from sysid.workbench.annotation import AnnotateConfig
+from sysid.workbench.fields import (
+    STRICT,
+    FormatField,
+    MappingField,
+    StartField,
+    StructureField,
+    TrainingConfig,
+    as_field_error,
+)
+from sysid.workbench.runner.naming import slug
+from sysid.workbench.stability import StabilityConfig
+from sysid.yaml_files import FieldError, check, parse_yaml, read_yaml
+
+
+class FitConfig(BaseModel):
+    """One fit.
+
+    Args:
+        name: Name in tables, different for each fit.
+        structure: What is fitted, with its ``kind``.
+        training: How a network is trained; a linear model has nothing to choose.
+        initial: Name of an earlier fit to start from.
+    """
+
+    model_config = STRICT
+
+    name: str = Field(min_length=1)
+    structure: StructureField
+    training: TrainingConfig | None = None
+    initial: str | None = None
+
+    @property
+    def slug(self) -> str:
+        """Name of the fit's folder."""
+        return slug(self.name)
+
+    @model_validator(mode="after")
+    def _check(self) -> FitConfig:
+        linear = isinstance(self.structure, ARX | TransferFunction)
+        if linear and (self.training is not None or self.initial is not None):
+            raise FieldError(
+                f"the fit {self.name!r} has a training or an initial fit, but is {self.structure.kind}",
+                expected="neither: a linear model finds its own start",
+                remedy="remove training and initial",
+            )
+        if isinstance(self.structure, NeuralStateSpace) and self.initial is not None:
+            raise FieldError(
+                f"the fit {self.name!r} has an initial fit, but is {self.structure.kind}",
+                expected="none: a neural state space begins at the best linear one",
+                remedy="remove initial",
+            )
+        try:
+            self.training_options(seed=0)
+        except ConfigError as error:
+            raise as_field_error(error) from error
+        return self
+
+    def training_options(self, seed: int) -> Training:
+        """The options of the training, with the pipeline's seed where the fit names none.
+
+        Args:
+            seed: The pipeline's seed.
+
+        Returns:
+            The options.
+        """
+        given: dict[str, Any] = {"seed": seed}
+        if self.training is not None:
+            given |= {name: getattr(self.training, name) for name in self.training.model_fields_set}
+        return Training(**given)
+
+
+class ExportConfig(BaseModel):
+    """What leaves the workbench.
+
+    Args:
+        fit: Name of a fit, or ``best``: least free-run error on the selection traces.
+        formats: File formats.
+        tolerance: Largest difference allowed between a file and its model, in the output's unit.
+        run_times: Whether every file is timed beside the model's own free run; some seconds a format.
+    """
+
+    model_config = STRICT
+
+    fit: str = "best"
+    formats: tuple[FormatField, ...] = ("onnx", "torchscript")
+    tolerance: float = Field(default=1e-9, gt=0.0)
+    run_times: bool = False
+
+
+class ReportConfig(BaseModel):
+    """What the report shows beside our own figures.
+
+    Args:
+        published: Name of a table of published figures.
+    """
+
+    model_config = STRICT
+
+    published: str | None = None
+
+
+def _as_list(value: object) -> object:
+    return [value] if isinstance(value, str) else value
+
+
+class PipelineConfig(BaseModel):
+    """A pipeline.
+
+    Args:
+        kind: ``fits``; other kinds of pipelines are in :mod:`sysid.workbench.kinds`.
+        name: Name of the run folder; letters, digits, dots, dashes and underscores.
+        description: What it is for.
+        data: Name of a data set, or path of its ``dataset.yaml``.
+        selection: Data set with traces that choose between fits; validation cases never do.
+        mapping: Inputs and output, such as ``BP+AR -> BC``.
+        start: How each free run begins.
+        rest: Value at rest of the output, by channel name, in its unit.
+        seed: Seed of everything random.
+        fits: What is fitted, in order.
+        export: What leaves the workbench; ``null`` for nothing.
+        report: What the report shows.
+        stability: Over which sequences a network's free run has to stay bounded and to settle.
+        annotate: Who says in which state each sample is, for errors by state and weights.
+    """
+
+    model_config = STRICT
+
+    kind: Literal["fits"] = "fits"
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    description: str = ""
+    data: str
+    selection: str | None = None
+    mapping: MappingField
+    start: StartField = Start()
+    rest: dict[str, float] = Field(default_factory=dict)
+    seed: int = Field(default=0, ge=0)
+    fits: Annotated[tuple[FitConfig, ...], BeforeValidator(_as_list)] = Field(min_length=1)
+    export: ExportConfig | None = ExportConfig()
+    report: ReportConfig = ReportConfig()
+    stability: StabilityConfig = StabilityConfig()
+    annotate: AnnotateConfig | None = None
+
+    @field_validator("fits")
+    @classmethod
+    def _check_fits(cls, fits: tuple[FitConfig, ...]) -> tuple[FitConfig, ...]:
+        earlier: dict[str, FitConfig] = {}
+        slugs: set[str] = set()
+        for fit in fits:
+            if fit.slug in slugs or fit.name == "best":
+                raise FieldError(
+                    f"the name {fit.name!r} cannot be told from another",
+                    expected="a different name for each fit, in letters and digits too, and not the word best",
+                    got=", ".join(other.name for other in fits),
+                    remedy="rename one of them",
+                )
+            if fit.initial is not None and fit.initial not in earlier:
+                near = difflib.get_close_matches(fit.initial, earlier, n=1)
+                raise FieldError(
+                    f"the fit {fit.name!r} starts from {fit.initial!r}, which is not an earlier fit",
+                    expected=f"one of {', '.join(earlier)}" if earlier else "no initial fit for the first one",
+                    got=fit.initial,
+                    remedy=f"did you mean {near[0]}?" if near else "name a fit that stands above it",
+                )
+            if fit.initial is not None and earlier[fit.initial].structure != fit.structure:
+                raise FieldError(
+                    f"the fit {fit.name!r} has another structure than {fit.initial!r}, which it starts from",
+                    expected=earlier[fit.initial].structure.label,
+                    got=fit.structure.label,
+                    remedy="use one structure for both, or remove initial",
+                )
+            earlier[fit.name] = fit
+            slugs.add(fit.slug)
+        return fits
+
+    @model_validator(mode="after")
+    def _check_names(self) -> PipelineConfig:
+        names = [fit.name for fit in self.fits]
+        if self.export is not None and self.export.fit not in ["best", *names]:
+            near = difflib.get_close_matches(self.export.fit, names, n=1)
+            raise FieldError(
+                f"export names the fit {self.export.fit!r}, which there is not",
+                expected=f"best, or one of {', '.join(names)}",
+                got=self.export.fit,
+                remedy=f"did you mean {near[0]}?" if near else "correct the name",
+            )
+        strangers = sorted(set(self.rest) - {self.mapping.output})
+        if strangers:
+            raise FieldError(
+                f"rest names {', '.join(strangers)}, which is not the output",
+                expected=self.mapping.output,
+                got=", ".join(strangers),
+                remedy=f"write rest: {{{self.mapping.output}: 0}}; inputs rest at their first sample",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_inputs(self) -> PipelineConfig:
+        n_inputs = len(self.mapping.inputs)
+        for fit in self.fits:
+            if isinstance(fit.structure, ARX) and len(fit.structure.nb) != n_inputs:
+                raise FieldError(
+                    f"the orders of the fit {fit.name!r} do not match the inputs",
+                    expected=f"{n_inputs} values of nb and of nk for {self.mapping}",
+                    got=f"{len(fit.structure.nb)} values",
+                    remedy="give one nb and one nk for each input",
+                )
+            if isinstance(fit.structure, TransferFunction) and len(fit.structure.poles) != n_inputs:
+                raise FieldError(
+                    f"the orders of the fit {fit.name!r} do not match the inputs",
+                    expected=f"{n_inputs} numbers of poles and of zeros for {self.mapping}",
+                    got=f"{len(fit.structure.poles)} numbers",
+                    remedy="give one number of poles and of zeros for each input",
+                )
+            if isinstance(fit.structure, NARX):
+                try:
+                    fit.structure.lags(n_inputs)
+                except ConfigError as error:
+                    raise as_field_error(error) from error
+        return self
+
+    @property
+    def rest_output(self) -> float | None:
+        """The output's declared value at rest, ``None`` where none is declared."""
+        return self.rest.get(self.mapping.output)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Pipeline:
+    """A pipeline and where it was read from.
+
+    Args:
+        config: The checked fields.
+        text: The YAML as written.
+        path: Its file.
+    """
+
+    config: PipelineConfig
+    text: str
+    path: Path
+
+
+def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
+    """The file of a pipeline.
+
+    Args:
+        name_or_path: A built-in or workspace pipeline's name, or a YAML file.
+        workspace: The user's workspace; ``None`` is the current folder.
+
+    Returns:
+        The file.
+
+    Raises:
+        ConfigError: If there is none.
+    """
+    given = Path(name_or_path)
+    if given.suffix in {".yaml", ".yml"} or len(given.parts) > 1:
+        if given.is_file():
+            return given
+        raise ConfigError(
+            "there is no such pipeline file", expected="a YAML file", got=name_or_path, remedy="check the path"
+        )
+    known: dict[str, Path] = {}
+    for folder in content_folders("pipelines", workspace=workspace):
+        for file in sorted(folder.glob("*.yaml")):
+            known.setdefault(file.stem, file)
+    if name_or_path in known:
+        return known[name_or_path]
+    near = difflib.get_close_matches(name_or_path, known, n=1)
+    raise ConfigError(
+        f"there is no pipeline named {name_or_path}",
+        expected=f"one of {', '.join(sorted(known))}, or the path of a YAML file" if known else "the path of a YAML",
+        got=name_or_path,
+        remedy=f"did you mean {near[0]}?" if near else "make a workspace with one: sysid init DIR",
+    )
+
+
+def read_pipeline(path: Path) -> Pipeline:
+    """Read and check a pipeline.
+
+    Args:
+        path: Its YAML file.
+
+    Returns:
+        The pipeline.
+
+    Raises:
+        ConfigError: Naming the file, the field and what is wrong with it.
+    """
+    config = check(PipelineConfig, read_yaml(path), where=path)
+    return Pipeline(config=config, text=path.read_text(encoding="utf-8-sig"), path=path.resolve())
+
+
+def parse_pipeline(text: str, *, where: object = "text") -> PipelineConfig:
+    """Check a pipeline that is not in a file.
+
+    Args:
+        text: The YAML.
+        where: Named in errors.
+
+    Returns:
+        The checked fields.
+
+    Raises:
+        ConfigError: Naming the field and what is wrong with it.
+
+    Example:
+        >>> text = '''
+        ... name: first
+        ... data: tank
+        ... mapping: pump -> level
+        ... fits: [{name: ARX, structure: {kind: ARX, na: 1, nb: [1], nk: [1]}}]
+        ... '''
+        >>> parse_pipeline(text).fits[0].structure.label
+        'ARX [1; 1; 1]'
+    """
+    return check(PipelineConfig, parse_yaml(text, where=where), where=where)
+
+
+def json_schema() -> dict[str, Any]:
+    """The YAML's JSON schema, for editors that complete and check while one types."""
+    return PipelineConfig.model_json_schema()

@@ -1,0 +1,134 @@
+"""What a pipeline works on: the traces that it names, with the roles that it needs, in the same terms."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sysid.content import content_folders
+from sysid.errors import ConfigError
+from sysid.traces import Role, Trace, TraceSet
+from sysid.workbench.annotation import annotated_set, find_annotator, weighted
+from sysid.workbench.fits.config import PipelineConfig
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Data:
+    """What a pipeline works on.
+
+    Args:
+        traces: The data set: every case that is scored.
+        selection: Traces that choose between fits and nothing else.
+        sequences: Traces over which a free run has to stay stable, where a data set of them is declared.
+    """
+
+    traces: TraceSet
+    selection: tuple[Trace, ...]
+    sequences: tuple[Trace, ...] = ()
+
+    @property
+    def estimation(self) -> tuple[Trace, ...]:
+        """The traces that are fitted."""
+        return self.traces.with_role(Role.ESTIMATION)
+
+
+def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str], None]) -> Data:
+    """Load the traces of a pipeline and check that they can do what it asks.
+
+    Args:
+        config: The pipeline.
+        beside: Folder of the pipeline's file: a path to a data set is relative to it.
+        progress: Told what is being done.
+
+    Returns:
+        The data.
+
+    Raises:
+        ConfigError: If no trace is for estimation, or a trace that chooses is also scored.
+        ChannelError: If a channel of the mapping is missing.
+    """
+    traces = _annotated(_load(config.data, beside, progress), config)
+    names = (*config.mapping.inputs, config.mapping.output)
+    traces.traces[0].columns(names)
+    if not traces.with_role(Role.ESTIMATION):
+        raise ConfigError(
+            "no trace is for estimation",
+            where=f"data set {traces.name}",
+            expected="a case with role: estimation",
+            got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
+            remedy="give a case that role in the data set's dataset.yaml",
+        )
+    selection = traces.with_role(Role.SELECTION)
+    if config.selection is not None:
+        chosen = _annotated(_load(config.selection, beside, progress), config)
+        selection = (*selection, *_selection_traces(chosen, traces, names))
+    sequences: tuple[Trace, ...] = ()
+    if config.stability.sequences is not None:
+        declared = _load(config.stability.sequences, beside, progress)
+        declared.traces[0].columns(names)
+        sequences = tuple(declared)
+    return Data(traces=traces, selection=selection, sequences=sequences)
+
+
+def _annotated(traces: TraceSet, config: PipelineConfig) -> TraceSet:
+    """The traces with states and weights, where the pipeline asks for them."""
+    if config.annotate is None:
+        return traces
+    annotator = find_annotator(config.annotate.by, where="annotate, by")
+    known = annotated_set(traces, annotator)
+    return dataclasses.replace(
+        known, traces=tuple(weighted(trace, annotator, config.annotate.weights) for trace in known)
+    )
+
+
+def _load(name: str, beside: Path, progress: Callable[[str], None]) -> TraceSet:
+    from sysid.ingest import load_dataset
+
+    local = beside / name
+    # A workspace is three folders side by side: its data sets are found from wherever it is run.
+    search = (beside.parent / "datasets", *content_folders("datasets"))
+    return load_dataset(
+        local if local.exists() else name,
+        search=search,
+        progress=lambda case, index, count: progress(f"{name}: {case} ({index + 1} of {count})"),
+    )
+
+
+def _selection_traces(chosen: TraceSet, traces: TraceSet, names: Sequence[str]) -> tuple[Trace, ...]:
+    """The traces that may choose: of that role, in the same terms, and not among those that are scored."""
+    found = chosen.with_role(Role.SELECTION)
+    if not found:
+        raise ConfigError(
+            "no trace is for selection",
+            where=f"data set {chosen.name}",
+            expected="a case with role: selection",
+            got=", ".join(f"{name}: {role.value}" for name, role in chosen.roles.items()),
+            remedy="give a case that role in the data set's dataset.yaml, or leave selection out",
+        )
+    scored = {trace.digest: trace.name for trace in traces if traces.roles[trace.name] is not Role.SELECTION}
+    for trace in found:
+        trace.columns(names)
+        if trace.digest in scored:
+            raise ConfigError(
+                f"the selection trace {trace.name} is the case {scored[trace.digest]}",
+                where=f"data set {chosen.name}",
+                expected="traces that are neither fitted nor scored",
+                remedy="a score counts only if nothing was chosen on it: use another trace",
+            )
+        ours, theirs = ([(t.channel(n).unit, t.channel(n).reference) for n in names] for t in (traces.traces[0], trace))
+        if ours != theirs or not math.isclose(trace.sample_time, traces.sample_time, rel_tol=1e-9):
+            raise ConfigError(
+                f"the selection trace {trace.name} is not in the terms of the data",
+                where=f"data set {chosen.name}",
+                expected=f"{_terms(traces.traces[0], names)}",
+                got=f"{_terms(trace, names)}",
+                remedy="convert or resample it at ingest",
+            )
+    return found
+
+
+def _terms(trace: Trace, names: Sequence[str]) -> str:
+    return f"{', '.join(trace.channel(name).label for name in names)} every {trace.sample_time:g} s"

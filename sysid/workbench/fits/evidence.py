@@ -1,0 +1,61 @@
+"""What a run says of its fits beyond their figures: what residuals are left, and whether a linear model is enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from sysid.errors import TraceError
+from sysid.estimation import FitResult
+from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
+from sysid.traces import Role
+from sysid.validation import analyse_residuals, judge_linearity
+from sysid.workbench.fits.config import PipelineConfig
+from sysid.workbench.fits.data import Data
+from sysid.workbench.runner.events import FitReady
+
+GROUPS: Final = {"estimation": (Role.ESTIMATION,), "unseen": (Role.VALIDATION, Role.TEST)}
+"""Cases whose residuals are analysed together, by their role."""
+
+
+def residuals(fit: FitResult, data: Data, config: PipelineConfig) -> dict[str, Any]:
+    """Analyse what a fit leaves one step ahead, on the cases that it was fitted to and on those it never saw.
+
+    Args:
+        fit: The fit.
+        data: The traces.
+        config: The pipeline.
+
+    Returns:
+        The contents of ``residuals.json``: by group its ``cases``, and its ``analysis`` or the ``reason`` why there is
+        none.
+    """
+    groups: dict[str, Any] = {}
+    for name, roles in GROUPS.items():
+        traces = [trace for trace in data.traces if data.traces.roles[trace.name] in roles]
+        if not traces:
+            continue
+        groups[name] = {"cases": [trace.name for trace in traces], "analysis": None, "reason": ""}
+        try:
+            groups[name]["analysis"] = analyse_residuals(fit.model, traces, config.start).to_dict()
+        except TraceError as error:
+            # A short trace or a model that diverges one step ahead is a finding; the run goes on.
+            groups[name]["reason"] = str(error)
+    return {"groups": groups}
+
+
+def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:
+    """Judge whether a linear model is enough for the data of a run.
+
+    Args:
+        fits: The fits that are ready.
+
+    Returns:
+        The verdict as JSON values; ``None`` unless there are linear models and networks that may be compared.
+    """
+    usable = [ready for ready in fits if ready.fit.status.comparable]
+    linear, networks = (
+        {ready.config.name: ready.evaluation for ready in usable if isinstance(ready.fit.model.structure, kinds)}
+        for kinds in ((ARX, TransferFunction), (NARX, NeuralStateSpace))
+    )
+    return judge_linearity(linear, networks).to_dict() if linear and networks else None

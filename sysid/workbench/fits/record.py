@@ -1,0 +1,251 @@
+"""Results as they are stored: figures and signals of a fit, and the results.json of a run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sysid.estimation import CascadeFit, FitResult, Posterior, Status
+from sysid.models import StartKind
+from sysid.reporting.results import SCHEMA_VERSION
+from sysid.traces import Role
+from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
+from sysid.workbench.fits.config import PipelineConfig
+from sysid.workbench.fits.data import Data
+from sysid.workbench.fits.evidence import linearity
+from sysid.workbench.fits.steps import Choice, Scores
+from sysid.workbench.runner.events import FitReady
+from sysid.workbench.runner.store import read_arrays, read_json, write_arrays, write_json
+
+SIGNALS = ("time", "target", "simulated", "predicted")
+"""What is kept of every case, sample by sample."""
+
+INTERVAL = ("low", "high")
+"""What is kept besides where there are intervals."""
+
+
+def write_fit(folder: Path, fit: FitResult) -> list[Path]:
+    """Store a fit.
+
+    Args:
+        folder: The fit's folder.
+        fit: The fit.
+
+    Returns:
+        The files written.
+    """
+    write_json(folder / "fit.json", fit.to_dict())
+    posterior = folder / "posterior.npz"
+    if fit.posterior is None:
+        posterior.unlink(missing_ok=True)  # of an earlier fit
+        return [folder / "fit.json"]
+    write_arrays(posterior, fit.posterior.to_arrays())
+    return [folder / "fit.json", posterior]
+
+
+def read_fit(folder: Path) -> FitResult:
+    """The fit that :func:`write_fit` stored."""
+    fit, posterior = FitResult.from_dict(read_json(folder / "fit.json")), folder / "posterior.npz"
+    return replace(fit, posterior=Posterior.from_arrays(read_arrays(posterior))) if posterior.is_file() else fit
+
+
+def write_scores(folder: Path, scores: Scores) -> list[Path]:
+    """Store figures and signals.
+
+    Args:
+        folder: The fit's folder.
+        scores: The figures.
+
+    Returns:
+        The files written.
+    """
+    cases = scores.evaluation.cases
+    arrays = {f"{name}/{signal}": getattr(case, signal) for name, case in cases.items() for signal in SIGNALS}
+    arrays |= {
+        f"{name}/{signal}": getattr(case.intervals, signal)
+        for name, case in cases.items()
+        if case.intervals is not None
+        for signal in INTERVAL
+    }
+    write_arrays(folder / "signals.npz", arrays)
+    figures = {name: case.to_dict() for name, case in cases.items()}
+    write_json(folder / "evaluation.json", {"cases": figures, "selection_mse": scores.selection_mse})
+    return [folder / "signals.npz", folder / "evaluation.json"]
+
+
+def write_residuals(folder: Path, residuals: Mapping[str, Any]) -> list[Path]:
+    """Store what :func:`sysid.workbench.fits.evidence.residuals` found.
+
+    Args:
+        folder: The fit's folder.
+        residuals: JSON values.
+
+    Returns:
+        The files written.
+    """
+    write_json(folder / "residuals.json", residuals)
+    return [folder / "residuals.json"]
+
+
+def read_scores(folder: Path) -> Scores:
+    """The figures and signals that :func:`write_scores` stored."""
+    stored = read_json(folder / "evaluation.json")
+    arrays = read_arrays(folder / "signals.npz")
+    cases = {
+        name: CaseResult(
+            case=name,
+            role=Role(fields["role"]),
+            free_run=_figures(fields["free_run"]),
+            one_step=_figures(fields["one_step"]),
+            run_time_s=fields["run_time_s"],
+            intervals=CaseIntervals.from_dict(fields["coverage"], *(arrays[f"{name}/{signal}"] for signal in INTERVAL))
+            if "coverage" in fields
+            else None,
+            by_state={state: (_figures(one), float(one["share"])) for state, one in fields["by_state"].items()}
+            if "by_state" in fields
+            else None,
+            **{signal: np.asarray(arrays[f"{name}/{signal}"], dtype=np.float64) for signal in SIGNALS},
+        )
+        for name, fields in stored["cases"].items()
+    }
+    return Scores(evaluation=Evaluation(cases=cases), selection_mse=float(stored["selection_mse"]))
+
+
+def _figures(fields: Mapping[str, Any]) -> Figures:
+    numbers = {name: float(fields[name]) for name in ("mse", "nrmse_fit", "max_abs_error", "r")}
+    return Figures(**numbers, unit=fields["unit"])
+
+
+def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """One fit as it stands in results.json.
+
+    Args:
+        ready: The fit and its figures.
+        exports: The exported files, with paths relative to the run folder.
+
+    Returns:
+        JSON values.
+    """
+    fit, model = ready.fit, ready.fit.model
+    stored = fit.to_dict()
+    return {
+        "name": ready.config.name,
+        "slug": ready.config.slug,
+        "mapping": str(model.mapping),
+        "structure": model.structure.to_dict(),
+        "label": model.structure.label,
+        "loop": fit.loop.value,
+        "train_time_s": fit.train_time_s,
+        "status": fit.status.name,
+        "seed": fit.seed,
+        "initial": ready.config.initial,
+        "notes": list(fit.notes),
+        "evidence": stored["evidence"],
+        "attempts": stored["attempts"],
+        "stability": stored["stability"],
+        "n_parameters": model.n_parameters,
+        "selection_mse": ready.selection_mse,
+        "cases": {name: case.to_dict() for name, case in ready.evaluation.cases.items()},
+        "exports": [dict(entry) for entry in exports],
+        "learning_curve": {name: stored["history"][name] for name in ("iteration", "mse")},
+    }
+
+
+def results_document(
+    *,
+    config: PipelineConfig,
+    command: str,
+    environment: Mapping[str, Any],
+    data: Data,
+    fits: Sequence[FitReady],
+    choice: Choice | None,
+    exports: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """The contents of results.json; its contract is in ``reports/README.md``.
+
+    Args:
+        config: The pipeline.
+        command: The command that makes the run again.
+        environment: The machine and the packages.
+        data: The traces.
+        fits: The fits that are ready.
+        choice: Which of them is put first.
+        exports: Exported files of that fit.
+
+    Returns:
+        JSON values, apart from NaN and the infinities.
+    """
+    traces = data.traces
+    first = choice.name if choice else None
+    start = config.start
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "pipeline": config.name,
+        "description": config.description,
+        "command": command,
+        "created": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "environment": dict(environment),
+        "seed": config.seed,
+        "data": {
+            "name": traces.name,
+            "digest": traces.digest,
+            "sample_time": traces.sample_time,
+            "source": traces.source,
+            "cases": {
+                trace.name: {
+                    "role": traces.roles[trace.name].value,
+                    "samples": len(trace),
+                    "duration_s": trace.duration,
+                    "provenance": list(trace.provenance),
+                }
+                for trace in traces
+            },
+        },
+        "selection": {
+            "name": config.selection or traces.name,
+            "cases": {trace.name: {"samples": len(trace), "digest": trace.digest} for trace in data.selection},
+        }
+        if data.selection
+        else None,
+        "start": {"kind": start.kind.value, "n_measured": start.n_measured if start.kind is StartKind.MEASURED else 0},
+        "fits": [fit_record(ready, exports if ready.config.name == first else ()) for ready in fits],
+        "best": asdict(choice) if choice else None,
+        "linearity": linearity(fits),
+        "published": config.report.published,
+    }
+
+
+def export_record(entry: Any, folder: str, unit: str, run_times: Sequence[Any] = ()) -> dict[str, Any]:
+    """One exported file as it stands in results.json.
+
+    Args:
+        entry: The bundle's entry.
+        folder: The bundle's folder, relative to the run folder.
+        unit: The output's unit.
+        run_times: What was measured of all files.
+
+    Returns:
+        JSON values.
+    """
+    return {
+        "format": entry.format,
+        "file": f"{folder}/{entry.name}",
+        "largest_difference": entry.largest_difference,
+        "tolerance": entry.tolerance,
+        "unit": unit,
+        "run_times": [
+            {"cars": one.cars, "seconds": one.seconds, "ratio": one.ratio}
+            for one in run_times
+            if (one.name, one.format) == (entry.name, entry.format)
+        ],
+    }
+
+
+def is_final(fit: FitResult | CascadeFit) -> bool:
+    """Whether a fit ran to its end; an interrupted one is used now and done again next time."""
+    return fit.status is not Status.INTERRUPTED

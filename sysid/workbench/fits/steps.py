@@ -1,0 +1,308 @@
+"""The steps of a pipeline: functions of (config, inputs) that give a result and touch no folder.
+
+Each step has a ``*_key`` beside it: the digest of everything that its result depends on. The pipeline
+stores results under their keys; a step does not know that.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sysid.errors import ConfigError
+from sysid.estimation import (
+    FitProgress,
+    FitResult,
+    TransferFunctionTraining,
+    fit_arx,
+    fit_narx,
+    fit_neural_state_space,
+    fit_transfer_function,
+)
+from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
+from sysid.traces import Role
+from sysid.validation import Evaluation, evaluate, evaluate_case
+from sysid.workbench.annotation import by_state, find_annotator
+from sysid.workbench.fits.config import FitConfig, PipelineConfig
+from sysid.workbench.fits.data import Data
+from sysid.workbench.runner.store import code_digest, digest
+from sysid.workbench.stability import StabilityCheck
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
+    from sysid.export.run_times import RunTime
+
+
+def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | None) -> str:
+    """Digest of everything that a fit depends on.
+
+    Args:
+        fit: The fit.
+        config: Its pipeline.
+        data: The traces.
+        initial: Key of the fit that it starts from.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    is_arx = isinstance(fit.structure, ARX)
+    network = isinstance(fit.structure, NARX | NeuralStateSpace)
+    training = dataclasses.asdict(fit.training_options(config.seed)) if network else {"seed": config.seed}
+    terms = {
+        "structure": fit.structure.to_dict(),
+        "training": None if is_arx else training,
+        "initial": initial,
+        "traces": [trace.digest for trace in data.estimation],
+        # Least squares has nothing to choose, so that other selection traces do not concern it.
+        "selection": None if is_arx else [trace.digest for trace in data.selection],
+        "stability": {**config.stability.model_dump(), "sequences": [trace.digest for trace in data.sequences]}
+        if network
+        else None,
+        "code": code_digest("estimation", "models", "kernels"),
+    }
+    return digest(_plain(terms | _common(config)))
+
+
+def _common(config: PipelineConfig) -> dict[str, Any]:
+    start = {"kind": config.start.kind.value, "n_measured": config.start.n_measured}
+    return {"mapping": str(config.mapping), "start": start, "rest_output": config.rest_output}
+
+
+def _plain(value: Any) -> Any:
+    """JSON values, with enums by their value."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    return getattr(value, "value", value)
+
+
+def fit_traces(
+    fit: FitConfig,
+    config: PipelineConfig,
+    data: Data,
+    initial: FitResult | None,
+    on_progress: Callable[[FitProgress], None],
+) -> FitResult:
+    """Fit one structure.
+
+    Args:
+        fit: The fit.
+        config: Its pipeline.
+        data: The traces.
+        initial: The fit that it starts from.
+        on_progress: Called after every iteration, from the threads that train.
+
+    Returns:
+        The fit.
+
+    Raises:
+        ConfigError: If no estimator belongs to the structure.
+    """
+    structure, training_options = fit.structure, fit.training_options(config.seed)
+    common: dict[str, Any] = {"start": config.start, "rest_output": config.rest_output}
+    if isinstance(structure, ARX):
+        return fit_arx(data.estimation, config.mapping, structure, **common)
+    if isinstance(structure, TransferFunction):
+        training = TransferFunctionTraining(seed=config.seed)
+        return fit_transfer_function(
+            data.estimation, config.mapping, structure, training, selection=data.selection, **common
+        )
+    if isinstance(structure, NARX):
+        check = StabilityCheck.of(config.stability, config.mapping, data.estimation, data.sequences)
+        found = fit_narx(
+            data.estimation,
+            config.mapping,
+            structure,
+            training_options,
+            selection=data.selection,
+            initial=initial,
+            vet=check.vet(training_options.loop),
+            on_progress=on_progress,
+            **common,
+        )
+        return check.applied(found)
+    if isinstance(structure, NeuralStateSpace):
+        check = StabilityCheck.of(config.stability, config.mapping, data.estimation, data.sequences)
+        found = fit_neural_state_space(
+            data.estimation,
+            config.mapping,
+            structure,
+            training_options,
+            selection=data.selection,
+            vet=check.vet(training_options.loop),
+            on_progress=on_progress,
+            **common,
+        )
+        return check.applied(found)
+    raise ConfigError(f"no estimator for the structure {structure.kind}", where=f"fit {fit.name}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scores:
+    """A fit's figures.
+
+    Args:
+        evaluation: On every case.
+        selection_mse: Mean free-run mse on the selection traces; NaN without any.
+    """
+
+    evaluation: Evaluation
+    selection_mse: float
+
+
+def scores_key(fit: str, data: Data, config: PipelineConfig) -> str:
+    """Digest of everything that a fit's figures depend on.
+
+    Args:
+        fit: Key of the fit.
+        data: The traces.
+        config: The pipeline.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    code = code_digest("validation", "models", "kernels")
+    terms = {
+        "fit": fit,
+        "traces": data.traces.digest,
+        "selection": [trace.digest for trace in data.selection],
+        # Scores of a release that kept less are made again.
+        "kept": ["figures", "signals", "residuals", "intervals"],
+        "code": code,
+    }
+    return digest(terms | _common(config))
+
+
+def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
+    """Run a fitted model over every case, in free run and one step ahead.
+
+    Args:
+        fit: The fit.
+        data: The traces.
+        config: The pipeline.
+
+    Returns:
+        The figures.
+    """
+    errors = [evaluate_case(fit.model, trace, Role.SELECTION, config.start, 1).free_run.mse for trace in data.selection]
+    evaluation = evaluate(fit.model, data.traces, config.start, posterior=fit.posterior)
+    if config.annotate is not None:
+        annotator = find_annotator(config.annotate.by, where="annotate, by")
+        evaluation = by_state(evaluation, data.traces, annotator, config.start)
+    return Scores(
+        evaluation=evaluation,
+        selection_mse=float(np.mean(errors)) if errors else math.nan,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """Which fit is put first.
+
+    Args:
+        name: The fit.
+        chosen_by: By which figure, on which traces, as a sentence.
+        cases_chose: Whether the cases that are scored took part in the choice.
+    """
+
+    name: str
+    chosen_by: str
+    cases_chose: bool = False
+
+
+def choose(fits: Mapping[str, tuple[FitResult, Scores]], asked: str) -> Choice:
+    """Choose the fit that is exported and put first in the report.
+
+    Args:
+        fits: Fits and figures by name.
+        asked: ``best``, or the name of a fit.
+
+    Returns:
+        The choice. Cases for validation have no say in it.
+    """
+    if asked != "best":
+        return Choice(name=asked, chosen_by="Named in the pipeline.")
+    # An unstable fit is compared by its figures like the others, and says what it is in its status.
+    usable = {name: pair for name, pair in fits.items() if pair[0].status.comparable} or dict(fits)
+    by_selection = {name: pair[1].selection_mse for name, pair in usable.items()}
+    if not any(math.isnan(mse) for mse in by_selection.values()):
+        sentence = "Least mean squared error of the free run on the selection traces."
+        return Choice(name=min(by_selection, key=by_selection.__getitem__), chosen_by=sentence)
+    # Evidence cannot be compared between open and closed loop: their residuals are not the same.
+    by_estimation = {name: pair[1].evaluation.mean_mse(Role.ESTIMATION) for name, pair in usable.items()}
+    return Choice(
+        name=min(by_estimation, key=by_estimation.__getitem__),
+        chosen_by="Least mean squared error of the free run on the estimation traces, for want of selection traces; "
+        "it favours the largest network.",
+    )
+
+
+def export_key(scores: str, config: PipelineConfig) -> str:
+    """Digest of everything that a bundle depends on.
+
+    Args:
+        scores: Key of the exported fit's figures.
+        config: The pipeline.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    export = None if config.export is None else config.export.model_dump(mode="json", exclude={"fit"})
+    return digest({"scores": scores, "export": export, "code": code_digest("export", "models", "kernels")})
+
+
+def export(
+    fit: FitResult, scores: Scores, data: Data, config: PipelineConfig, *, folder: Path, provenance: dict[str, Any]
+) -> Bundle:
+    """Write a fit's files and check each against the model on every case.
+
+    Args:
+        fit: The fit.
+        scores: Its figures, for the model card.
+        data: The traces that the files are run on.
+        config: The pipeline, with an ``export``.
+        folder: Where the bundle goes.
+        provenance: What the bundle says about where it comes from.
+
+    Returns:
+        The bundle.
+
+    Raises:
+        ConfigError: If the pipeline exports nothing.
+        ParityError: If a file differs from the model by more than the tolerance.
+    """
+    from sysid.export import export_bundle
+
+    if config.export is None:
+        raise ConfigError("the pipeline exports nothing", where=config.name, remedy="add export: {fit: best}")
+    return export_bundle(
+        fit,
+        data.traces,
+        folder,
+        start=config.start,
+        formats=config.export.formats,
+        tolerance=config.export.tolerance,
+        metrics=scores.evaluation,
+        provenance=provenance,
+    )
+
+
+def export_run_times(bundle: Bundle) -> tuple[RunTime, ...]:
+    """Time every file of a bundle beside the model's own free run.
+
+    Args:
+        bundle: The bundle.
+
+    Returns:
+        The model's own run, then file by file.
+    """
+    from sysid.export.run_times import bundle_run_times
+
+    return bundle_run_times(bundle)

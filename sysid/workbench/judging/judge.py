@@ -1,0 +1,56 @@
+"""Judges: what says which consequence a model's error has, found by name among the installed packages.
+
+A judge is an object registered in the entry-point group ``sysid.judges``; its name there is the kind of its pipelines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from pydantic import BaseModel
+
+from sysid.models import AbstractModel, Cascade
+from sysid.workbench.plugins import find_plugin
+from sysid.workbench.runner.kept_steps import Step
+
+GROUP = "sysid.judges"
+
+Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade, Mapping[str, Any]]]]
+"""Models and cascades by the name of what they are together, each with the options that its pipeline gives it."""
+
+
+class Judge(Protocol):
+    """What a judge answers."""
+
+    options: type[BaseModel]
+    """Fields of ``options`` in its pipelines."""
+    part_options: type[BaseModel]
+    """Fields of ``options`` of each model."""
+
+    @property
+    def version(self) -> str:
+        """Digest of the code that its results depend on."""
+
+    def steps(self, options: Any, subjects: Subjects) -> Sequence[Step]:
+        """What is to be done; the steps do not depend on each other."""
+
+    def document(self, options: Any, subjects: Subjects, results: Mapping[str, Any]) -> dict[str, Any]:
+        """All results, by name of their step, as :class:`sysid.reporting.judging.tables.JudgementRecord` has them."""
+
+
+def find_judge(name: str, *, where: object) -> Judge:
+    """The judge of a name.
+
+    Args:
+        name: Kind of the pipeline.
+        where: The file that asks for it, for errors.
+
+    Returns:
+        The judge.
+
+    Raises:
+        ConfigError: If none of that name is installed.
+    """
+    judge: Judge = find_plugin(GROUP, name, what="judge", where=where)
+    return judge

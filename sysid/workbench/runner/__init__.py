@@ -1,0 +1,1 @@
+"""The runner of steps: store, resume, events, screen, plan."""

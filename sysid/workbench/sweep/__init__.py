@@ -1,0 +1,1 @@
+"""Pipelines of kind sweep: ranges, samplers, workers, trials."""

@@ -1,0 +1,377 @@
+"""The driver: which jobs there are, in which order they may be done, who is dropped, what is announced.
+
+Nothing here depends on when a result comes in. A trial's seed follows from its point; a trial that begins from another
+waits for it; trials are dropped only when all of a look are in. So the same sweep gives the same trials and the same
+winner with any number of workers, killed or not. The driver alone writes: workers compute and answer.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from sysid.models import NARX
+from sysid.reporting.sweep.record import FIGURES, Trial
+from sysid.workbench.runner.events import StepProgress, Watcher
+from sysid.workbench.runner.store import code_digest, digest, strict
+from sysid.workbench.sweep.config import SweepConfig
+from sysid.workbench.sweep.search_space import Point
+from sysid.workbench.sweep.store import Clock, TrialStore
+from sysid.workbench.sweep.trial import FAILED, Bench, Job
+from sysid.workbench.sweep.workers import AbstractWorkers
+
+FORMAT = 1
+"""Changes when what a trial stores changes, so that older ones are done again."""
+
+LINEAR = {"loop": "open", "max_iterations": 20, "regularisation": 0.0}
+"""How the linear fit is made that networks with the same delays may begin from: least squares, in a few steps."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rung:
+    """How far trials are trained before they are looked at.
+
+    Args:
+        iterations: Of the training.
+        record: Share of the estimation traces.
+        keep: Share of the trials that goes on; 1 for the last rung.
+    """
+
+    iterations: int
+    record: float
+    keep: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Driver:
+    """Goes through points.
+
+    Args:
+        config: The sweep.
+        bench: What all jobs share.
+        store: Where results lie.
+        workers: Who does the jobs.
+        clock: The time that the sweep takes.
+        step: What is being done, for the screen.
+        tell: Told how it goes.
+        last: The last job of each point that was tried, by its number.
+    """
+
+    config: SweepConfig
+    bench: Bench
+    store: TrialStore
+    workers: AbstractWorkers
+    clock: Clock
+    step: str
+    tell: Watcher
+    _shared: str = field(init=False)
+    _progress: _Progress = field(init=False)
+    last: dict[int, Job] = field(default_factory=dict)
+    _smaller: dict[int, Point] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        terms = {
+            "format": FORMAT,
+            "pipeline": {name: self.bench.pipeline.get(name) for name in ("mapping", "start", "rest")},
+            "traces": self.bench.traces.digest,
+            "selection": [trace.digest for trace in self.bench.selection],
+            "code": code_digest("estimation", "models", "kernels"),
+        }
+        object.__setattr__(self, "_shared", digest(terms))
+        object.__setattr__(self, "_progress", _Progress(driver=self))
+
+    @property
+    def done_now(self) -> int:
+        """Jobs that this session has done itself."""
+        return self._progress.n_fresh
+
+    def rungs(self) -> list[Rung]:
+        """The looks, the end of the training last."""
+        rungs = [Rung(iterations=r.iterations, record=r.record, keep=r.keep) for r in self.config.pruning]
+        return [*rungs, Rung(iterations=self._full, record=1.0, keep=1.0)]
+
+    @property
+    def _full(self) -> int:
+        from sysid.estimation import Training
+
+        return int(self.config.training.get("max_iterations", Training().max_iterations))
+
+    def run(self, points: Sequence[Point], *, keep_all: bool = False) -> list[Trial]:
+        """Try some points.
+
+        Args:
+            points: The points; a network that begins from a smaller one begins from one of these.
+            keep_all: Drop none.
+
+        Returns:
+            A trial for each, in their order; those that were dropped say at which look.
+        """
+        rungs = [replace(rung, keep=1.0) if keep_all else rung for rung in self.rungs()]
+        self._progress.expect(points, rungs)
+        self._smaller.clear()
+        self._smaller.update(_next_smaller(points) if self.config.warm_start == "smaller" else {})
+        jobs: dict[int, Job] = {}
+        found: dict[int, Trial] = {}
+        alive = list(points)
+        for look, rung in enumerate(rungs, start=1):
+            begun: dict[int, Job] = {}
+            for point in alive:
+                begun[point.number] = self._job(point, rung, jobs.get(point.number), begun)
+            jobs = begun
+            self.last.update(begun)
+            shared = [self._linear(point, rung) for point in alive] if look == 1 else []
+            trials = self._do([*(job for job in shared if job is not None), *jobs.values()])
+            for point in alive:
+                trial = trials[jobs[point.number].key]
+                found[point.number] = as_trial_of(trial, point, before=found.get(point.number))
+            alive, dropped = self._split(alive, found, rung.keep)
+            for point in dropped:
+                found[point.number] = found[point.number].model_copy(update={"dropped_at": look})
+            self._progress.dropped(len(alive), rungs[look:])
+        return [found[point.number] for point in points]
+
+    def _split(self, points: list[Point], found: Mapping[int, Trial], keep: float) -> tuple[list[Point], list[Point]]:
+        """Those who go on and those who do not, both in the order of the grid; ties go to the earlier point."""
+        if keep >= 1.0:
+            return points, []
+        n = max(1, math.ceil(keep * len(points)))
+        ranked = sorted(points, key=lambda point: (self.rank(found[point.number]), point.number))
+        chosen = {point.number for point in ranked[:n]}
+        return [p for p in points if p.number in chosen], [p for p in points if p.number not in chosen]
+
+    def rank(self, trial: Trial) -> tuple[bool, float]:
+        """Sorting key of a trial by what chooses, best first, unusable ones last."""
+        value = FIGURES[self.config.choose.by].of(trial, self.config.choose.on)
+        return not trial.usable, value if math.isfinite(value) else math.inf
+
+    def _job(self, point: Point, rung: Rung, before: Job | None, begun: Mapping[int, Job]) -> Job:
+        """A point's training up to a look; smaller networks of the same look are in ``begun`` already."""
+        after, resume, done = None, False, 0
+        if before is not None:
+            # A state of training belongs to its records; with longer ones only the parameters go on.
+            after, resume = before.key, before.record == rung.record
+            done = (before.iterations or 0) if resume else 0
+        elif point.number in self._smaller:
+            after = begun[self._smaller[point.number].number].key
+        else:
+            shared = self._linear(point, rung)
+            after = None if shared is None else shared.key
+        return self._keyed(
+            Job(
+                key="",
+                number=point.number,
+                structure=point.structure.to_dict(),
+                training=self._training(point),
+                iterations=rung.iterations if isinstance(point.structure, NARX) else None,
+                record=rung.record,
+                after=after,
+                resume=resume,
+                cost=_cost(point, (rung.iterations - done) * rung.record),
+            )
+        )
+
+    def _training(self, point: Point) -> dict[str, Any]:
+        if not isinstance(point.structure, NARX) and not point.training:
+            return {}
+        return {"seed": point.seed(self.config.seed), **point.training}
+
+    def _linear(self, point: Point, rung: Rung) -> Job | None:
+        """The linear fit that a network begins from, if this sweep begins them so."""
+        network = point.structure
+        begins = self.config.warm_start == "linear" and isinstance(network, NARX) and network.feedthrough
+        if not begins or not isinstance(network, NARX) or network.neurons == 0:
+            return None
+        linear = with_neurons(network, 0).to_dict()
+        training = {**LINEAR, "seed": 0}
+        return self._keyed(Job(key="", number=0, structure=linear, training=training, record=rung.record, cost=100.0))
+
+    def _keyed(self, job: Job) -> Job:
+        terms = {
+            "shared": self._shared,
+            "structure": job.structure,
+            "training": job.training,
+            "iterations": job.iterations,
+            "record": job.record,
+            "after": job.after,
+            "resume": job.resume,
+        }
+        return replace(job, key=digest(strict(terms)))
+
+    def _do(self, jobs: Iterable[Job]) -> dict[str, Trial]:
+        """Do every job that is not stored, those that others wait for first, then the longest."""
+        wanted = {job.key: job for job in jobs}
+        done: dict[str, Trial] = {}
+        missing: dict[str, Job] = {}
+        for key, job in wanted.items():
+            stored = self.store.read(key)
+            if stored is None:
+                missing[key] = job
+            else:
+                done[key] = self._note(job, stored, fresh=False)
+        followers: dict[str, list[Job]] = {}
+        ready: list[tuple[bool, float, int, Job]] = []
+        waited_for = {job.after for job in missing.values()}
+        turn = itertools.count()  # jobs of one cost are done in the order in which they became ready
+        for job in missing.values():
+            if job.after in missing:
+                followers.setdefault(str(job.after), []).append(job)
+            else:
+                heapq.heappush(ready, (job.key not in waited_for, -job.cost, next(turn), job))
+        busy = 0
+        while ready or busy:
+            while ready and self.workers.free > 0:
+                job = heapq.heappop(ready)[3]
+                self.workers.submit(job, None if job.after is None else self.store.read(job.after))
+                busy += 1
+            for job, outcome in self.workers.finished():
+                busy -= 1
+                # On disk before anybody hears of it.
+                self.store.write(outcome)
+                self.clock.keep()
+                done[job.key] = self._note(job, outcome, fresh=True)
+                for follower in followers.pop(job.key, []):
+                    heapq.heappush(ready, (follower.key not in waited_for, -follower.cost, next(turn), follower))
+            self._progress.show()
+        return done
+
+    def _note(self, job: Job, outcome: Mapping[str, Any], *, fresh: bool) -> Trial:
+        trial = as_trial(outcome)
+        self._progress.done(job, trial, fresh=fresh)
+        return trial
+
+
+def as_trial(outcome: Mapping[str, Any]) -> Trial:
+    """What is told of a job's result: all but the fit itself.
+
+    Args:
+        outcome: What was stored.
+
+    Returns:
+        The trial, without a place in the ranges.
+    """
+    from sysid.models import structure_from_dict
+
+    kept = {name: value for name, value in outcome.items() if name not in {"fit", "checkpoint"}}
+    label = structure_from_dict(outcome["structure"]).label
+    # A warm start that is no point of the grid has the number 0, which no trial has.
+    return Trial.model_validate({**kept, "number": max(1, kept["number"]), "label": label})
+
+
+def as_trial_of(trial: Trial, point: Point, *, before: Trial | None) -> Trial:
+    """A job's result as that of its point, with the time of the jobs before it.
+
+    Args:
+        trial: The result.
+        point: The point.
+        before: The point's result at the look before.
+
+    Returns:
+        The trial.
+    """
+    added = {name: getattr(trial, name) + (getattr(before, name) if before else 0.0) for name in ("seconds", "cpu_s")}
+    return trial.model_copy(update={"number": point.number, "values": dict(point.values), **added})
+
+
+def with_neurons(network: NARX, neurons: int) -> NARX:
+    """A network with another number of neurons.
+
+    Args:
+        network: The network.
+        neurons: How many.
+
+    Returns:
+        The other one.
+    """
+    return NARX(**{**{k: v for k, v in network.to_dict().items() if k != "kind"}, "neurons": neurons})
+
+
+def _next_smaller(points: Sequence[Point]) -> dict[int, Point]:
+    """For each network the largest one with fewer neurons and all else equal, by the number of its point."""
+    alike: dict[str, list[Point]] = {}
+    for point in points:
+        if isinstance(point.structure, NARX):
+            name = digest({"delays": with_neurons(point.structure, 1).to_dict(), "training": dict(point.training)})
+            alike.setdefault(name, []).append(point)
+    found: dict[int, Point] = {}
+    for group in alike.values():
+        rising = sorted(group, key=lambda point: point.structure.to_dict()["neurons"])
+        found |= {larger.number: smaller for smaller, larger in itertools.pairwise(rising)}
+    return found
+
+
+def _cost(point: Point, iterations: float) -> float:
+    """Work of a piece of training; between linear and quadratic in the parameters, as measured on 20,000 samples."""
+    network = point.structure
+    if not isinstance(network, NARX):
+        return 100.0
+    regressors = sum(len(lags) for lags in network.input_delays) * 2 / len(network.input_delays)
+    parameters = network.neurons * (regressors + len(network.output_delays) + 2)
+    return max(1.0, iterations) * (25.0 + parameters)
+
+
+@dataclass(eq=False)
+class _Progress:
+    """Counts work, and says how it stands."""
+
+    driver: Driver
+    expected: float = 0.0
+    finished: float = 0.0
+    worked: float = 0.0
+    n_done: int = 0
+    n_fresh: int = 0
+    n_expected: int = 0
+    best: Trial | None = None
+    mean_cost: Callable[[float], float] = lambda _: 0.0
+
+    def expect(self, points: Sequence[Point], rungs: Sequence[Rung]) -> None:
+        """Count on these points."""
+        self.mean_cost = lambda iterations: sum(_cost(p, iterations) for p in points) / max(1, len(points))
+        self._plan(len(points), rungs, 0)
+
+    def dropped(self, n_left: int, rungs: Sequence[Rung]) -> None:
+        """Count again: so many go on."""
+        self.expected, self.n_expected = self.finished, self.n_done
+        if rungs:
+            self._plan(n_left, rungs, 0)
+
+    def _plan(self, n: int, rungs: Sequence[Rung], done: int) -> None:
+        for rung in rungs:
+            self.expected += n * self.mean_cost((rung.iterations - done) * rung.record)
+            self.n_expected += n
+            n, done = max(1, math.ceil(rung.keep * n)), rung.iterations
+
+    def done(self, job: Job, trial: Trial, *, fresh: bool) -> None:
+        """A job is done, now or earlier."""
+        self.finished += job.cost
+        self.n_done += 1 if job.number else 0
+        self.worked += job.cost if fresh else 0.0
+        self.n_fresh += fresh
+        counts = job.number > 0 and trial.status != FAILED and job.record == 1.0
+        if counts and (self.best is None or self.driver.rank(trial) < self.driver.rank(self.best)):
+            self.best = trial
+
+    def show(self) -> None:
+        """Tell the screen: how many, how long still, the best so far."""
+        best = ""
+        if self.best is not None:
+            value = self.driver.rank(self.best)[1]
+            best = f", best so far {self.best.label}: {self.driver.config.choose.by} {value:.3g}"
+        left = self.left()
+        ahead = "" if left is None else f", {_duration(left)} left"
+        total = max(self.expected, self.finished, 1.0)
+        detail = f"{self.n_done} of {max(self.n_expected, self.n_done)}{ahead}{best}"
+        self.driver.tell(StepProgress(step=self.driver.step, fraction=min(1.0, self.finished / total), detail=detail))
+
+    def left(self) -> float | None:
+        """Seconds to go, from the work of this session; ``None`` before its first result."""
+        if self.worked <= 0.0:
+            return None
+        return max(0.0, self.expected - self.finished) * self.driver.clock.session / self.worked
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds / 60:.0f} min" if seconds >= 90 else f"{seconds:.0f} s"

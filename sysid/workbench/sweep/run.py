@@ -1,0 +1,361 @@
+"""A sweep from ranges to report: trials, a record of them, and the winner through the same steps as any fit."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult
+from sysid.models import NARX
+from sysid.reporting.results import Results
+from sysid.reporting.sweep.record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
+from sysid.workbench.fits import steps
+from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
+from sysid.workbench.fits.data import Data, load_data
+from sysid.workbench.fits.run import GivenFit, run_pipeline
+from sysid.workbench.runner import events
+from sysid.workbench.runner.store import RunFolder, write_bytes
+from sysid.workbench.sweep.config import WINNER, SweepConfig
+from sysid.workbench.sweep.driver import Driver
+from sysid.workbench.sweep.sampler import publish, strategy
+from sysid.workbench.sweep.search_space import Space, parse_space
+from sysid.workbench.sweep.store import TRIALS, TrialStore
+from sysid.workbench.sweep.trial import Bench, train
+from sysid.workbench.sweep.workers import AbstractWorkers, LocalWorkers
+from sysid.yaml_files import check, read_yaml
+
+Hire = Callable[[Bench, SweepConfig], AbstractWorkers]
+"""Finds workers for a sweep."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sweep:
+    """A sweep and where it was read from.
+
+    Args:
+        config: The checked fields.
+        text: The YAML as written.
+        path: Its file.
+    """
+
+    config: SweepConfig
+    text: str
+    path: Path
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Swept:
+    """What came of a sweep.
+
+    Args:
+        record: Every trial.
+        results: The contents of ``results.json``: the winner and those beside it.
+    """
+
+    record: SweepRecord
+    results: Results
+
+
+def read_sweep_file(path: Path) -> Sweep:
+    """Read and check a sweep.
+
+    Args:
+        path: Its YAML file.
+
+    Returns:
+        The sweep.
+
+    Raises:
+        ConfigError: Naming the file, the field and what is wrong with it.
+    """
+    config = check(SweepConfig, read_yaml(path), where=path)
+    return Sweep(config=config, text=path.read_text(encoding="utf-8-sig"), path=path.resolve())
+
+
+def hire(bench: Bench, config: SweepConfig) -> AbstractWorkers:
+    """The workers that a sweep asks for.
+
+    Args:
+        bench: What they share.
+        config: The sweep.
+
+    Returns:
+        Processes of this machine, or those of a cluster.
+
+    Raises:
+        ConfigError: If there is no such cluster.
+    """
+    if config.cluster is None:
+        return LocalWorkers(bench, config.workers)
+    from sysid.workbench.sweep.dask import DaskWorkers
+
+    return DaskWorkers(bench, config.cluster)
+
+
+def run_sweep(
+    sweep: Sweep,
+    folder: Path,
+    *,
+    command: str,
+    fresh: bool = False,
+    watchers: Sequence[events.Watcher] = (),
+    find_workers: Hire = hire,
+) -> Swept:
+    """Run a sweep; what an earlier session has finished is not done again, however that session ended.
+
+    Args:
+        sweep: What to do.
+        folder: The run folder.
+        command: The command that makes the run again, for the report.
+        fresh: Do everything again.
+        watchers: Told everything that happens, in order.
+        find_workers: Finds who does the jobs.
+
+    Returns:
+        Every trial, and the winner's results.
+
+    Raises:
+        BusyError: If another run is at work in the folder.
+        UserError: If data or options cannot be used as they are, or no trial can.
+        ParityError: If an exported file differs from its model.
+    """
+    store = RunFolder(path=folder.resolve())
+    run = _Run(sweep=sweep, store=store, command=command, fresh=fresh, watchers=watchers, find_workers=find_workers)
+    with store.locked():
+        found = run.trials()
+    fits = [run.fit_of(WINNER, found.winner)] + [run.fit_of(trial.label, trial) for trial in found.beside]
+    pipeline = Pipeline(config=sweep.config.pipeline(fits), text=sweep.text, path=sweep.path)
+    given = {fit.name: found.given[trial.number] for fit, trial in zip(fits, found.shown, strict=True)}
+    choice = steps.Choice(name=WINNER, chosen_by=found.record.chosen_by, cases_chose=sweep.config.choose.on == "cases")
+    results = run_pipeline(
+        pipeline, folder, command=command, fresh=fresh, watchers=watchers, given=given, chosen=choice
+    )
+    ready = events.SweepReady(
+        record=found.record, folder=store.path, command=command, data=sweep.config.data, seed=sweep.config.seed
+    )
+    for watch in watchers:
+        watch(ready)
+    return Swept(record=found.record, results=results)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Found:
+    """What the trials came to."""
+
+    record: SweepRecord
+    winner: Trial
+    beside: list[Trial]
+    given: dict[int, GivenFit]
+
+    @property
+    def shown(self) -> list[Trial]:
+        """Trials that become fits of the report, the winner first."""
+        return [self.winner, *self.beside]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Run:
+    """One session of a sweep."""
+
+    sweep: Sweep
+    store: RunFolder
+    command: str
+    fresh: bool
+    watchers: Sequence[events.Watcher]
+    find_workers: Hire
+
+    @property
+    def config(self) -> SweepConfig:
+        """The checked fields."""
+        return self.sweep.config
+
+    def tell(self, event: events.Event) -> None:
+        """Tell everybody."""
+        for watch in self.watchers:
+            watch(event)
+
+    def fit_of(self, name: str, trial: Trial) -> FitConfig:
+        """A trial as a fit of a pipeline."""
+        return FitConfig.model_validate({"name": name, "structure": trial.structure, "training": self._options(trial)})
+
+    def _options(self, trial: Trial) -> dict[str, Any] | None:
+        if trial.structure["kind"] != NARX.kind:
+            return None
+        swept = {n.removeprefix("training."): v for n, v in trial.values.items() if n.startswith("training.")}
+        return {**self.config.training, **swept}
+
+    def trials(self) -> _Found:
+        """Try what there is to try, and choose."""
+        write_bytes(self.store.path / "pipeline.yaml", self.sweep.text.encode())
+        data = self._load()
+        space = self.config.space()
+        bench = Bench(
+            pipeline=self._first(space).model_dump(mode="json"),
+            traces=data.traces,
+            selection=data.selection,
+        )
+        trials = TrialStore(path=self.store.path / TRIALS)
+        if self.fresh:
+            shutil.rmtree(trials.path, ignore_errors=True)
+        n = self.config.method.trials or len(space.points())
+        step = f"Sweeping {n} of {len(space.points())} points by {self.config.method.name}"
+        self.tell(events.StepStarted(step=step))
+        workers = self.find_workers(bench, self.config)
+        try:
+            with trials.clock() as clock:
+                driver = Driver(
+                    config=self.config,
+                    bench=bench,
+                    store=trials,
+                    workers=workers,
+                    clock=clock,
+                    step=step,
+                    tell=self.tell,
+                )
+                plan, tried = strategy(self.config, space), []
+                while points := plan.ask():
+                    batch = driver.run(points)
+                    plan.tell(batch)
+                    tried += batch
+                beside = self._beside(driver, tried, len(space.points()))
+            found = self._choose(
+                driver, bench, tried=tried, beside=beside, n_points=len(space.points()), wall_s=clock.total
+            )
+        finally:
+            workers.close()
+        detail = f"{found.winner.label}, {self.config.choose.by} {driver.rank(found.winner)[1]:.3g}"
+        self.tell(events.StepDone(step=step, stored=driver.done_now == 0, detail=detail))
+        if self.config.storage is not None:
+            self._publish(found.record, self.config.storage)
+        return found
+
+    def _first(self, space: Space) -> PipelineConfig:
+        """The pipeline of the first point: what all points share."""
+        return self.config.pipeline([FitConfig(name=WINNER, structure=space.points()[0].structure)])
+
+    def _load(self) -> Data:
+        step = "Loading the traces"
+        self.tell(events.StepStarted(step=step))
+        data = load_data(
+            self._first(self.config.space()),
+            beside=self.sweep.path.parent,
+            progress=lambda text: self.tell(events.StepProgress(step=step, fraction=None, detail=text)),
+        )
+        if self.config.choose.on == "selection" and not data.selection:
+            raise ConfigError(
+                "there are no selection traces to choose by",
+                where="choose.on",
+                expected="a data set with cases whose role is selection",
+                got=f"selection: {self.config.selection}",
+                remedy="name one with selection: ..., or choose on estimation, which favours the largest network",
+            )
+        cases = f"{len(data.traces)} cases of {data.traces.name}"
+        self.tell(events.StepDone(step=step, stored=False, detail=f"{cases}, {len(data.selection)} to choose by"))
+        return data
+
+    def _beside(self, driver: Driver, tried: Sequence[Trial], n_points: int) -> list[Trial]:
+        """Structures chosen by hand: the sweep's own trials of them where it tried them in full."""
+        found: list[Trial] = []
+        fixed = {name: v for name, v in self.config.training.items() if not isinstance(v, dict) and v != "range"}
+        for written in self.config.beside:
+            for point in parse_space([written], fixed, len(self.config.mapping.inputs)).points():
+                structure = point.structure.to_dict()
+                same = next((t for t in tried if t.structure == structure and t.dropped_at is None), None)
+                if same is None:
+                    own = replace(point, number=n_points + 1 + len(found))
+                    same = driver.run([own], keep_all=True)[0]
+                found.append(same)
+        return found
+
+    def _choose(
+        self,
+        driver: Driver,
+        bench: Bench,
+        *,
+        tried: Sequence[Trial],
+        beside: Sequence[Trial],
+        n_points: int,
+        wall_s: float,
+    ) -> _Found:
+        usable = [trial for trial in tried if trial.in_full]
+        if not usable:
+            raise ConfigError(
+                "no trial of the sweep can be used",
+                where=self.sweep.path,
+                expected="a fit that is stable and improves on where it started",
+                got=", ".join(sorted({trial.status for trial in tried})),
+                remedy="allow more iterations, or sweep other structures; the trials' files say how each one failed",
+            )
+        winner = min(usable, key=lambda trial: (driver.rank(trial), trial.parameters, trial.number))
+        unit = bench.traces.traces[0].channel(self.config.mapping.output).unit
+        record = self._record(tried, beside, winner, unit=unit, n_points=n_points, wall_s=wall_s)
+        write_sweep(self.store.path, record)
+        others = [trial for trial in beside if trial.number != winner.number]
+        given = {trial.number: self._given(driver, bench, trial) for trial in [winner, *others]}
+        return _Found(record=record, winner=winner, beside=others, given=given)
+
+    def _given(self, driver: Driver, bench: Bench, trial: Trial) -> GivenFit:
+        """The fit of a trial; a network's is taken up where it ended, which gives what its trial did not keep."""
+        job = driver.last[trial.number]
+
+        def make() -> FitResult:
+            outcome = driver.store.read(job.key)
+            if outcome is None:
+                raise ConfigError("a trial has gone from the run folder", where=driver.store.file(job.key))
+            if outcome["checkpoint"] is None:
+                return FitResult.from_dict(outcome["fit"])
+            fit, _ = train(bench, replace(job, after=job.key, resume=True), outcome)
+            return replace(fit, train_time_s=float(trial.seconds))
+
+        return GivenFit(key=job.key, make=make)
+
+    def _record(
+        self, tried: Sequence[Trial], beside: Sequence[Trial], winner: Trial, *, unit: str, n_points: int, wall_s: float
+    ) -> SweepRecord:
+        config, choose = self.config, self.config.choose
+        sentence = f"Least {FIGURES[choose.by].words} on {TRACES[choose.on]} among {len(tried)} trials."
+        if config.reproduces:
+            sentence += f" This sweep repeats {config.reproduces}, which chose on the very cases that it reports."
+        return SweepRecord(
+            name=config.name,
+            mapping=str(config.mapping),
+            unit=unit,
+            method=config.method.name,
+            loop=str(config.training.get("loop", "")),
+            points=n_points,
+            ranges=_ranges(self.config.space()),
+            objectives=list(config.objectives),
+            choose_by=choose.by,
+            choose_on=choose.on,
+            chosen_by=sentence,
+            reproduces=config.reproduces,
+            published=config.report.published,
+            warm_start=config.warm_start,
+            rungs=[rung.model_dump() for rung in config.pruning],
+            workers=config.workers,
+            wall_s=wall_s,
+            winner=winner.number,
+            beside=list(beside),
+            trials=list(tried),
+        )
+
+    def _publish(self, record: SweepRecord, url: str) -> None:
+        """Write the trials where Optuna's tools find them; that this fails costs nobody the sweep."""
+        try:
+            publish(record, url)
+        except Exception as error:  # noqa: BLE001 - a database can fail in any way, and the sweep is on disk
+            self.tell(events.Warned(text=f"not written to the Optuna store ({type(error).__name__}: {error})"))
+
+
+def _ranges(space: Space) -> dict[str, list[Any]]:
+    """Every value that a field can take, over all structures that have it."""
+    found: dict[str, list[Any]] = {}
+    for alternative in space.alternatives:
+        for dimension in alternative.dimensions:
+            known = found.setdefault(dimension.name, [])
+            known += [value for value in dimension.values if value not in known]
+    return found

@@ -1,0 +1,251 @@
+"""What a sweep can try: structures and training options with ranges in their fields, and the points in them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from pydantic import BaseModel
+
+from sysid.errors import ConfigError
+from sysid.estimation import Training
+from sysid.models import NARX, AbstractStructure
+from sysid.models.ranges import WORD, AbstractRange, declared_ranges, parse_range
+from sysid.workbench.fields import STRICT, STRUCTURES, StructureField, TrainingConfig
+from sysid.workbench.runner.store import digest
+from sysid.yaml_files import check
+
+MAX_POINTS = 100_000
+"""Points of a sweep: more cannot be tried, and to list them takes minutes."""
+
+TRAINING = "training."
+"""Begins the name of a dimension that belongs to the training."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Point:
+    """One thing to try.
+
+    Args:
+        number: Its place in the grid, from 1 on.
+        structure: What is fitted.
+        training: Options of the training, as they differ from the default; empty for a linear model.
+        values: Where it lies in the ranges: the value of each dimension, by name.
+        alternative: Which of the structures it belongs to, from 0 on.
+    """
+
+    number: int
+    structure: AbstractStructure
+    training: Mapping[str, Any]
+    values: Mapping[str, Any]
+    alternative: int = 0
+
+    def seed(self, sweep: int) -> int:
+        """The seed of its training, from what it is and not from when it is trained.
+
+        Args:
+            sweep: Seed of the sweep.
+
+        Returns:
+            A number of 31 bits.
+        """
+        terms = {"structure": self.structure.to_dict(), "training": dict(self.training), "sweep": sweep}
+        return int(digest(terms)[:8], 16) >> 1
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dimension:
+    """One field with a range.
+
+    Args:
+        name: The field: ``neurons``, ``nb[1]``, ``training.regularisation``.
+        values: The values, in order.
+        numeric: Whether neighbours in the list are neighbours in meaning.
+    """
+
+    name: str
+    values: tuple[Any, ...]
+    numeric: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Alternative:
+    """One structure with its ranges.
+
+    Args:
+        written: The structure's fields as written.
+        training: The training's options as written.
+        dimensions: Fields with a range, in the order written: the last changes fastest in a grid.
+        n_inputs: Inputs of the mapping.
+        where: Named in errors.
+    """
+
+    written: Mapping[str, Any]
+    training: Mapping[str, Any]
+    dimensions: tuple[Dimension, ...]
+    n_inputs: int
+    where: str
+
+    def point(self, values: Mapping[str, Any], number: int) -> Point:
+        """The point at some values.
+
+        Args:
+            values: By dimension.
+            number: Its place in the grid.
+
+        Returns:
+            The point.
+
+        Raises:
+            ConfigError: If these values do not go together.
+        """
+        fields: dict[str, Any] = {}
+        for name, written in self.written.items():
+            entries = [values.get(f"{name}[{i}]", entry) for i, entry in enumerate(written)] if _many(written) else None
+            fields[name] = values.get(name, written if entries is None else entries)
+        structure = _checked(self._for_all_inputs(fields), self.where)
+        if isinstance(structure, NARX):
+            structure.lags(self.n_inputs)
+        options = {name: values.get(TRAINING + name, written) for name, written in self.training.items()}
+        network = isinstance(structure, NARX) or structure.kind not in {"ARX", "TransferFunction"}
+        return Point(number=number, structure=structure, training=options if network else {}, values=dict(values))
+
+    def _for_all_inputs(self, fields: dict[str, Any]) -> dict[str, Any]:
+        """One number for a field that has one per input stands for all of them."""
+        if fields.get("kind") == NARX.kind:
+            return fields  # a network's delays are read so by itself
+        hints = typing.get_type_hints(STRUCTURES[fields["kind"]]) if fields.get("kind") in STRUCTURES else {}
+        many = {name for name, hint in hints.items() if tuple in {typing.get_origin(h) for h in _members(hint)}}
+        return {
+            name: [value] * self.n_inputs if name in many and isinstance(value, int) else value
+            for name, value in fields.items()
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Space:
+    """Everything that can be tried.
+
+    Args:
+        alternatives: Structures with their ranges.
+    """
+
+    alternatives: tuple[Alternative, ...]
+    _points: list[Point] = field(default_factory=list)
+
+    def points(self) -> list[Point]:
+        """Every point that makes a structure, each once, in the order of the grid.
+
+        Raises:
+            ConfigError: If none does; the first reason is told.
+        """
+        if self._points:
+            return self._points
+        n = sum(math.prod(len(dimension.values) for dimension in one.dimensions) for one in self.alternatives)
+        if n > MAX_POINTS:
+            raise ConfigError(
+                f"the ranges hold {n:,} points",
+                where=self.alternatives[0].where,
+                expected=f"up to {MAX_POINTS:,}, each of which is checked before the first is tried",
+                remedy="give the ranges a step, or leave one of them out",
+            )
+        seen: set[str] = set()
+        reason: ConfigError | None = None
+        for index, alternative in enumerate(self.alternatives):
+            names = [dimension.name for dimension in alternative.dimensions]
+            for values in itertools.product(*(dimension.values for dimension in alternative.dimensions)):
+                try:
+                    point = alternative.point(dict(zip(names, values, strict=True)), len(self._points) + 1)
+                except ConfigError as error:
+                    # More zeros than poles, say: no structure, and nothing to try.
+                    reason = reason or error
+                    continue
+                name = digest({"structure": point.structure.to_dict(), "training": dict(point.training)})
+                if name not in seen:
+                    seen.add(name)
+                    self._points.append(replace(point, alternative=index))
+        if not self._points:
+            raise reason or ConfigError("the sweep has nothing to try", remedy="write a structure")
+        return self._points
+
+
+def parse_space(
+    structures: Sequence[Mapping[str, Any]], training: Mapping[str, Any], n_inputs: int, *, where: str = "structure"
+) -> Space:
+    """The space that a sweep's YAML describes.
+
+    Args:
+        structures: Fields of each structure, with ranges.
+        training: Options of the training, with ranges.
+        n_inputs: Inputs of the mapping.
+        where: Named in errors.
+
+    Returns:
+        The space.
+
+    Raises:
+        ConfigError: If a range cannot be read, or the training has no such option.
+
+    Example:
+        >>> space = parse_space([{"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": "range"}], {}, 2)
+        >>> len(space.points()), space.points()[-1].structure.label
+        (20, 'NARX 1/1/20')
+    """
+    options = [_dimension(TRAINING + name, value, None) for name, value in training.items()]
+    swept = tuple(dimension for dimension in options if dimension is not None)
+    _check_training({n: v for n, v in training.items() if TRAINING + n not in {d.name for d in swept}}, swept)
+    alternatives = []
+    for written in structures:
+        declared: dict[str, AbstractRange] = {}
+        if written.get("kind") in STRUCTURES:
+            declared = declared_ranges(STRUCTURES[written["kind"]])
+        dimensions: list[Dimension] = []
+        for name, value in written.items():
+            found = [_dimension(name, value, declared.get(name))]
+            if _many(value):
+                found += [_dimension(f"{name}[{i}]", entry, declared.get(name)) for i, entry in enumerate(value)]
+            dimensions += [dimension for dimension in found if dimension is not None]
+        alternatives.append(
+            Alternative(
+                written=written, training=training, dimensions=(*swept, *dimensions), n_inputs=n_inputs, where=where
+            )
+        )
+    return Space(alternatives=tuple(alternatives))
+
+
+def _dimension(name: str, written: object, declared: AbstractRange | None) -> Dimension | None:
+    found = parse_range(written, declared, where=name)
+    return None if found is None else Dimension(name=name, values=found.values, numeric=found.numeric)
+
+
+def _check_training(fixed: Mapping[str, Any], swept: Sequence[Dimension]) -> None:
+    """Every option that the training is given, and every value in a range of one, is one that it takes."""
+    tries = [fixed, *({dimension.name.removeprefix(TRAINING): v} for dimension in swept for v in dimension.values)]
+    for given in tries:
+        options = check(TrainingConfig, dict(given), where="training")
+        Training(**{name: getattr(options, name) for name in options.model_fields_set})
+
+
+class _Wrapped(BaseModel):
+    """A structure where errors name its field."""
+
+    model_config = STRICT
+
+    structure: StructureField
+
+
+def _checked(fields: Mapping[str, Any], where: str) -> AbstractStructure:
+    return check(_Wrapped, {"structure": dict(fields)}, where=where).structure
+
+
+def _many(value: object) -> typing.TypeGuard[list[Any]]:
+    return isinstance(value, list) and any(isinstance(entry, dict) or entry == WORD for entry in value)
+
+
+def _members(hint: Any) -> tuple[Any, ...]:
+    """The types in a union, or the one type."""
+    return typing.get_args(hint) if type(None) in typing.get_args(hint) else (hint,)

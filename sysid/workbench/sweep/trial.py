@@ -1,0 +1,216 @@
+"""One trial: train, score, and say all of it in JSON values. A function of its job alone, in whatever process."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from sysid.errors import SysidError
+from sysid.estimation import FitResult, Training, fit_narx
+from sysid.estimation.least_squares.checkpoint import Checkpoint
+from sysid.models import NARX, AbstractModel, Start
+from sysid.traces import Role, Trace, TraceSet
+from sysid.workbench.fits.config import FitConfig, PipelineConfig
+from sysid.workbench.fits.data import Data
+from sysid.workbench.fits.steps import fit_traces
+
+FAILED = "FAILED"
+"""Status of a trial whose fit raised an error."""
+
+REPEATS = 3
+"""Free runs that are timed; the least counts, for whatever else the machine does only adds to it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bench:
+    """What all trials of a sweep share; sent to each worker once.
+
+    Args:
+        pipeline: The pipeline that the winner will go through, as JSON values.
+        traces: Every case.
+        selection: The traces that choose.
+    """
+
+    pipeline: Mapping[str, Any]
+    traces: TraceSet
+    selection: tuple[Trace, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One piece of training.
+
+    Args:
+        key: Digest of everything it depends on.
+        number: The point's place in the grid.
+        structure: What is fitted, as JSON values.
+        training: Options of the training, its seed among them; empty for a linear model.
+        iterations: Where this piece ends; ``None`` for where the training ends.
+        record: Share of each estimation trace that it sees.
+        after: Key of the job whose result it needs.
+        resume: Whether it goes on with that fit as if it had not been put aside, or only begins at its parameters.
+        cost: Work, in units of its own, for the order of jobs and the time left.
+    """
+
+    key: str
+    number: int
+    structure: Mapping[str, Any]
+    training: Mapping[str, Any]
+    iterations: int | None = None
+    record: float = 1.0
+    after: str | None = None
+    resume: bool = False
+    cost: float = 1.0
+
+
+def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Train and score one point.
+
+    Args:
+        bench: Traces and conditions.
+        job: What to do.
+        before: The result of the job that it needs.
+
+    Returns:
+        JSON values: status, figures, the fit and where it can go on. An error of the fit is a result too.
+    """
+    began, cpu = time.perf_counter(), time.process_time()
+    outcome: dict[str, Any] = {"key": job.key, "number": job.number, "structure": dict(job.structure)}
+    try:
+        with threadpool_limits(1):
+            fit, checkpoint = train(bench, job, before)
+            trained = time.perf_counter() - began
+            outcome |= {
+                "status": fit.status.name,
+                "usable": fit.status.usable,
+                "iterations": _iterations(fit),
+                "parameters": fit.model.n_parameters,
+                "operations": operations(fit.model),
+                "log_evidence": None if fit.evidence is None else fit.evidence.log_evidence,
+                "fit": fit.to_dict(),
+                "checkpoint": None if checkpoint is None else dict(checkpoint.fields),
+                **_scores(bench, fit.model),
+            }
+    except (SysidError, ArithmeticError, np.linalg.LinAlgError) as error:
+        # A structure that cannot be fitted to these traces is a finding; the other trials go on.
+        trained = time.perf_counter() - began
+        outcome |= {"status": FAILED, "usable": False, "reason": str(error)}
+    return outcome | {"seconds": trained, "cpu_s": time.process_time() - cpu}
+
+
+def train(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> tuple[FitResult, Checkpoint | None]:
+    """Train one point.
+
+    Args:
+        bench: Traces and conditions.
+        job: What to do.
+        before: The result of the job that it needs.
+
+    Returns:
+        The fit, and where it can go on if it is a network's.
+
+    Raises:
+        SysidError: If it cannot be fitted.
+    """
+    fit = FitConfig.model_validate({"name": "trial", "structure": dict(job.structure), "training": _options(job)})
+    config = PipelineConfig.model_validate(dict(bench.pipeline))
+    data = Data(traces=_shortened(bench.traces, job.record), selection=bench.selection)
+    if not isinstance(fit.structure, NARX):
+        return fit_traces(fit, config, data, None, lambda _: None), None
+    training: Training = fit.training_options(config.seed)
+    if job.iterations is not None:
+        training = replace(training, max_iterations=job.iterations)
+    kept: list[Checkpoint] = []
+    usable = before is not None and before["status"] != FAILED
+    result = fit_narx(
+        data.estimation,
+        config.mapping,
+        fit.structure,
+        training,
+        start=config.start,
+        rest_output=config.rest_output,
+        selection=data.selection,
+        initial=FitResult.from_dict(before["fit"]) if before and usable and not job.resume else None,
+        resume=Checkpoint(fields=before["checkpoint"]) if before and usable and job.resume else None,
+        on_checkpoint=kept.append,
+    )
+    return result, kept[-1]
+
+
+def _options(job: Job) -> dict[str, Any] | None:
+    # One start at a time in one thread: processes are what runs side by side.
+    return {**job.training, "workers": 1} if job.training else None
+
+
+def _shortened(traces: TraceSet, share: float) -> TraceSet:
+    """The set with the beginning of each estimation trace only."""
+    if share >= 1.0:
+        return traces
+
+    def cut(trace: Trace) -> Trace:
+        if traces.roles[trace.name] is not Role.ESTIMATION:
+            return trace
+        n = max(2, round(share * len(trace)))
+        return replace(
+            trace,
+            values=trace.values[:n],
+            usable=None if trace.usable is None else trace.usable[:n],
+            weights=None if trace.weights is None else trace.weights[:n],
+        )
+
+    return replace(traces, traces=tuple(cut(trace) for trace in traces))
+
+
+def _iterations(fit: FitResult) -> int:
+    return int(fit.history["iteration"][-1]) if len(fit.history.get("iteration", ())) else 0
+
+
+def operations(model: AbstractModel) -> int:
+    """Multiplications of one step: what its speed depends on, the same on every machine.
+
+    Args:
+        model: The model.
+
+    Returns:
+        For a network one a weight; for a linear model one a number of its recursion.
+    """
+    return int(np.count_nonzero(model.recursion.numbers))
+
+
+def _scores(bench: Bench, model: AbstractModel) -> dict[str, Any]:
+    """Figures on every case and on the selection traces."""
+    start: Start = PipelineConfig.model_validate(dict(bench.pipeline)).start
+    cases = {
+        trace.name: {"role": bench.traces.roles[trace.name].value, **_case(model, trace, start, REPEATS)}
+        for trace in bench.traces
+    }
+    chosen = [_case(model, trace, start, 0) for trace in bench.selection]
+    means = {
+        f"selection_{name}": float(np.mean([one[name] for one in chosen])) if chosen else math.nan
+        for name in ("free_run_mse", "one_step_mse")
+    }
+    return {"cases": cases, **means}
+
+
+def _case(model: AbstractModel, trace: Trace, start: Start, repeats: int) -> dict[str, float]:
+    inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
+    history = start.history(inputs, target, model.rest_output)
+    n = start.n_measured
+    inputs, target, counted = inputs[n:], target[n:], trace.usable_samples[n:]
+    simulated, predicted = model.simulate(inputs, history), model.predict(inputs, target, history)
+    figures = {
+        "free_run_mse": float(np.mean((simulated - target)[counted] ** 2)),
+        "one_step_mse": float(np.mean((predicted - target)[counted] ** 2)),
+    }
+    seconds = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        model.simulate(inputs, history)
+        seconds.append(time.perf_counter() - began)
+    return figures | ({"run_time_s": min(seconds)} if seconds else {})

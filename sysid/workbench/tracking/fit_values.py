@@ -1,0 +1,224 @@
+"""What is tracked of a fit, in plain words: names, parameters, figures, pictures. No tracking tool is known here."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models import NARX, NeuralStateSpace
+from sysid.traces import Role
+from sysid.workbench.runner.events import DataLoaded, FitReady, RunStarted
+
+if TYPE_CHECKING:
+    from sysid.validation import CaseResult
+
+
+MAX_METRICS = 1000
+"""Metrics that MLflow takes in one batch (``mlflow.utils.validation.MAX_METRICS_PER_BATCH``)."""
+COLOUR_TAG = "mlflow.runColor"
+"""Tag of a run with its colour in charts; without it MLflow may give two fits the same."""
+
+
+def colour(number: int) -> str:
+    """The colour of a fit, as reports have it.
+
+    Args:
+        number: Of the fit in its run.
+
+    Returns:
+        A colour as in ``#0072B2``.
+    """
+    from sysid.reporting.figures.style import PALETTE
+
+    return PALETTE[number % len(PALETTE)]
+
+
+def run_name(ready: FitReady) -> str:
+    """The fit as an engineer recognises it.
+
+    Args:
+        ready: The fit.
+
+    Returns:
+        For example ``BP+AR -> BC · NARX 4/4/20 · closed``.
+    """
+    model = ready.fit.model
+    return f"{model.mapping} · {model.structure.label} · {ready.fit.loop.value}"
+
+
+def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
+    """Words to filter and group by.
+
+    Args:
+        ready: The fit.
+        run: The run that it belongs to.
+        data: The traces.
+
+    Returns:
+        Texts by name.
+    """
+    return {
+        "pipeline": run.config.name,
+        "pipeline_run": run.run_id,
+        "fit": ready.config.name,
+        "structure": ready.fit.model.structure.label,
+        "loop": ready.fit.loop.value,
+        "status": ready.fit.status.name,
+        "data": data.traces.name,
+        "data_digest": data.traces.digest,
+        "output_unit": ready.fit.model.output_unit,
+        "folder": str(ready.folder),
+    } | ({"initial_fit": ready.config.initial} if ready.config.initial else {})
+
+
+def description(ready: FitReady, run: RunStarted, links: Mapping[str, str]) -> str:
+    """What stands above the fit: how it ended, what is worth knowing, what belongs to it, and the command.
+
+    Args:
+        ready: The fit.
+        run: The run that it belongs to.
+        links: Addresses by what lies there.
+
+    Returns:
+        Markdown.
+    """
+    # MLflow shows the first few lines and hides the rest behind a click: what leads elsewhere stands first.
+    leads = [f"[{words}]({address})" for words, address in links.items()]
+    lines = [" · ".join([f"**{ready.config.name}** of the pipeline `{run.config.name}`", *leads]), ""]
+    lines += [ready.fit.status.value, "", *(f"* {note}" for note in ready.fit.notes)]
+    return "\n".join([*lines, "", f"Made by `{run.command}`."])
+
+
+def parameters(ready: FitReady, run: RunStarted) -> dict[str, str]:
+    """What was chosen before the fit.
+
+    Args:
+        ready: The fit.
+        run: The run that it belongs to.
+
+    Returns:
+        Texts by name.
+    """
+    structure = ready.fit.model.structure.to_dict()
+    chosen: dict[str, Any] = {"mapping": ready.fit.model.mapping, "start": run.config.start.kind.value, **structure}
+    if ready.config.training is not None or structure["kind"] in {NARX.kind, NeuralStateSpace.kind}:
+        training = ready.config.training_options(run.config.seed)
+        chosen |= {f"training.{name}": getattr(value, "value", value) for name, value in vars(training).items()}
+    return {name: str(value) for name, value in chosen.items()}
+
+
+def metrics(ready: FitReady) -> dict[str, float]:
+    """The figures; a slash groups a figure's cases in one section.
+
+    Args:
+        ready: The fit.
+
+    Returns:
+        Finite numbers by name.
+    """
+    fit, cases = ready.fit, ready.evaluation.cases
+    unseen = [role for role in (Role.VALIDATION, Role.TEST) if any(case.role is role for case in cases.values())]
+    found: dict[str, float] = {
+        "mean_free_run_mse": ready.evaluation.mean_mse(*unseen),
+        "worst_free_run_mse": max(case.free_run.mse for case in cases.values()),
+        "mean_nrmse_fit": _mean_fit([case.free_run.nrmse_fit for case in cases.values() if case.role in unseen]),
+        "least_nrmse_fit": min(case.free_run.nrmse_fit for case in cases.values()),
+        "selection_mse": ready.selection_mse,
+        "parameters": fit.model.n_parameters,
+        "train_time_s": fit.train_time_s,
+        "mean_run_time_s": float(np.mean([case.run_time_s for case in cases.values()])),
+    }
+    if fit.evidence is not None:
+        found["log_evidence"] = fit.evidence.log_evidence
+        found["effective_parameters"] = fit.evidence.total_effective_parameters
+    if fit.stability is not None:
+        found["unstable_sequences"] = fit.stability["unbounded"] + fit.stability["unsettled"]
+    for name, case in cases.items():
+        case_name = key(name)
+        found[f"free_run_mse/{case_name}"] = case.free_run.mse
+        found[f"one_step_mse/{case_name}"] = case.one_step.mse
+        found[f"nrmse_fit/{case_name}"] = case.free_run.nrmse_fit
+        found[f"max_abs_error/{case_name}"] = case.free_run.max_abs_error
+        found[f"run_time_s/{case_name}"] = case.run_time_s
+        if case.intervals is not None:
+            found[f"free_run_coverage/{case_name}"] = case.intervals.free_run.share
+            found[f"one_step_coverage/{case_name}"] = case.intervals.one_step.share
+    return {name: float(value) for name, value in found.items() if math.isfinite(value)}
+
+
+def _mean_fit(fits: list[float]) -> float:
+    """Mean over the cases whose target varies, so that a fit is defined; NaN without any."""
+    defined = [fit for fit in fits if not math.isnan(fit)]
+    return float(np.mean(defined)) if defined else math.nan
+
+
+def learning_curve(ready: FitReady) -> list[tuple[int, float]]:
+    """Iteration and mean squared error, where the latter is finite."""
+    history = ready.fit.history
+    pairs = zip(history["iteration"], history["mse"], strict=True)
+    return [(int(iteration), float(mse)) for iteration, mse in pairs if math.isfinite(mse)]
+
+
+def pictures(ready: FitReady) -> Iterator[tuple[str, NDArray[np.uint8]]]:
+    """Target and output of each case, drawn.
+
+    The key is the case, and the same for every fit, so that fits stand side by side.
+
+    Args:
+        ready: The fit.
+
+    Yields:
+        Key and picture, shape ``(height, width, 3)``.
+    """
+    for name, case in ready.evaluation.cases.items():
+        yield f"target and output/{key(name)}", _picture(ready, case)
+
+
+def _picture(ready: FitReady, case: CaseResult) -> NDArray[np.uint8]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from sysid.reporting.figures.fit_figures import case_figure
+
+    model = ready.fit.model
+    figure = case_figure(
+        case.time,
+        case.target,
+        case.simulated,
+        title=f"{case.case}, {case.role.value}: {model.structure.label}, {ready.fit.loop.value} loop",
+        label=model.mapping.output,
+        unit=model.output_unit,
+    )
+    # matplotlib's backends carry no annotations.
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[:, :, :3])
+
+
+def batches(values: Sequence[Any]) -> Iterator[Sequence[Any]]:
+    """Metrics in as many calls as the store needs.
+
+    Args:
+        values: The metrics.
+
+    Yields:
+        At most as many as it takes in one batch.
+    """
+    for first in range(0, len(values), MAX_METRICS):
+        yield values[first : first + MAX_METRICS]
+
+
+def key(name: str) -> str:
+    """A name with every character that a tracking store refuses as an underscore.
+
+    Args:
+        name: For example ``"VAL 1 (µ = 0.3)"``.
+
+    Returns:
+        For example ``"VAL 1 __ _ 0.3_"``.
+    """
+    return re.sub(r"[^A-Za-z0-9_. -]", "_", name)

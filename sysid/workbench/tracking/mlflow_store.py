@@ -1,0 +1,289 @@
+"""MLflow itself, and the only file that imports it: its stores, its experiments, its data sets and its models.
+
+No other room knows that it exists. What is tracked, and when, :mod:`sysid.workbench.tracking.listener` says.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.traces import TraceSet
+from sysid.workbench.runner.events import FitReady
+from sysid.workbench.runner.naming import slug
+from sysid.workbench.tracking import fit_values as tracked
+from sysid.workbench.tracking import mlflow_views as views
+from sysid.workbench.tracking.fit_run import Entities
+from sysid.workbench.tracking.registry import parsed, register
+from sysid.workbench.tracking.sqlite_store import SQLITE, held
+
+QUIET = {
+    "MLFLOW_DISABLE_TELEMETRY": "true",
+    "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
+    "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
+    "GIT_PYTHON_REFRESH": "quiet",
+}
+"""Settings that MLflow reads when it is imported; what the user has set stays."""
+
+
+TRACKING_VARIABLE = "MLFLOW_TRACKING_URI"
+"""MLflow's own environment variable for the store."""
+
+
+def store_uri(workspace: Path) -> str:
+    """Where runs are tracked: ``MLFLOW_TRACKING_URI``, or SQLite in the workspace.
+
+    Args:
+        workspace: The user's workspace.
+
+    Returns:
+        A tracking URI.
+    """
+    return os.environ.get(TRACKING_VARIABLE) or f"{SQLITE}{(workspace / 'mlflow.db').resolve().as_posix()}"
+
+
+def connect(uri: str) -> Any:
+    """A client of a store that is ready for use by several processes.
+
+    Args:
+        uri: The tracking URI.
+
+    Returns:
+        An ``MlflowClient``.
+    """
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
+    with no_deprecations():
+        from mlflow import MlflowClient
+
+        for name in ("mlflow", "alembic"):
+            logging.getLogger(name).setLevel(logging.WARNING)
+        if not uri.startswith(SQLITE):
+            return MlflowClient(uri)
+        with held(Path(uri.removeprefix(SQLITE)), _make_store):
+            return MlflowClient(uri)
+
+
+def _make_store(database: Path) -> None:
+    from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
+
+    store = SqlAlchemyStore(f"{SQLITE}{database.as_posix()}", "mlartifacts")
+    store.engine.dispose()
+
+
+@contextmanager
+def no_deprecations() -> Iterator[None]:
+    """What MLflow and its web framework deprecate in each other is not the user's business, nor ours to fix.
+
+    Yields:
+        Nothing.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def entities() -> Entities:
+    """The classes that those who may not import MLflow need of it.
+
+    Returns:
+        The classes.
+    """
+    from mlflow.entities import Metric, Param
+
+    return Entities(metric=Metric, param=Param)
+
+
+def experiment_of(client: Any, name: str, artifacts: Path | None) -> str:
+    """The experiment of a mapping, a pipeline or a sweep, made or brought back if need be.
+
+    Args:
+        client: An ``MlflowClient``.
+        name: Its name.
+        artifacts: Where a new one keeps its files; ``None`` leaves it to a server.
+
+    Returns:
+        Its identifier.
+    """
+    from mlflow.exceptions import MlflowException
+
+    found = client.get_experiment_by_name(name)
+    if found is None:
+        location = None
+        if artifacts is not None:
+            location = (artifacts / slug(name)).resolve().as_uri()
+        try:
+            # Otherwise MLflow asks every visitor what kind of experiment it is.
+            tags = {"mlflow.experimentKind": "custom_model_development"}
+            return str(client.create_experiment(name, artifact_location=location, tags=tags))
+        except MlflowException:
+            # Another process has just made it.
+            found = client.get_experiment_by_name(name)
+            if found is None:
+                raise
+    if found.lifecycle_stage == "deleted":
+        client.restore_experiment(found.experiment_id)
+    return str(found.experiment_id)
+
+
+def latest_experiment(uri: str) -> str | None:
+    """The experiment with the newest run, the one to open first.
+
+    Args:
+        uri: The tracking URI.
+
+    Returns:
+        Its identifier; ``None`` where nothing is tracked yet.
+    """
+    with no_deprecations():
+        client = connect(uri)
+        experiments = [experiment.experiment_id for experiment in client.search_experiments()]
+        newest = client.search_runs(experiments, order_by=["attributes.start_time DESC"], max_results=1)
+        if not newest:
+            return None
+        # The page that is opened names the view, which an experiment made by other means has not got yet.
+        views.show(client, newest[0].info.experiment_id, [])
+        return str(newest[0].info.experiment_id)
+
+
+def log_data(client: Any, run_id: str, traces: TraceSet) -> None:
+    """Log the data that a fit was made of.
+
+    Args:
+        client: An ``MlflowClient``.
+        run_id: The fit's run.
+        traces: The data.
+    """
+    from mlflow.data.code_dataset_source import CodeDatasetSource
+    from mlflow.data.meta_dataset import MetaDataset
+    from mlflow.entities import DatasetInput, InputTag
+    from mlflow.types import ColSpec, Schema
+
+    cases = {trace.name: f"{traces.roles[trace.name].value}, {len(trace)} samples" for trace in traces}
+    dataset = MetaDataset(
+        CodeDatasetSource(tags={"source": traces.source[:2000], "digest": traces.digest, "cases": cases}),
+        name=traces.name,
+        # MLflow keeps at most 36 characters; the whole digest stands in the source and in the run's tags.
+        digest=traces.digest[:32],
+        schema=Schema([ColSpec("double", channel.label) for channel in traces.channels]),
+    )
+    context = InputTag("mlflow.data.context", "estimation and validation")
+    client.log_inputs(run_id, [DatasetInput(dataset._to_mlflow_entity(), [context])])
+
+
+def log_model(client: Any, file: Path, ready: FitReady, *, uri: str, run_id: str, traces: TraceSet) -> None:
+    """Log the exported network as a model that MLflow can load and serve, and as the newest in the registry.
+
+    Args:
+        client: An ``MlflowClient``.
+        file: The network, in ONNX.
+        ready: The fit that was exported.
+        uri: The tracking URI.
+        run_id: The fit's run.
+        traces: The data; an example of inputs is taken from it.
+    """
+    import mlflow
+    import onnx
+
+    network = onnx.load(str(file))
+    before, variable = mlflow.get_tracking_uri(), os.environ.get(TRACKING_VARIABLE)
+    mlflow.set_tracking_uri(uri)
+    try:
+        with mlflow.start_run(run_id=run_id):
+            logged = mlflow.onnx.log_model(
+                network,
+                name=slug(tracked.run_name(ready)),
+                signature=_signature(network),
+                input_example=_example(network, ready, traces),
+                # Without these MLflow asks for CUDA at load and for whatever it finds installed.
+                onnx_execution_providers=["CPUExecutionProvider"],
+                pip_requirements=["onnx", "onnxruntime", "numpy"],
+                save_as_external_data=False,
+            )
+        register(
+            client,
+            str(ready.fit.model.mapping),
+            source=logged.model_uri,
+            run_id=run_id,
+            model_id=logged.model_id,
+            fit=ready.config.name,
+        )
+    finally:
+        mlflow.set_tracking_uri(before)
+        # MLflow writes what it is told into the environment too, where it would name the store of the next run.
+        os.environ.pop(TRACKING_VARIABLE, None)
+        if variable is not None:
+            os.environ[TRACKING_VARIABLE] = variable
+
+
+def _example(network: Any, ready: FitReady, traces: TraceSet) -> dict[str, NDArray[np.float64]]:
+    """A few samples of the first trace for one car, from the middle of every channel's range."""
+    trace = traces.traces[0]
+    columns = trace.columns(ready.fit.model.mapping.inputs)[:8]
+    _, state = network.graph.input
+    return {"u": columns[:, None, :], "state": np.zeros((1, state.type.tensor_type.shape.dim[1].dim_value))}
+
+
+def _signature(network: Any) -> Any:
+    """Names, types and shapes of a graph's inputs and outputs; -1 stands for any length."""
+    from mlflow.models import ModelSignature
+    from mlflow.types import Schema, TensorSpec
+    from onnx.helper import tensor_dtype_to_np_dtype
+
+    def schema(values: Any) -> Any:
+        tensors = [(value.name, value.type.tensor_type) for value in values]
+        return Schema(
+            [
+                TensorSpec(
+                    np.dtype(tensor_dtype_to_np_dtype(tensor.elem_type)),
+                    tuple(dim.dim_value or -1 for dim in tensor.shape.dim),
+                    name,
+                )
+                for name, tensor in tensors
+            ]
+        )
+
+    return ModelSignature(inputs=schema(network.graph.input), outputs=schema(network.graph.output))
+
+
+def fetch_bundle(uri: str, address: str, folder: Path) -> tuple[Path, str]:
+    """The bundle of a registered model.
+
+    Args:
+        uri: The tracking URI.
+        address: ``models:/<name>@<alias>`` or ``models:/<name>/<version>``.
+        folder: Where it is put.
+
+    Returns:
+        The bundle's folder, and the run that tracks it.
+
+    Raises:
+        ConfigError: If there is no such model, or its run holds no bundle.
+    """
+    client = connect(uri)
+    name, alias, version = parsed(address)
+    with no_deprecations():
+        from mlflow.exceptions import MlflowException
+
+        try:
+            found = client.get_model_version_by_alias(name, alias) if alias else client.get_model_version(name, version)
+            target = folder / f"{slug(name)}-{found.version}"
+            target.mkdir(parents=True, exist_ok=True)
+            return Path(client.download_artifacts(found.run_id, "bundle", str(target))), str(found.run_id)
+        except (MlflowException, OSError) as error:
+            raise ConfigError(
+                "the registered model cannot be had",
+                where=address,
+                expected="a model that sysid run has exported and tracked",
+                got=str(error).splitlines()[0],
+                remedy="look for its name and version under Models in sysid ui",
+            ) from error

@@ -1,0 +1,165 @@
+"""Sensitivities through a cascade against finite differences, whatever its wiring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from sysid.errors import ChannelError, ConfigError
+from sysid.estimation.least_squares.counted_rows import counted_rows
+from sysid.estimation.networks.joint_provider import BLOCK, CascadeProvider
+from sysid.models import Cascade, Limit
+from sysid.testing import finite_difference_jacobian
+from sysid.traces import Channel, Trace
+from tests.models.cascades import CASCADES, command, linear, network, service
+from tests.models.test_cascade import lag
+
+
+def trace(cascade: Cascade, n: int = 60, seed: int = 0, *, usable=None) -> Trace:
+    """A record with the cascade's inputs, and noise for its outputs."""
+    names = cascade.wiring.channels
+    noise = np.random.default_rng(seed).uniform(0.0, 90.0, (n, len(cascade.outputs)))
+    return Trace(
+        name=f"record {seed}",
+        sample_time=0.1,
+        channels=tuple(Channel(name=name, unit="psi") for name in names),
+        values=np.column_stack([command(n, len(cascade.inputs), seed), noise]),
+        usable=usable,
+    )
+
+
+def provider(cascade: Cascade, n: int = 60, **fields) -> CascadeProvider:
+    errors = {name: 0.5 + i for i, name in enumerate(cascade.outputs)}
+    return CascadeProvider(**{"cascade": cascade, "traces": (trace(cascade, n), trace(cascade, n // 2, 1)), "errors": errors} | fields)  # fmt: skip  # noqa: E501
+
+
+def check(one: CascadeProvider, atol: float = 2e-6) -> None:
+    theta = one.theta
+    assert_allclose(one.jacobian(theta), finite_difference_jacobian(one.residuals, theta), rtol=1e-5, atol=atol)
+
+
+@pytest.mark.parametrize("cascade", CASCADES.values(), ids=CASCADES)
+def test_sensitivities_equal_finite_differences(cascade):
+    check(provider(cascade))
+
+
+@pytest.mark.parametrize("trained", [("BP",), ("AR",), ("BC",), ("BP", "BC")], ids="+".join)
+def test_some_members_alone_are_trained(trained):
+    one = provider(service(), trained=trained)
+    assert len(one.theta) == sum(service().member(name).n_parameters for name in trained)
+    check(one)
+
+
+def test_a_target_upstream_of_what_is_trained_does_not_move():
+    one = provider(service(), trained=("AR",), errors={"BP": 1.0, "BC": 2.0})
+    J = one.jacobian(one.theta)
+    assert not J[:60].any()
+    assert J[60:120].any()
+    check(one)
+
+
+def test_an_output_held_by_a_channel_moves_with_it():
+    cascade = replace(service(), limits={"AR": Limit(high="BP"), "BC": Limit(low="AR")})
+    held = cascade.simulate_trace(trace(cascade)).activity
+    assert held["AR"].high > 0
+    assert held["BC"].low > 0
+    check(provider(cascade))
+
+
+def test_blocks_join_without_a_seam():
+    one = provider(service(), n=2 * BLOCK + 57)
+    theta, direction = one.theta, np.random.default_rng(4).standard_normal(len(one.theta))
+    width = 1e-6
+    expected = (one.residuals(theta + width * direction) - one.residuals(theta - width * direction)) / (2 * width)
+    assert_allclose(one.jacobian(theta) @ direction, expected, rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize(("stride", "moves"), [(1, np.inf), (3, np.inf), (7, np.inf), (7, 150.0)])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_normal_equations_equal_the_dense_ones(stride, moves, workers):
+    cascade = service()
+    usable = np.random.default_rng(5).random(BLOCK + 90) > 0.2
+    traces = (trace(cascade, BLOCK + 90, usable=usable), trace(cascade, 50, 1))
+    errors = {"BC": 2.0, "BP": 0.5}
+    one = provider(cascade, traces=traces, errors=errors, stride=stride, moves=moves, workers=workers)
+    rows = [counted_rows(t.columns(list(errors)) / list(errors.values()), stride, moves) for t in traces]
+    weights = np.concatenate([np.tile(t.usable_samples[own], 2) for t, own in zip(traces, rows, strict=True)])
+    weights = weights.astype(float)
+    at, J, e = one.linearise(one.theta), one.jacobian(one.theta), one.residuals(one.theta)
+    assert one.n_samples == weights.sum()
+    assert_allclose(at.loss, 0.5 * np.sum(weights * e**2), rtol=1e-12)
+    assert_allclose(at.loss, one.loss(one.theta), rtol=1e-12)
+    assert_allclose(at.gradient, J.T @ (weights * e), rtol=1e-9, atol=1e-9)
+    assert_allclose(at.gauss_newton, J.T @ (weights[:, None] * J), rtol=1e-9, atol=1e-9)
+
+
+def test_beyond_the_soft_margin_a_trace_counts_by_the_logarithm_of_its_error():
+    """The gradient against finite differences of the loss; the matrix is that of the squares, weighted by trace."""
+    one = provider(service(), soft_margin=20.0, stride=2)
+    theta, at = one.theta, one.linearise(one.theta)
+    assert_allclose(at.loss, one.loss(theta))
+    slopes = finite_difference_jacobian(lambda there: np.array([one.loss(there)]), theta)[0]
+    assert_allclose(at.gradient, slopes, rtol=1e-4, atol=1e-6 * np.abs(slopes).max())
+    J, weights, H = one.jacobian(theta), [], at.gauss_newton
+    for residual in np.split(one.residuals(theta), np.cumsum([30, 30, 30, 15, 15])):
+        weights += [1.0 / (1.0 + np.mean(residual**2) / 20.0**2)] * len(residual)
+    assert min(weights) < 0.9
+    assert_allclose(H, J.T @ (np.array(weights)[:, None] * J), rtol=1e-9, atol=1e-9 * H.max())
+
+
+def test_long_rows_count_less_in_the_matrix_and_not_in_the_loss():
+    plain = provider(service(), stride=2)
+    one = provider(service(), stride=2, leverage=1.5)
+    theta, J = one.theta, one.jacobian(one.theta)
+    lengths = np.linalg.norm(J, axis=1)
+    weights = np.minimum(1.0, 1.5 * np.median(lengths[lengths > 0.0]) / np.maximum(lengths, 1e-300)) ** 2
+    assert 0.1 < np.mean(weights < 1.0) < 0.9
+    at = one.linearise(theta)
+    assert_allclose(at.gradient, J.T @ (weights * one.residuals(theta)), rtol=1e-9, atol=1e-9)
+    assert_allclose(at.gauss_newton, J.T @ (weights[:, None] * J), rtol=1e-9, atol=1e-9)
+    assert at.loss == plain.linearise(theta).loss == pytest.approx(one.loss(theta))
+
+
+def test_a_gap_does_not_make_a_trace_count_as_better_than_it_is():
+    usable = np.arange(60) >= 40
+    one = provider(service(), traces=(trace(service(), usable=usable),), soft_margin=20.0)
+    S = np.mean(one.residuals(one.theta).reshape(3, 60)[:, usable] ** 2, axis=1)
+    assert_allclose(one.loss(one.theta), 0.5 * np.sum(20 * 20.0**2 * np.log1p(S / 20.0**2)))
+
+
+def test_parameters_go_in_and_come_out():
+    cascade = CASCADES["a linear member"]
+    one = provider(cascade)
+    inputs = command()
+    assert_array_equal(one.at(one.theta).simulate(inputs).values, cascade.simulate(inputs).values)
+    moved = one.theta + 0.01
+    assert_array_equal(provider(one.at(moved)).theta, moved)
+
+
+def test_a_model_with_a_state_of_its_own_may_come_before_what_is_trained():
+    cascade = Cascade(models=(lag("STP -> BP"), network("BP -> AR", seed=2), linear("BP+AR -> BC")))
+    one = provider(cascade, trained=("AR", "BC"))
+    check(one)
+    with pytest.raises(ConfigError, match="cannot be trained with the others"):
+        provider(cascade)
+
+
+@pytest.mark.parametrize("fields", [{"errors": {"XX": 1.0}}, {"errors": {}}, {"trained": ("XX",)}], ids=str)
+def test_names_that_are_no_outputs_are_refused(fields):
+    with pytest.raises(ChannelError, match="missing channel"):
+        provider(service(), **fields)
+
+
+def test_a_loss_that_is_not_a_number_is_infinite():
+    one = provider(service())
+    assert one.loss(np.full(len(one.theta), np.nan)) == np.inf
+
+
+def test_a_start_that_runs_away_overflows_without_a_warning():
+    one = provider(Cascade(models=(linear("STP -> BP"),)), n=1200)
+    with np.errstate(all="raise"):  # what one has asked for elsewhere does not matter either
+        found = one.linearise(2.0 * one.theta)
+    assert not np.isfinite(found.gauss_newton).any()

@@ -1,0 +1,161 @@
+"""Members trained together through each other; one retrained on what comes from upstream."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from sysid.errors import ChannelError, ConfigError
+from sysid.estimation import CascadeFit, JointTraining, Status, fit_cascade, with_upstream_outputs
+from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.models import Cascade
+from sysid.traces import Role, TraceSet
+from tests.models.cascades import command, linear, network, service
+
+TRUTH = service()
+TRAINING = JointTraining(max_iterations=20, looks=4)
+
+
+def measured(cascade: Cascade = TRUTH, n: int = 400, seed: int = 0):
+    """What a system puts out that is a cascade itself."""
+    return cascade.simulate(command(n, len(cascade.inputs), seed)).trace(f"record {seed}")
+
+
+def disturbed(cascade: Cascade = TRUTH, seed: int = 7, by: float = 0.02) -> Cascade:
+    """The same cascade, all parameters a little off."""
+    one = CascadeProvider(cascade=cascade, traces=(measured(n=5),), errors=dict.fromkeys(cascade.outputs, 1.0))
+    return one.at(one.theta + by * np.random.default_rng(seed).standard_normal(len(one.theta)))
+
+
+def mse(cascade: Cascade, trace, name: str = "BC") -> float:
+    return float(np.mean((cascade.simulate_trace(trace)[name] - trace[name]) ** 2))
+
+
+@pytest.fixture(scope="module")
+def fit() -> CascadeFit:
+    return fit_cascade(disturbed(), [measured(), measured(seed=1)], training=TRAINING, selection=[measured(seed=2)])
+
+
+def test_training_together_lowers_the_error_of_every_output_on_unseen_commands(fit):
+    unseen = measured(seed=3)
+    for name in TRUTH.outputs:
+        assert mse(fit.model, unseen, name) < 0.01 * mse(disturbed(), unseen, name)
+    assert fit.status.usable
+    assert fit.seed is None
+
+
+def test_the_curve_falls(fit):
+    assert np.all(np.diff(fit.history["loss"]) <= 1e-12)
+    assert len({len(column) for column in fit.history.values()}) == 1
+
+
+def test_the_prior_has_groups_for_every_member(fit):
+    assert {name.split(":")[0] for name in fit.evidence.alphas} == {"BP", "AR", "BC"}
+
+
+def test_the_fit_survives_storing(fit):
+    again = CascadeFit.from_dict(json.loads(json.dumps(fit.to_dict())))
+    unseen = measured(seed=3)
+    assert_array_equal(again.model.simulate_trace(unseen).values, fit.model.simulate_trace(unseen).values)
+    assert (again.status, again.errors, again.notes) == (fit.status, fit.errors, fit.notes)
+
+
+def test_the_downstream_target_alone_moves_upstream_members():
+    start = disturbed()
+    fit = fit_cascade(start, [measured()], targets=["BC"], training=TRAINING)
+    assert mse(fit.model, measured()) < 0.01 * mse(start, measured())
+    assert not np.array_equal(fit.model.member("BP").theta, start.member("BP").theta)
+
+
+def test_members_that_are_not_trained_stay():
+    start = disturbed()
+    fit = fit_cascade(start, [measured()], targets={"BC": 0.1}, trained=["BC"], training=TRAINING)
+    assert fit.errors == {"BC": 0.1}
+    for name in ("BP", "AR"):
+        assert_array_equal(fit.model.member(name).theta, start.member(name).theta)
+    assert mse(fit.model, measured()) < mse(start, measured())
+
+
+def test_a_start_that_the_selection_traces_prefer_is_kept():
+    # The estimation record belongs to another system: training on it can only lead away.
+    other = measured(disturbed(seed=11, by=0.1))
+    fit = fit_cascade(TRUTH, [other], training=TRAINING, selection=[measured(seed=2)])
+    assert fit.status is Status.NOT_IMPROVED
+    assert_array_equal(fit.model.simulate_trace(other).values, TRUTH.simulate_trace(other).values)
+
+
+def test_what_is_exactly_right_does_not_outweigh_the_rest():
+    """A state that is exact on every selection trace scores as one that is right to a thousandth of what counts."""
+    errors = dict.fromkeys(TRUTH.outputs, 0.5)
+    fit = fit_cascade(
+        TRUTH, [measured()], targets=errors, training=replace(TRAINING, max_iterations=1), selection=[measured(seed=2)]
+    )
+    assert "on the selection traces 1e-06" in fit.notes[0]
+
+
+@pytest.mark.parametrize("basis", ["levels and rates", "plain"])
+def test_a_fit_is_the_same_every_time(basis):
+    training = replace(TRAINING, max_iterations=4, looks=2, basis=basis)
+    results = [fit_cascade(disturbed(), [measured(), measured(seed=1)], training=training) for _ in range(2)]
+    assert_array_equal(*(one.model.simulate_trace(measured()).values for one in results))
+
+
+def test_strides_find_the_same_system():
+    fit = fit_cascade(disturbed(), [measured()], training=replace(TRAINING, stride=5))
+    assert mse(fit.model, measured(seed=3)) < 0.05 * mse(disturbed(), measured(seed=3))
+
+
+def test_a_cascade_with_a_linear_member_is_trained_too():
+    truth = Cascade(models=(network("STP -> BP", seed=1), linear("BP -> BC")))
+    start = truth.with_member(replace(linear("BP -> BC"), coefficients=np.array([0.12, 0.04, 0.55, 0.28])))
+    record = truth.simulate(command(400)).trace("a")
+    fit = fit_cascade(start, [record], training=replace(TRAINING, max_iterations=60))
+    assert mse(fit.model, record) < 1e-3 * mse(start, record)
+
+
+@pytest.mark.parametrize("fields", [{"starts": 0}, {"stride": 0}, {"moves": 0.0}, {"basis": "other"}], ids=str)
+def test_training_that_cannot_be_is_refused(fields):
+    with pytest.raises(ConfigError):
+        JointTraining(**fields)
+
+
+class TestUpstream:
+    """Traces with the free run of upstream members in place of what was measured."""
+
+    TRACES = TraceSet(
+        name="set", traces=(measured(), measured(seed=1)), roles={"record 0": Role.ESTIMATION, "record 1": Role.TEST}
+    )
+
+    def test_inputs_are_simulated_and_the_output_stays_measured(self):
+        cascade = disturbed()
+        changed = with_upstream_outputs(self.TRACES, cascade, "BC")
+        trace = self.TRACES["record 0"]
+        run = cascade.simulate_trace(trace)
+        assert changed["record 0"].channel_names == ("BP", "AR", "BC")
+        assert_array_equal(changed["record 0"]["BP"], run["BP"])
+        assert_array_equal(changed["record 0"]["AR"], run["AR"])
+        assert_array_equal(changed["record 0"]["BC"], trace["BC"])
+        assert changed.roles == self.TRACES.roles
+        assert "simulated" in changed["record 0"].provenance[-1]
+
+    def test_a_member_that_is_refitted_on_them_sees_in_the_whole_what_it_was_fitted_on(self):
+        cascade = disturbed()
+        changed = with_upstream_outputs(self.TRACES, cascade, "BC")["record 0"]
+        model = cascade.member("BC")
+        at_rest = cascade.levels(self.TRACES["record 0"]["STP"][:1])
+        alone = Cascade(models=(model,), rest={"BP": float(at_rest[1]), "AR": float(at_rest[2])}).simulate_trace(
+            changed
+        )
+        assert_allclose(alone["BC"], cascade.simulate_trace(self.TRACES["record 0"])["BC"], atol=1e-9)
+
+    def test_the_command_stays_measured(self):
+        changed = with_upstream_outputs(self.TRACES, TRUTH, "BP")
+        assert_array_equal(changed["record 1"]["STP"], self.TRACES["record 1"]["STP"])
+
+    def test_a_stranger_is_refused(self):
+        with pytest.raises(ChannelError, match="missing channel XX"):
+            with_upstream_outputs(self.TRACES, TRUTH, "XX")

@@ -1,0 +1,144 @@
+"""Neural state spaces find systems whose truth is known, and say how."""
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space
+from sysid.estimation.networks.neural_provider import NeuralProvider
+from sysid.estimation.networks.neural_start import linear_start
+from sysid.estimation.networks.provider import experiments_of
+from sysid.models import Mapping, NeuralForm, NeuralStateSpace, Scaling, Start, StartKind
+from sysid.traces import Channel, Trace
+
+MAPPING = Mapping.parse("u -> y")
+CHANNELS = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+MEASURED = Start(kind=StartKind.MEASURED, n_measured=20)
+
+
+def a_trace(name: str, u: np.ndarray, y: np.ndarray) -> Trace:
+    return Trace(name=name, sample_time=1.0, channels=CHANNELS, values=np.column_stack([u, y]))
+
+
+def steps(n: int, rng: np.random.Generator) -> np.ndarray:
+    return np.repeat(rng.uniform(-1.0, 1.0, n // 10 + 1), 10)[:n]
+
+
+def linear(seed: int, n: int = 600) -> Trace:
+    """Two poles, one of them slow, and a constant."""
+    u = steps(n, np.random.default_rng(seed))
+    x, y = np.zeros(2), np.empty(n)
+    for t in range(n):
+        y[t] = x @ [0.7, -0.3] + 0.2
+        x = np.array([[0.95, 0.1], [0.0, 0.6]]) @ x + np.array([0.05, 0.4]) * u[t]
+    return a_trace(f"linear {seed}", u, y)
+
+
+def hidden_saturation(seed: int, n: int = 800) -> Trace:
+    """A state that saturates and is not measured, then a slow one that is."""
+    u = steps(n, np.random.default_rng(seed))
+    a, b, y = 0.0, 0.0, np.empty(n)
+    for t in range(n):
+        y[t] = b
+        a, b = 0.8 * a + 0.3 * u[t], 0.95 * b + 0.05 * np.tanh(2.0 * a)
+    return a_trace(f"saturation {seed}", u, y)
+
+
+def rmse(fit: FitResult, trace: Trace, start: Start = MEASURED) -> float:
+    u, y = trace.columns(["u"]), trace["y"]
+    n = start.n_measured
+    output = fit.model.simulate(u[n:], start.history(u, y, fit.model.rest_output))
+    return float(np.sqrt(np.mean((output - y[n:]) ** 2)))
+
+
+def test_the_linear_start_is_the_best_linear_model():
+    trace = linear(0)
+    network = NeuralStateSpace(states=2, neurons=3)
+    form = NeuralForm(
+        sizes=network.sizes(1),
+        theta=np.zeros(network.sizes(1).count),
+        scaling=Scaling.to_unit_range([trace.columns(["u"])], [trace["y"]]),
+    )
+    provider = NeuralProvider(template=form, experiments=experiments_of([trace], MAPPING, MEASURED, 0.0))
+    theta = linear_start(provider)
+    assert 2.0 * provider.loss(theta) / provider.n_samples < 1e-12
+    assert np.abs(np.concatenate(provider.states(theta))).max() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("start", [Start(), MEASURED], ids=["at rest", "measured start"])
+def test_a_linear_system_is_found_exactly(start):
+    fit = fit_neural_state_space(
+        [linear(0), linear(1)],
+        MAPPING,
+        NeuralStateSpace(states=2, neurons=0),
+        Training(max_iterations=20),
+        start=start,
+        rest_output=0.2,
+    )
+    assert rmse(fit, linear(2), start) < 1e-5
+    assert fit.loop is Loop.CLOSED
+
+
+@pytest.fixture(scope="module")
+def saturation() -> FitResult:
+    return fit_neural_state_space(
+        [hidden_saturation(0)],
+        MAPPING,
+        NeuralStateSpace(states=2, neurons=3),
+        Training(max_iterations=60, starts=2, regularisation=1e-6),
+        start=MEASURED,
+        selection=[hidden_saturation(1)],
+    )
+
+
+def test_a_hidden_nonlinearity_is_found(saturation):
+    unseen = hidden_saturation(2)
+    best_linear = fit_neural_state_space(
+        [hidden_saturation(0)], MAPPING, NeuralStateSpace(states=2, neurons=0), Training(), start=MEASURED
+    )
+    assert rmse(saturation, unseen) < 0.1 * rmse(best_linear, unseen)
+
+
+def test_the_same_seed_gives_the_same_model(saturation):
+    again = fit_neural_state_space(
+        [hidden_saturation(0)],
+        MAPPING,
+        NeuralStateSpace(states=2, neurons=3),
+        Training(max_iterations=60, starts=2, regularisation=1e-6),
+        start=MEASURED,
+        selection=[hidden_saturation(1)],
+    )
+    np.testing.assert_array_equal(again.model.theta, saturation.model.theta)
+
+
+def test_a_result_comes_back_from_its_fields(saturation):
+    again = FitResult.from_dict(saturation.to_dict())
+    np.testing.assert_array_equal(again.model.theta, saturation.model.theta)
+    assert "starts" in saturation.notes[0]
+
+
+def test_a_rectified_output_is_fitted_through_its_sign():
+    def record(seed: int) -> Trace:
+        whole = linear(seed)
+        return a_trace(f"rectified {seed}", whole["u"], np.abs(whole["y"] - 0.2))
+
+    fits = {
+        output: fit_neural_state_space(
+            [record(0), record(1)], MAPPING, NeuralStateSpace(states=2, neurons=0, output=output), start=MEASURED
+        )
+        for output in ("plain", "absolute")
+    }
+    assert rmse(fits["absolute"], record(2)) < 0.01 * rmse(fits["plain"], record(2))
+
+
+def test_there_is_no_open_loop():
+    with pytest.raises(ConfigError, match="open loop"):
+        fit_neural_state_space([linear(0)], MAPPING, NeuralStateSpace(states=1, neurons=1), Training(loop=Loop.OPEN))
+
+
+@pytest.mark.parametrize(
+    "given", [{"prelude": 100}, {"stride": 2}, {"curriculum": (1, 20)}, {"basis": "plain"}], ids=str
+)
+def test_options_of_lagged_regressors_are_refused(given):
+    with pytest.raises(ConfigError, match=next(iter(given))):
+        fit_neural_state_space([linear(0)], MAPPING, NeuralStateSpace(states=1, neurons=1), Training(**given))

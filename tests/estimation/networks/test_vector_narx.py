@@ -1,0 +1,105 @@
+"""A network of several outputs against systems that are one, and against networks of one output."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from sysid.errors import ConfigError
+from sysid.estimation import JointTraining, fit_vector_narx
+from sysid.estimation.networks.initialise import Layout
+from sysid.estimation.networks.member_layout import MemberLayout
+from sysid.models import VectorMapping, VectorNARX
+from sysid.models.cascade_program import Part
+from sysid.traces import Channel, Trace
+from tests.models.cascades import block, command, network
+
+MAPPING = VectorMapping.parse("u -> x+y")
+
+
+def coupled(n: int = 800, seed: int = 0) -> Trace:
+    """Two reservoirs that fill each other within a sample, one of them through a restriction that bends."""
+    u = command(n, 1, seed)[:, 0] - 77.0
+    x, y = np.zeros(n), np.zeros(n)
+    for t in range(1, n):
+        flow = 0.15 * (x[t - 1] - y[t - 1]) / (1.0 + 0.1 * abs(x[t - 1] - y[t - 1]))
+        x[t] = x[t - 1] + 0.2 * (u[t] - x[t - 1]) - flow
+        y[t] = y[t - 1] + flow
+    return Trace(
+        name=f"record {seed}",
+        sample_time=0.1,
+        channels=tuple(Channel(name=name, unit="psi") for name in ("u", "x", "y")),
+        values=np.column_stack([u, x, y]),
+    )
+
+
+NETWORK = VectorNARX(input_delays=[0], output_delays=1, neurons=4)
+
+
+def test_a_coupled_system_is_found_in_free_run():
+    training = JointTraining(max_iterations=60, starts=2)
+    fit = fit_vector_narx([coupled(), coupled(seed=1)], MAPPING, NETWORK, training, selection=[coupled(seed=2)])
+    unseen = coupled(seed=3)
+    run = fit.model.simulate_trace(unseen)
+    for name in ("x", "y"):
+        assert np.mean((run[name] - unseen[name]) ** 2) < 1e-3 * np.var(unseen[name])
+    assert fit.seed in {0, 1}
+    assert len(fit.notes) >= 3
+    again = fit_vector_narx(
+        [coupled()], MAPPING, NETWORK, JointTraining(max_iterations=2, looks=1), initial=fit.model.models[0]
+    )
+    assert again.seed is None
+    with pytest.raises(ConfigError, match="another structure"):
+        fit_vector_narx([coupled()], MAPPING, NETWORK, initial=block("u -> x+y"))
+
+
+def test_a_fit_is_its_seed():
+    training = JointTraining(max_iterations=4, looks=2, seed=5)
+    one, two = (fit_vector_narx([coupled()], MAPPING, NETWORK, training).model.models[0].theta for _ in range(2))
+    assert_array_equal(one, two)
+
+
+def test_layout_of_a_single_output_is_that_of_a_network_alone():
+    model = network("BP+AR -> BC", neurons=4)
+    layout = MemberLayout.of(model, Part.of(model))
+    plain = Layout(lags=model.network.lags(2), neurons=4, linear=True)
+    assert layout.plain == plain
+    assert layout.count == model.n_parameters
+    assert_array_equal(layout.centre(), plain.centre())
+    assert_array_equal(
+        layout.draw(np.random.default_rng(3), layout.centre()), plain.draw(np.random.default_rng(3), plain.centre())
+    )
+    ours = {group.name.removeprefix("BC: "): group.members.tolist() for group in layout.groups(0)}
+    theirs = {g.name: g.members.tolist() for g in plain.prior(plain.centre(), alpha=1.0, beta=1.0).groups}
+    assert ours == theirs
+
+
+@pytest.mark.parametrize(
+    "model", [block("BP -> AR+BC"), block("BP -> AR+BC", feedthrough=False)], ids=["linear", "not"]
+)
+def test_groups_cover_every_parameter_once(model):
+    layout = MemberLayout.of(model, Part.of(model))
+    members = np.concatenate([group.members for group in layout.groups(0)])
+    assert sorted(members.tolist()) == list(range(model.n_parameters))
+
+
+def test_the_centre_holds_every_output():
+    model = block("BP -> AR+BC", output_delays=[[1, 2], [1, 3, 4]])
+    layout = MemberLayout.of(model, Part.of(model))
+    w = layout.centre()[-2 * layout.lags.n_regressors :].reshape(2, -1)
+    assert_allclose(w, [[0, 0, 1, 0, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("fields", "n", "match"),
+    [
+        pytest.param({"output_delays": 0}, (1, 2), "not a set of lags", id="no lag"),
+        pytest.param({"output_delays": [[1], [2], [3]]}, (1, 2), "sets of output delays", id="sets of another number"),
+        pytest.param({"input_delays": [[1], [2]]}, (1, 2), "sets of input delays", id="input sets of another number"),
+        pytest.param({"neurons": -1}, (1, 2), "not a number of neurons", id="negative neurons"),
+    ],
+)
+def test_structures_that_cannot_be_are_refused(fields, n, match):
+    with pytest.raises(ConfigError, match=match):
+        VectorNARX(**({"input_delays": 2, "output_delays": 2, "neurons": 2} | fields)).lags(*n)

@@ -1,0 +1,119 @@
+"""The judge of trains: steps that do not depend on each other, and one document of their results."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from sysid.errors import ConfigError
+from sysid.models import ARX, ARXModel, Mapping
+from sysid.rail.dynamics.train import heavy_haul
+from sysid.rail.judging.consequence import JUDGE, ConsequenceOptions
+from sysid.rail.judging.scenario_catalogue import all_scenarios
+
+TRAIN = """\
+name: three pairs
+vehicles:
+  - {name: locomotive, mass: 180000, length: 9.83, axles: 6, brake: none, power: {}}
+  - {count: 6, mass: 120000, length: 9.83}
+"""
+
+
+@pytest.fixture
+def train(tmp_path: Path) -> str:
+    file = tmp_path / "train.yaml"
+    file.write_text(TRAIN, encoding="utf-8")
+    return str(file)
+
+
+def handle_to_cylinder() -> ARXModel:
+    """A brake of its own that follows the handle in some ten seconds and knows no open tail."""
+    return ARXModel(
+        orders=ARX(na=1, nb=(1,), nk=(1,)),
+        coefficients=np.array([-2.5 * 0.01, 0.99]),
+        intercept=225.0 * 0.01,
+        mapping=Mapping.parse("STP -> BC"),
+        sample_time=0.1,
+        input_units=("psi",),
+        output_unit="psi",
+        rest_output=0.0,
+    )
+
+
+def options(train: str, **changes: object) -> ConsequenceOptions:
+    given = {"train": train, "scenarios": ("full service", "emergency, both ends"), "errors": (0.1, 3.0)}
+    return ConsequenceOptions(**{**given, "errors_in": ("full service",), **changes})
+
+
+SUBJECTS = {"simple": [(handle_to_cylinder(), {})]}
+
+
+def test_a_judgement_of_a_simple_brake(train: str) -> None:
+    chosen = options(train)
+    results = {step.name: json.loads(json.dumps(step.run())) for step in JUDGE.steps(chosen, SUBJECTS)}
+    stop, ends = results["simple: full service"], results["simple: emergency, both ends"]
+    assert abs(stop["distance_percent"]) < 10.0
+    assert stop["mse_psi2"] > 0.0
+    assert stop["reference"]["stopped"]
+    assert stop["other"]["stopped"]
+    # What it cannot do is told, with the reason, and stands in no figure.
+    assert "pipe pressures" in ends["refused"]
+    assert results["bias of 0.1 psi"]["distance"] < results["bias of 3 psi"]["distance"]
+    document = JUDGE.document(chosen, SUBJECTS, results)
+    assert "full service" in document["headline"]
+    metrics = document["metrics"]["simple"]
+    assert metrics["distance_percent/full service"] == stop["distance_percent"]
+    assert all(math.isfinite(value) for value in metrics.values())
+    summary, *_ = document["tables"]
+    assert summary["rows"][0][0] == "simple"
+    assert summary["rows"][0][-1] == "1"
+    widths = {len(row) - len(table["head"]) for table in document["tables"] for row in table["rows"]}
+    assert widths == {0}
+    # The reference stands in every chart of a speed.
+    assert [line["name"] for line in document["charts"][1]["lines"]] == ["reference", "simple"]
+
+
+def test_the_reference_against_itself_would_be_nothing(train: str) -> None:
+    """Terms tell subjects, scenes and errors apart, and nothing else."""
+    steps = JUDGE.steps(options(train), SUBJECTS)
+    terms = [json.dumps(step.terms, sort_keys=True) for step in steps]
+    assert len(set(terms)) == len(steps)
+    again = [
+        json.dumps(s.terms, sort_keys=True) for s in JUDGE.steps(options(train), {"other name": SUBJECTS["simple"]})
+    ]
+    assert again == terms
+    faster = [json.dumps(s.terms, sort_keys=True) for s in JUDGE.steps(options(train, speed=90.0), SUBJECTS)]
+    assert not set(faster) & set(terms)
+
+
+def test_all_that_the_report_asks_for_is_in_the_catalogue() -> None:
+    names = set(all_scenarios(heavy_haul(pairs=1)))
+    wanted = {"full service", "emergency", "release and reapply", "crest, full service", "sag, full service"}
+    wanted |= {"curve, full service", "full service, both ends", "emergency, both ends", "driver on a falling line"}
+    assert wanted <= names
+
+
+def test_a_scenario_that_is_not_there_is_named(train: str) -> None:
+    with pytest.raises(ConfigError, match="no scenario 'full stop'"):
+        JUDGE.steps(options(train, scenarios=("full stop",)), SUBJECTS)
+
+
+def test_a_train_that_is_not_there_is_named() -> None:
+    with pytest.raises(ConfigError, match="no train express"):
+        JUDGE.steps(ConsequenceOptions(train="express"), SUBJECTS)
+
+
+def test_a_train_with_another_brake_than_the_reference_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "train.yaml"
+    file.write_text(TRAIN.replace("count: 6", "count: 5"), encoding="utf-8")
+    with pytest.raises(ConfigError, match="another brake"):
+        JUDGE.steps(options(str(file)), SUBJECTS)
+
+
+@pytest.mark.parametrize("wrong", [{"errors": (1.0, 0.5)}, {"variant": "guess"}, {"speed": 0.0}, {"trian": "x"}])
+def test_impossible_options_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(ValidationError):
+        ConsequenceOptions(**wrong)

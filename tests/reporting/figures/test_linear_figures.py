@@ -1,0 +1,64 @@
+"""Pictures of transfer functions show the model, and how sure it is."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from sysid.estimation import FitResult, TransferFunctionTraining, fit_transfer_function
+from sysid.models import Mapping, TransferFunction
+from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.figures.svg import svg
+from tests.estimation.linear_systems import steps, trace_of
+
+
+def fitted(noise: float, domain: str) -> FitResult:
+    rng = np.random.default_rng(0)
+    u = steps(600, 1, rng)
+    y = signal.lfilter([0.0, 1.0, 0.5], [1.0, -1.5, 0.7], u[:, 0]) + noise * rng.normal(size=600)
+    orders = TransferFunction(poles=(2,), zeros=(1,), delays=(1,) if domain == "discrete" else (0,), domain=domain)
+    quick = TransferFunctionTraining(scattered_starts=0)
+    return fit_transfer_function([trace_of(u, y)], Mapping.parse("u1 -> y"), orders, quick, rest_output=0.0)
+
+
+@pytest.mark.parametrize("domain", ["discrete", "continuous"])
+def test_bode_shows_the_response_within_its_band(domain: str) -> None:
+    fit = fitted(0.3, domain)
+    above, below = bode_figure(fit.model, fit.uncertainty).axes
+    frequency, gain = above.lines[0].get_data()
+    np.testing.assert_allclose(gain, np.abs(fit.model.response(0, np.asarray(frequency))))
+    band = above.collections[0].get_paths()[0].vertices
+    assert band[:, 1].min() <= gain.min()
+    assert band[:, 1].max() >= gain.max()
+    assert "degrees" in below.get_ylabel()
+
+
+def test_noise_widens_the_cloud_of_poles() -> None:
+    spreads = []
+    for noise in (0.01, 1.0):
+        fit = fitted(noise, "discrete")
+        axes = pole_zero_figure(fit.model, fit.uncertainty).axes[0]
+        cloud = axes.lines[0].get_xydata()
+        spreads.append(np.std(np.abs(cloud[:, 0] + 1j * cloud[:, 1])))
+        np.testing.assert_allclose(np.sort(axes.lines[1].get_xdata()), np.sort(fit.model.poles(0).real))
+    assert spreads[1] > 20.0 * spreads[0]
+
+
+def test_the_step_response_ends_at_the_gain() -> None:
+    fit = fitted(0.1, "discrete")
+    figure = step_figure(fit.model, samples=400)
+    y = figure.axes[0].lines[0].get_ydata()
+    assert y[-1] == pytest.approx(fit.model.response(0, np.array([0.0]))[0].real, rel=1e-6)
+    assert svg(figure, title="Step", description="Step response", name="step").startswith("<svg")
+
+
+def test_a_zero_far_off_is_counted_and_does_not_shrink_the_circle() -> None:
+    fit = fitted(0.01, "discrete")
+    far = dataclasses.replace(fit.model, taps=tuple(np.array([0.01, 1.0]) for _ in fit.model.taps))
+    assert np.abs(far.zeros(0)).max() > 1.5
+    axes = pole_zero_figure(far, None).axes[0]
+    assert axes.get_xlim() == (-1.5, 1.5)
+    assert "zeros (1 outside)" in [text.get_text() for text in axes.get_legend().get_texts()]

@@ -1,0 +1,271 @@
+"""A pipeline end to end on a user's own CSV files: what is stored, what a killed run loses, what a change costs."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.estimation import FitResult, Status
+from sysid.models import Start
+from sysid.reporting.results import Results, read_results
+from sysid.validation import evaluate
+from sysid.workbench.fits import steps
+from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.data import load_data
+from sysid.workbench.fits.record import read_fit, read_scores
+from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.runner import events
+from sysid.workbench.runner.store import RunFolder, code_digest
+
+FITS = ("ARX", "open loop", "closed loop")
+
+
+def run(workspace: Path, *, fresh: bool = False) -> tuple[Results, dict[str, bool]]:
+    """Run the workspace's pipeline; also which fits were taken from an earlier run."""
+    stored: dict[str, bool] = {}
+
+    def watch(event: events.Event) -> None:
+        if isinstance(event, events.FitReady):
+            stored[event.config.name] = event.stored
+
+    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    return run_pipeline(read, workspace / "run", command="sysid run first", fresh=fresh, watchers=[watch]), stored
+
+
+def rewrite(workspace: Path, old: str, new: str) -> None:
+    file = workspace / "pipelines" / "first.yaml"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def test_own_data_from_a_yaml(workspace: Path) -> None:
+    rewrite(workspace, "neurons: 2", "neurons: 6")
+    rewrite(workspace, "max_iterations: 8", "max_iterations: 400")
+    rewrite(workspace, "{loop: closed, ", "{loop: closed, starts: 8, ")
+    rewrite(workspace, "export: null", "export: {tolerance: 1.0e-9}")
+    results, stored = run(workspace)
+    assert stored == dict.fromkeys(FITS, False)
+    # As text: what was not computed is NaN, and NaN differs from itself as a number.
+    assert read_results(workspace / "run").model_dump_json() == results.model_dump_json()
+    assert [(fit.name, fit.loop.value, fit.mapping) for fit in results.fits] == [
+        ("ARX", "open", "inlet+valve -> outlet"),
+        ("open loop", "open", "inlet+valve -> outlet"),
+        ("closed loop", "closed", "inlet+valve -> outlet"),
+    ]
+    closed = results.fits[2]
+    assert {name: (case.role.value, case.free_run.unit) for name, case in closed.cases.items()} == {
+        "run-1": ("estimation", "kPa"),
+        "run-2": ("selection", "kPa"),
+        "run-3": ("validation", "kPa"),
+    }
+    assert results.data.sample_time == 0.05
+    # The rig multiplies and saturates: a network that does not beat the linear model has learnt nothing.
+    assert closed.cases["run-3"].free_run.mse < 0.1 * results.fits[0].cases["run-3"].free_run.mse
+    assert closed.selection_mse == closed.cases["run-2"].free_run.mse
+    assert results.best is not None
+    assert results.best.name == "closed loop"
+    exported = {entry.file: entry for entry in closed.exports}
+    assert {entry.format for entry in exported.values()} == {"onnx", "torchscript"}
+    assert all(entry.largest_difference <= 1e-9 and entry.unit == "kPa" for entry in exported.values())
+    folder = workspace / "run"
+    assert all((folder / file).is_file() for file in exported)
+    for file in ("results.json", "environment.json", "pipeline.yaml", "report/index.html"):
+        assert (folder / file).stat().st_size > 0
+    assert (folder / "pipeline.yaml").read_bytes() == (workspace / "pipelines" / "first.yaml").read_bytes()
+
+
+@pytest.fixture
+def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The report costs two seconds, and most of what follows is not about it."""
+
+    def write_report(folder: Path) -> Path:
+        page = folder / "report" / "index.html"
+        page.parent.mkdir(exist_ok=True)
+        page.write_text("no report")
+        return page
+
+    monkeypatch.setattr("sysid.reporting.report.write_report", write_report)
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_report_is_written_again_only_if_something_changed(workspace: Path) -> None:
+    first, _ = run(workspace)
+    page = workspace / "run" / "report" / "index.html"
+    written = page.stat().st_mtime_ns
+    again, _ = run(workspace)
+    assert page.stat().st_mtime_ns == written
+    assert again.created == first.created
+    rewrite(workspace, "name: ARX", "name: linear")
+    run(workspace)
+    assert page.stat().st_mtime_ns > written
+
+
+@pytest.mark.usefixtures("no_report")
+def test_stored_results_are_the_computed_ones(workspace: Path) -> None:
+    run(workspace)
+    folder = RunFolder(path=workspace / "run").fit("closed-loop")
+    fit, scores = read_fit(folder), read_scores(folder)
+    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    data = load_data(read.config, beside=read.path.parent, progress=lambda _: None)
+    again = evaluate(fit.model, data.traces, Start())
+    for name, case in again.cases.items():
+        np.testing.assert_array_equal(scores.evaluation.cases[name].simulated, case.simulated)
+        np.testing.assert_array_equal(scores.evaluation.cases[name].predicted, case.predicted)
+        assert scores.evaluation.cases[name].free_run == case.free_run
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_second_run_fits_nothing(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first, _ = run(workspace)
+    monkeypatch.setattr(steps, "fit_traces", lambda *_: pytest.fail("fitted again"))
+    monkeypatch.setattr(steps, "score", lambda *_: pytest.fail("scored again"))
+    second, stored = run(workspace)
+    assert stored == dict.fromkeys(FITS, True)
+    assert [fit.model_dump_json() for fit in second.fits] == [fit.model_dump_json() for fit in first.fits]
+
+
+@pytest.mark.usefixtures("no_report")
+def test_fresh_does_everything_again_with_the_same_result(workspace: Path) -> None:
+    first, _ = run(workspace)
+    second, stored = run(workspace, fresh=True)
+    assert stored == dict.fromkeys(FITS, False)
+    for before, after in zip(first.fits, second.fits, strict=True):
+        assert {n: c.free_run for n, c in after.cases.items()} == {n: c.free_run for n, c in before.cases.items()}
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_changed_fit_does_not_concern_the_others(workspace: Path) -> None:
+    run(workspace)
+    rewrite(workspace, "loop: closed, max_iterations: 8", "loop: closed, max_iterations: 9")
+    _, stored = run(workspace)
+    assert stored == {"ARX": True, "open loop": True, "closed loop": False}
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_changed_initial_fit_concerns_what_starts_from_it(workspace: Path) -> None:
+    run(workspace)
+    rewrite(workspace, "loop: open, max_iterations: 8", "loop: open, max_iterations: 7")
+    _, stored = run(workspace)
+    assert stored == {"ARX": True, "open loop": False, "closed loop": False}
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_damaged_result_is_done_again(workspace: Path) -> None:
+    first, _ = run(workspace)
+    damaged = workspace / "run" / "fits" / "open-loop" / "fit.json"
+    damaged.write_text(damaged.read_text()[:-20], encoding="utf-8")
+    second, stored = run(workspace)
+    assert stored == {"ARX": True, "open loop": False, "closed loop": True}
+    assert second.fits[1].cases["run-3"].free_run == first.fits[1].cases["run-3"].free_run
+
+
+KILLER = """
+import os, signal, sys
+from pathlib import Path
+import sysid.reporting.report
+from sysid.workbench.runner import store
+from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.run import run_pipeline
+
+replacing = store.replacing
+def dying(path):
+    if path.as_posix().endswith(sys.argv[1]):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return replacing(path)
+store.replacing = dying
+run_pipeline(read_pipeline(Path("pipelines/first.yaml")), Path("run"), command="sysid run first")
+"""
+
+
+@pytest.mark.usefixtures("no_report")
+@pytest.mark.parametrize(
+    ("about_to_write", "kept"),
+    [
+        pytest.param("fits/arx/fit.json", (), id="before the first fit is written"),
+        pytest.param(".steps/fit-arx.json", (), id="before the first fit is stamped"),
+        pytest.param("fits/open-loop/signals.npz", ("ARX",), id="before a fit's signals are written"),
+        pytest.param(".steps/scores-open-loop.json", ("ARX",), id="before a fit's figures are stamped"),
+        pytest.param("fits/closed-loop/fit.json", ("ARX", "open loop"), id="after a fit, before it is written"),
+        pytest.param(".steps/report.json", FITS, id="after everything but the report's stamp"),
+    ],
+)
+def test_a_killed_run_goes_on_where_it_was(workspace: Path, about_to_write: str, kept: tuple[str, ...]) -> None:
+    done = subprocess.run([sys.executable, "-c", KILLER, about_to_write], check=False)
+    assert done.returncode == -signal.SIGKILL
+    # Both runs shall see the same code, also while somebody is working on it.
+    code_digest.cache_clear()
+    results, stored = run(workspace)
+    assert stored == {name: name in kept for name in FITS}
+    assert [fit.name for fit in results.fits] == list(FITS)
+    assert (workspace / "run" / "report" / "index.html").is_file()
+
+
+@pytest.mark.usefixtures("no_report")
+def test_an_interrupted_fit_is_used_now_and_done_again_next_time(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = steps.fit_traces
+
+    def interrupted(fit, *arguments) -> FitResult:
+        result = whole(fit, *arguments)
+        if fit.name != "open loop":
+            return result
+        return FitResult(
+            model=result.model, status=Status.INTERRUPTED, loop=result.loop, history=result.history, train_time_s=0.1
+        )
+
+    with monkeypatch.context() as patch:
+        patch.setattr(steps, "fit_traces", interrupted)
+        results, _ = run(workspace)
+    assert [fit.status for fit in results.fits][1] == "INTERRUPTED"
+    results, stored = run(workspace)
+    # What started from the interrupted fit is done again with it.
+    assert stored == {"ARX": True, "open loop": False, "closed loop": False}
+    assert "INTERRUPTED" not in [fit.status for fit in results.fits]
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_run_that_is_killed_early_leaves_results_of_what_is_finished(workspace: Path) -> None:
+    def stop(event: events.Event) -> None:
+        if isinstance(event, events.FitReady) and event.config.name == "closed loop":
+            raise KeyboardInterrupt
+
+    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    with pytest.raises(KeyboardInterrupt):
+        run_pipeline(read, workspace / "run", command="sysid run first", watchers=[stop])
+    left = read_results(workspace / "run")
+    assert [fit.name for fit in left.fits] == ["ARX", "open loop"]
+    assert left.best is None
+
+
+@pytest.mark.usefixtures("no_report")
+def test_progress_of_several_starts_never_falls(workspace: Path) -> None:
+    rewrite(
+        workspace,
+        "loop: closed, max_iterations: 8}\n    initial: open loop",
+        "loop: closed, max_iterations: 8, starts: 3}",
+    )
+    shares: list[float] = []
+
+    def watch(event: events.Event) -> None:
+        if isinstance(event, events.StepProgress) and "closed loop" in event.step and event.fraction is not None:
+            shares.append(event.fraction)
+
+    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    run_pipeline(read, workspace / "run", command="", watchers=[watch])
+    assert len(shares) > 10
+    assert (np.diff(shares) >= 0.0).all()
+    assert 0.0 <= shares[0] < shares[-1] <= 1.0
+
+
+def test_results_are_strict_json(workspace: Path) -> None:
+    run(workspace)
+    for file in (workspace / "run").rglob("*.json"):
+        json.loads(file.read_text(encoding="utf-8"), parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))

@@ -1,0 +1,204 @@
+"""The driver: the same trials and winner whatever comes in when, and nothing done twice."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sysid.traces import Channel, Role, Trace, TraceSet
+from sysid.workbench.runner.store import digest
+from sysid.workbench.sweep.config import SweepConfig
+from sysid.workbench.sweep.driver import Driver
+from sysid.workbench.sweep.store import TrialStore
+from sysid.workbench.sweep.trial import Bench, Job
+from sysid.workbench.sweep.workers import AbstractWorkers
+from sysid.yaml_files import check
+
+SWEEP = {
+    "kind": "sweep",
+    "name": "s",
+    "data": "d",
+    "mapping": "u -> y",
+    "structure": {
+        "kind": "NARX",
+        "input_delays": {"from": 1, "to": 4},
+        "output_delays": 1,
+        "neurons": {"from": 1, "to": 6},
+    },
+    "training": {"max_iterations": 40},
+}
+PRUNED = {"pruning": [{"iterations": 5, "record": 0.5, "keep": 0.5}, {"iterations": 20, "keep": 0.3}]}
+
+
+def bench() -> Bench:
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+    trace = Trace(name="a", sample_time=1.0, channels=channels, values=np.zeros((10, 2)))
+    traces = TraceSet(name="d", traces=(trace,), roles={"a": Role.ESTIMATION}, source="test")
+    return Bench(pipeline={"mapping": "u -> y"}, traces=traces, selection=())
+
+
+class Crew(AbstractWorkers):
+    """Answers from the job alone, in a random order: as many hands as ``n``, some quicker than others."""
+
+    def __init__(self, n: int, seed: int, die_after: int = 10**9) -> None:
+        self.n, self.rng, self.die_after = n, np.random.default_rng(seed), die_after
+        self.held: list[tuple[Job, dict[str, Any]]] = []
+        self.done: list[Job] = []
+
+    @property
+    def free(self) -> int:
+        return self.n - len(self.held)
+
+    def submit(self, job: Job, before: Mapping[str, Any] | None) -> None:
+        assert (before is None) == (job.after is None)
+        assert before is None or before["key"] == job.after
+        self.held.append((job, answer(job, before)))
+
+    def finished(self) -> list[tuple[Job, dict[str, Any]]]:
+        if len(self.done) >= self.die_after:
+            raise KeyboardInterrupt
+        job, result = self.held.pop(int(self.rng.integers(len(self.held))))
+        self.done.append(job)
+        return [(job, result)]
+
+    def close(self) -> None:
+        """Nothing."""
+
+
+def answer(job: Job, before: Mapping[str, Any] | None) -> dict[str, Any]:
+    """A figure that depends on the point, the training, and what it began from."""
+    terms = {**dataclasses.asdict(job), "key": "", "cost": 0, "before": before["mark"] if before else ""}
+    mark = digest(terms)
+    error = int(mark[:6], 16) / 2**24
+    return {
+        "key": job.key,
+        "number": job.number,
+        "structure": dict(job.structure),
+        "status": "CONVERGED",
+        "usable": int(mark[6:8], 16) > 30,
+        "iterations": job.iterations or 0,
+        "seconds": 1.0,
+        "cpu_s": 1.0,
+        "selection_free_run_mse": error,
+        "mark": mark,
+        "fit": {},
+    }
+
+
+def sweep(folder: Path, crew: Crew, **change: Any) -> tuple[list[dict[str, Any]], Driver]:
+    config = check(SweepConfig, SWEEP | change, where="s.yaml")
+    store = TrialStore(path=folder)
+    with store.clock() as clock:
+        driver = Driver(
+            config=config, bench=bench(), store=store, workers=crew, clock=clock, step="s", tell=lambda _: None
+        )
+        trials = driver.run(config.space().points())
+    return [trial.model_dump() for trial in trials], driver
+
+
+WAYS = {
+    "in full": {},
+    "with looks": PRUNED,
+    "from smaller networks": {"warm_start": "smaller"},
+    "from linear fits, with looks": {"warm_start": "linear", **PRUNED},
+}
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_the_number_of_workers_and_their_order_change_nothing(tmp_path: Path, way: dict[str, Any]) -> None:
+    found = [sweep(tmp_path / str(n), Crew(n, seed), **way)[0] for seed, n in enumerate((1, 2, 4, 7))]
+    assert len(found[0]) == 24
+    assert all(trials == found[0] for trials in found[1:])
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_a_driver_that_dies_goes_on_and_does_nothing_twice(tmp_path: Path, way: dict[str, Any]) -> None:
+    whole, _ = sweep(tmp_path / "whole", undisturbed := Crew(2, 0), **way)
+    keys: list[str] = []
+    for attempt in range(20):
+        crew = Crew(2, attempt, die_after=5)
+        try:
+            found, _ = sweep(tmp_path / "killed", crew, **way)
+        except KeyboardInterrupt:
+            keys += [job.key for job in crew.done]
+            continue
+        keys += [job.key for job in crew.done]
+        break
+    assert found == whole
+    assert len(keys) == len(set(keys)) == len(undisturbed.done)
+
+
+def test_looks_drop_the_worse_part_and_train_the_rest_to_the_end(tmp_path: Path) -> None:
+    crew = Crew(3, 0)
+    trials, driver = sweep(tmp_path, crew, **PRUNED)
+    dropped = {look: {t["number"] for t in trials if t["dropped_at"] == look} for look in (1, 2, None)}
+    assert {look: len(numbers) for look, numbers in dropped.items()} == {1: 12, 2: 8, None: 4}
+    assert {trial["iterations"] for trial in trials if trial["dropped_at"] is None} == {40}
+    first = [answer(job, None) for job in crew.done if job.iterations == 5]
+    ranked = sorted(first, key=lambda one: (not one["usable"], one["selection_free_run_mse"]))
+    assert {one["number"] for one in ranked[12:]} == dropped[1]
+    assert driver.done_now == 24 + 12 + 4
+
+
+def test_a_job_goes_on_from_the_look_before_unless_the_record_grew(tmp_path: Path) -> None:
+    crew = Crew(1, 0)
+    sweep(tmp_path, crew, **PRUNED)
+    by_key = {job.key: job for job in crew.done}
+    for job in crew.done:
+        if job.after is not None:
+            assert job.resume == (by_key[job.after].record == job.record)
+            assert by_key[job.after].number == job.number
+
+
+def test_networks_with_the_same_delays_share_one_linear_fit(tmp_path: Path) -> None:
+    crew = Crew(2, 0)
+    sweep(tmp_path, crew, warm_start="linear")
+    linear = [job for job in crew.done if job.structure["neurons"] == 0]
+    assert len(linear) == 4
+    assert {job.after for job in crew.done if job not in linear} == {job.key for job in linear}
+
+
+def test_jobs_of_one_cost_need_no_order_of_their_own(tmp_path: Path) -> None:
+    network = {
+        "kind": "NARX",
+        "input_delays": {"from": 1, "to": 8},
+        "output_delays": {"from": 1, "to": 8},
+        "neurons": 4,
+    }
+    found, _ = sweep(tmp_path, Crew(3, 1), structure=network, warm_start="linear")
+    assert len(found) == 64
+
+
+def test_a_network_grows_from_the_next_smaller_one(tmp_path: Path) -> None:
+    crew = Crew(2, 0)
+    sweep(tmp_path, crew, warm_start="smaller")
+    by_key = {job.key: job for job in crew.done}
+    for job in crew.done:
+        smaller = by_key[job.after].structure["neurons"] if job.after else 0
+        assert job.structure["neurons"] == smaller + 1
+
+
+def test_a_torn_file_is_no_result(tmp_path: Path) -> None:
+    whole, _ = sweep(tmp_path, Crew(1, 0))
+    file = next(tmp_path.glob("*/*.json"))
+    file.write_text(file.read_text(encoding="utf-8")[:50], encoding="utf-8")
+    crew = Crew(1, 0)
+    assert sweep(tmp_path, crew)[0] == whole
+    assert len(crew.done) == 1
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"seed": 1}, {"training": {"max_iterations": 41}}, {"training": {"max_iterations": 40, "loop": "open"}}],
+    ids=["seed", "iterations", "loop"],
+)
+def test_other_conditions_are_other_trials(tmp_path: Path, change: dict[str, Any]) -> None:
+    sweep(tmp_path, Crew(1, 0))
+    crew = Crew(1, 0)
+    sweep(tmp_path, crew, **change)
+    assert len(crew.done) == 24

@@ -1,0 +1,288 @@
+"""Tracking, read back from a store of its own: what an engineer finds there, and what its failure costs."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.reporting.results import Results
+from sysid.workbench.cli import run_cli
+from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.tracking import fit_values as tracked
+from sysid.workbench.tracking import mlflow_store as tracking
+from sysid.workbench.tracking import mlflow_views as views
+from sysid.workbench.tracking import registry
+from sysid.workbench.tracking.listener import KEY_TAG, Tracker
+from sysid.workbench.tracking.mlflow_store import latest_experiment, store_uri
+
+
+def track(workspace: Path, name: str = "first", *, fresh: bool = False) -> tuple[Tracker, Results]:
+    """Run a pipeline of the workspace with a tracker."""
+    told: list[str] = []
+    tracker = Tracker.of_workspace(workspace, told.append)
+    read = read_pipeline(workspace / "pipelines" / f"{name}.yaml")
+    results = run_pipeline(read, workspace / "run", command=f"sysid run {name}", fresh=fresh, watchers=[tracker])
+    assert len(told) == len(tracker.failures)
+    return tracker, results
+
+
+def runs_of(client) -> dict[str, object]:
+    """Runs by the name of their fit."""
+    experiment = client.get_experiment_by_name("inlet+valve -> outlet")
+    return {run.data.tags["fit"]: run for run in client.search_runs([experiment.experiment_id])}
+
+
+@pytest.fixture(scope="module")
+def tracked_once(tmp_path_factory: pytest.TempPathFactory, write_rig, empty_store: Path):
+    """One run with export, tracked; and the client that reads it back."""
+    workspace = tmp_path_factory.mktemp("tracked")
+    write_rig(workspace)
+    shutil.copyfile(empty_store, workspace / "mlflow.db")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(workspace)
+        patch.delenv("MLFLOW_TRACKING_URI", raising=False)
+        file = workspace / "pipelines" / "first.yaml"
+        file.write_text(file.read_text().replace("export: null", "export: {formats: [onnx]}"), encoding="utf-8")
+        tracker, results = track(workspace)
+        assert tracker.failures == []
+        assert "MLFLOW_TRACKING_URI" not in os.environ, "the next run in this process would be tracked there"
+        yield workspace, tracker.client, results
+
+
+def test_fits_stand_flat_in_the_experiment_of_their_mapping(tracked_once) -> None:
+    _, client, _ = tracked_once
+    found = runs_of(client)
+    assert {run.info.run_name for run in found.values()} == {
+        "inlet+valve -> outlet · ARX [1; 1 1; 1 1] · open",
+        "inlet+valve -> outlet · NARX 1/1/2 · open",
+        "inlet+valve -> outlet · NARX 1/1/2 · closed",
+    }
+    assert {run.info.status for run in found.values()} == {"FINISHED"}
+    assert not any("mlflow.parentRunId" in run.data.tags for run in found.values())
+    assert len({run.data.tags["pipeline_run"] for run in found.values()}) == 1
+    assert len({run.data.tags["mlflow.runColor"] for run in found.values()}) == len(found), "told apart in charts"
+
+
+def test_parameters_and_figures_are_those_of_the_results(tracked_once) -> None:
+    _, client, results = tracked_once
+    closed = runs_of(client)["closed loop"]
+    record = results.fits[2]
+    assert closed.data.params["neurons"] == "2"
+    assert closed.data.params["training.max_iterations"] == "8"
+    assert closed.data.params["training.loop"] == "closed"
+    for name, case in record.cases.items():
+        assert closed.data.metrics[f"free_run_mse/{name}"] == case.free_run.mse
+        assert closed.data.metrics[f"one_step_mse/{name}"] == case.one_step.mse
+    assert closed.data.metrics["mean_free_run_mse"] == record.cases["run-3"].free_run.mse
+    assert closed.data.metrics["parameters"] == record.n_parameters
+    assert "training.loop" not in runs_of(client)["ARX"].data.params
+
+
+def test_the_learning_curve_is_a_stepped_metric(tracked_once) -> None:
+    _, client, results = tracked_once
+    history = client.get_metric_history(runs_of(client)["closed loop"].info.run_id, "learning_curve_mse")
+    curve = results.fits[2].learning_curve
+    assert curve is not None
+    assert [(entry.step, entry.value) for entry in sorted(history, key=lambda entry: entry.step)] == [
+        (int(step), mse) for step, mse in zip(curve.iteration, curve.mse, strict=True)
+    ]
+
+
+def test_the_data_set_is_an_input_with_its_digest(tracked_once) -> None:
+    _, client, results = tracked_once
+    for run in runs_of(client).values():
+        (entry,) = run.inputs.dataset_inputs
+        assert entry.dataset.name == "rig"
+        assert results.data.digest.startswith(entry.dataset.digest)
+        assert run.data.tags["data_digest"] == results.data.digest
+        assert "outlet [kPa gauge]" in entry.dataset.schema
+
+
+def test_pictures_have_the_same_key_in_every_fit(tracked_once) -> None:
+    _, client, _ = tracked_once
+    keys = {}
+    for name, run in runs_of(client).items():
+        files = [entry.path for entry in client.list_artifacts(run.info.run_id, "images")]
+        keys[name] = {Path(file).name.split("+step+")[0] for file in files}
+        assert run.data.tags["mlflow.loggedImages"] == "True"
+    assert set(map(frozenset, keys.values())) == {
+        frozenset({"target and output~run-1", "target and output~run-2", "target and output~run-3"})
+    }
+
+
+def test_pictures_lie_where_the_comparison_of_runs_looks_for_them(tracked_once) -> None:
+    _, client, _ = tracked_once
+    for run in runs_of(client).values():
+        files = {entry.path for entry in client.list_artifacts(run.info.run_id) if not entry.is_dir}
+        assert {f"target and output - run-{n}.png" for n in (1, 2, 3)} <= files
+
+
+def test_a_fit_leads_to_the_fit_it_started_from_and_to_its_bundle(tracked_once) -> None:
+    _, client, results = tracked_once
+    runs = runs_of(client)
+    closed, parent = runs["closed loop"], runs["open loop"].info.run_id
+    here = f"#/experiments/{closed.info.experiment_id}/runs"
+    assert closed.data.tags["initial_run"] == parent
+    assert f"[started from open loop]({here}/{parent})" in closed.data.tags["mlflow.note.content"]
+    best = runs[results.best.name]
+    for part in ("bundle", "report"):
+        assert f"[{part}]({here}/{best.info.run_id}/artifacts/{part})" in best.data.tags["mlflow.note.content"]
+    zips = [entry.path for entry in client.list_artifacts(best.info.run_id) if entry.path.endswith(".zip")]
+    assert len(zips) == 1
+
+
+def test_the_experiment_shows_first_what_matters_first(tracked_once) -> None:
+    _, client, _ = tracked_once
+    tags = client.get_experiment_by_name("inlet+valve -> outlet").tags
+    state = views.read_view(tags[views.TAG])
+    assert tags[views.CASES_TAG] == "run-1|run-2|run-3"
+    assert state["selectedColumns"][0] == state["orderByKey"] == "metrics.`mean_free_run_mse`"
+    known = {name for run in runs_of(client).values() for name in run.data.metrics}
+    charts = state["compareRunCharts"]
+    assert {chart["metricKey"] for chart in charts if "metricKey" in chart} <= known
+    pictures = [chart["imageKeys"] for chart in charts if chart["type"] == "IMAGE"]
+    assert pictures == [[f"target and output/run-{n}"] for n in (1, 2, 3)]
+
+
+def test_a_view_of_many_cases_fits_into_a_tag() -> None:
+    names = [f"case {n} {'x' * (n % 40)}" for n in range(400)]
+    value = views.view_tag(names, 0)
+    assert len(value) <= views.TAG_LIMIT
+    shown = [chart for chart in views.read_view(value)["compareRunCharts"] if chart["type"] == "IMAGE"]
+    assert 10 < len(shown) < 400
+
+
+def test_the_best_fit_has_bundle_report_and_a_model_that_runs(tracked_once) -> None:
+    workspace, client, results = tracked_once
+    run = runs_of(client)[results.best.name]
+    bundled = {Path(entry.path).name for entry in client.list_artifacts(run.info.run_id, "bundle")}
+    assert {"model.json", "step.onnx", "sequence.onnx"} <= bundled
+    assert {Path(entry.path).name for entry in client.list_artifacts(run.info.run_id, "report")} == {
+        "index.html",
+        "results.json",
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # MLflow's own deprecations
+        import mlflow
+
+        mlflow.set_tracking_uri(store_uri(workspace))
+        (model_id,) = [output.model_id for output in run.outputs.model_outputs]
+        loaded = mlflow.pyfunc.load_model(f"models:/{model_id}")
+        inputs = {name: np.zeros((5, 1, 2)) if name == "u" else np.zeros((1, 3)) for name in ("u", "state")}
+        output = loaded.predict(inputs)
+    assert loaded.metadata.signature.inputs.input_names() == ["u", "state"]
+    assert output["y"].shape == (5, 1, 1)
+    assert np.isfinite(output["y"]).all()
+
+
+def test_what_is_tracked_already_is_not_tracked_twice(tracked_once) -> None:
+    workspace, client, _ = tracked_once
+    before = {name: run.info.run_id for name, run in runs_of(client).items()}
+    tracker, _ = track(workspace)
+    assert tracker.failures == []
+    experiment = client.get_experiment_by_name("inlet+valve -> outlet")
+    assert len(client.search_runs([experiment.experiment_id])) == len(before)
+    assert latest_experiment(store_uri(workspace)) == experiment.experiment_id
+
+
+def test_a_run_left_open_by_a_kill_is_closed_and_logged_again(tracked_once) -> None:
+    workspace, client, _ = tracked_once
+    run = runs_of(client)["ARX"]
+    client.update_run(run.info.run_id, status="RUNNING")
+    track(workspace)
+    experiment = client.get_experiment_by_name("inlet+valve -> outlet")
+    twins = client.search_runs(
+        [experiment.experiment_id], filter_string=f"tags.`{KEY_TAG}` = '{run.data.tags[KEY_TAG]}'"
+    )
+    assert sorted(twin.info.status for twin in twins) == ["FINISHED", "KILLED"]
+
+
+def test_a_deleted_experiment_comes_back(tracked_once) -> None:
+    workspace, client, _ = tracked_once
+    experiment = client.get_experiment_by_name("inlet+valve -> outlet")
+    client.delete_experiment(experiment.experiment_id)
+    tracker, _ = track(workspace)
+    assert tracker.failures == []
+    assert client.get_experiment(experiment.experiment_id).lifecycle_stage == "active"
+
+
+@pytest.mark.parametrize("step", ["connect", "pictures"])
+def test_a_failing_store_costs_no_fit(
+    workspace: Path, empty_store: Path, monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    shutil.copyfile(empty_store, workspace / "mlflow.db")
+
+    def fail(*_: object) -> object:
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(tracking if step == "connect" else tracked, step, fail)
+    tracker, results = track(workspace)
+    assert len(results.fits) == 3
+    assert (workspace / "run" / "report" / "index.html").is_file()
+    assert tracker.failures
+    assert all("the disk is full" in text for text in tracker.failures)
+
+
+def test_names_that_a_store_refuses_are_changed() -> None:
+    assert tracked.key("VAL 1 (µ=0.3)/a") == "VAL 1 ___0.3__a"
+
+
+def load_onnx(workspace: Path, uri: str):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # MLflow's own deprecations
+        import mlflow
+
+        mlflow.set_tracking_uri(store_uri(workspace))
+        return mlflow.onnx.load_model(uri)
+
+
+def test_the_exported_model_is_the_newest_version_and_the_candidate(tracked_once) -> None:
+    workspace, client, results = tracked_once
+    model = client.get_registered_model("inlet-valve-to-outlet")
+    assert set(model.aliases) == {"candidate"}
+    version = client.get_model_version(model.name, str(model.aliases["candidate"]))
+    assert version.run_id == runs_of(client)[results.best.name].info.run_id
+    assert version.tags["fit"] == results.best.name
+    graph = load_onnx(workspace, "models:/inlet-valve-to-outlet@candidate").graph
+    assert [value.name for value in graph.output] == ["y", "state_out", "flags"]
+
+
+def test_a_promoted_model_is_loaded_as_the_champion(tracked_once, capsys: pytest.CaptureFixture[str]) -> None:
+    workspace, client, results = tracked_once
+    name = "inlet-valve-to-outlet"
+    (first,) = client.search_model_versions(f"name = '{name}'")
+    second = registry.register(
+        client,
+        "inlet+valve -> outlet",
+        source=first.source,
+        run_id=first.run_id,
+        model_id=getattr(first, "model_id", None),
+        fit="again",
+    )
+    assert str(client.get_registered_model(name).aliases["candidate"]) == second
+    assert run_cli(["promote", "inlet+valve -> outlet", "--version", first.version]) == 0
+    assert f"version {first.version} ({results.best.name}) is the champion." in capsys.readouterr().out
+    assert run_cli(["promote", name]) == 0
+    assert f"version {second} (again) is the champion, in place of version {first.version}" in capsys.readouterr().out
+    assert str(client.get_model_version_by_alias(name, "champion").version) == second
+    assert load_onnx(workspace, f"models:/{name}@champion").graph.node
+
+
+@pytest.mark.parametrize(
+    ("words", "match"),
+    [
+        (["outlet"], r"(?s)no such model in the registry.*one of inlet-valve-to-outlet.*got:\s+outlet"),
+        (["inlet-valve-to-outlet", "--version", "99"], r"(?s)has no such version.*one of 1.*got:\s+99"),
+    ],
+    ids=["unknown model", "unknown version"],
+)
+def test_what_cannot_be_promoted_is_refused(tracked_once, capsys: pytest.CaptureFixture[str], words, match) -> None:
+    assert run_cli(["promote", *words]) == 2
+    assert re.search(match, capsys.readouterr().err)
