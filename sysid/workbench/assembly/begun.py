@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sysid.composite.fixed_members import known_model
+from sysid.composite.members import placed, placed_name, wired
 from sysid.errors import ConfigError
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.known import known_model
 from sysid.workbench.assembly.member_config import MemberConfig
-from sysid.workbench.assembly.members import placed, placed_name, wired
 
 
 def read_whole(bundle: Path) -> tuple[Cascade, str]:

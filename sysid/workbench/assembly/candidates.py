@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from sysid.composite.fixed_members import known_model
+from sysid.composite.members import Members, geometric_mean, own_traces
+from sysid.composite.stages import Choice, choose_together, fit_member, fit_one_step, model_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.models import Mapping, NARXModel
 from sysid.reporting.sweep.record import read_sweep
 from sysid.traces import Trace
 from sysid.workbench.assembly.context import Context
-from sysid.workbench.assembly.known import known_model
 from sysid.workbench.assembly.member_config import MemberConfig, SweepSource
-from sysid.workbench.assembly.members import Members, geometric_mean, own_traces
-from sysid.workbench.assembly.stages import Choice, choose_together, fit_member, fit_one_step, model_of
 from sysid.workbench.runner import events
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.store import TRIALS, TrialStore

@@ -7,6 +7,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
 
+from sysid.composite.active_learning import GROWN, Growth, Round, grow
+from sysid.composite.members import Members, assembled, dealt, whole_score
+from sysid.composite.round import JointRound
+from sysid.composite.stages import (
+    model_of,
+    reading_more,
+    retrain,
+)
 from sysid.estimation import CascadeFit
 from sysid.estimation.result import Status
 from sysid.models import Cascade
@@ -14,17 +22,9 @@ from sysid.traces import Trace
 from sysid.workbench.assembly.begun import begun, read_whole
 from sysid.workbench.assembly.candidates import Candidates, fit_candidates
 from sysid.workbench.assembly.context import CODE, Context
-from sysid.workbench.assembly.growth import GROWN, Growth, Round, grow
-from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.material import Material
-from sysid.workbench.assembly.members import Members, assembled, dealt, whole_score
 from sysid.workbench.assembly.rounds import RoundDone
 from sysid.workbench.assembly.stage_config import TogetherConfig
-from sysid.workbench.assembly.stages import (
-    model_of,
-    reading_more,
-    retrain,
-)
 from sysid.workbench.fits.record import is_final
 from sysid.workbench.runner import events
 from sysid.workbench.runner.store import code_digest, digest, read_json, strict, write_json

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sysid.composite.active_learning import Growth, Look
+from sysid.composite.limit_check import LimitCheck
+from sysid.composite.limits_held import Holding, holding_table
+from sysid.composite.monte_carlo import Stress
 from sysid.models import Cascade
 from sysid.reporting.comparing.published import PublishedTable, read_published
 from sysid.reporting.figures.thinning import thin
 from sysid.reporting.numbers import number, quantity, seconds
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.growth import Growth, Look
 from sysid.workbench.assembly.lessons import Lesson, lessons_point, lessons_table
-from sysid.workbench.assembly.limit_check import LimitCheck
-from sysid.workbench.assembly.limits_held import Holding, holding_table
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.member_scores import MemberScores, member_tables
 from sysid.workbench.assembly.rounds import RoundDone, rounds_table
-from sysid.workbench.assembly.stress import Stress
 from sysid.workbench.assembly.views import (
     export_table,
     growth_charts,

@@ -8,6 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sysid.composite.active_learning import Look, sequence_errors
+from sysid.composite.limits_held import holding
+from sysid.composite.members import whole_score, written
+from sysid.composite.monte_carlo import Stress, stress
 from sysid.models import Cascade
 from sysid.reporting.judging.results import (
     JudgementResults,
@@ -21,15 +25,11 @@ from sysid.validation import evaluate_cascade
 from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.document import SELECTION, Outcome, document
-from sysid.workbench.assembly.growth import Look, sequence_errors
 from sysid.workbench.assembly.lessons import lessons_of
-from sysid.workbench.assembly.limits_held import holding
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.member_scores import score_candidates
-from sysid.workbench.assembly.members import whole_score, written
 from sysid.workbench.assembly.starts import Trained
-from sysid.workbench.assembly.stress import Stress, stress
 from sysid.workbench.runner import events
 from sysid.workbench.runner.environment import environment
 from sysid.workbench.runner.store import digest, strict, write_json

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from sysid.composite.members import geometric_mean
 from sysid.reporting.numbers import number, times
 from sysid.traces import Role, TraceSet
 from sysid.workbench.assembly.course import ALONE, CHOSEN, ONE_STEP, RETRAINED, TOGETHER
 from sysid.workbench.assembly.member_scores import MemberScores
-from sysid.workbench.assembly.members import geometric_mean
 from sysid.workbench.assembly.stage_config import LessonsConfig
 
 Scores = Mapping[str, Mapping[str, float]]

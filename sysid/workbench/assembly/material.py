@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
+from sysid.composite.fixed_members import with_known
+from sysid.composite.limit_check import LimitCheck, check_limits
+from sysid.composite.members import dealt
 from sysid.errors import ConfigError
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
-from sysid.workbench.assembly.known import with_known
-from sysid.workbench.assembly.limit_check import LimitCheck, check_limits
-from sysid.workbench.assembly.members import dealt
 from sysid.workbench.assembly.rehearsal import rehearse
 
 

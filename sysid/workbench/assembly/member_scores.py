@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.composite.members import in_place
 from sysid.models import NARXModel
 from sysid.reporting.comparing.published import PublishedTable
 from sysid.traces import Trace
 from sysid.workbench.assembly.candidates import Candidate, Candidates
-from sysid.workbench.assembly.members import in_place
 
 REPEATS = 5
 """Free runs that are timed."""

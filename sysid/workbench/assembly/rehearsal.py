@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from sysid.composite.fixed_members import known_model
+from sysid.composite.members import assembled
+from sysid.composite.shared_weights import Everywhere
+from sysid.composite.stages import reading_more
 from sysid.models import NARX, NARXModel, Scaling, parameter_count
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.everywhere import Everywhere
-from sysid.workbench.assembly.known import known_model
 from sysid.workbench.assembly.member_config import MemberConfig
-from sysid.workbench.assembly.members import assembled
-from sysid.workbench.assembly.stages import reading_more
 
 
 def rehearse(config: AssemblyConfig, like: Trace) -> None:

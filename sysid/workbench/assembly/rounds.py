@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sysid.composite.members import placed_outputs
+from sysid.composite.round import JointRound
 from sysid.estimation import CascadeFit
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.joint_round import JointRound
-from sysid.workbench.assembly.members import placed_outputs
 from sysid.workbench.assembly.stage_config import TogetherConfig
 
 FEW = 3

@@ -15,14 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.composite.active_learning import Growth
+from sysid.composite.members import free_runs, score_of, whole_score
 from sysid.models import Cascade, mean_of
 from sysid.traces import Trace
 from sysid.workbench.assembly.candidates import Candidates
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.course import Course
-from sysid.workbench.assembly.growth import Growth
 from sysid.workbench.assembly.material import Material
-from sysid.workbench.assembly.members import free_runs, score_of, whole_score
 from sysid.workbench.assembly.rounds import RoundDone
 from sysid.workbench.runner import events
 

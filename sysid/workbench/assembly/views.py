@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sysid.composite.active_learning import Growth, Look
+from sysid.composite.limit_check import LimitCheck
+from sysid.composite.monte_carlo import Stress
 from sysid.reporting.numbers import number, seconds
-from sysid.workbench.assembly.growth import Growth, Look
-from sysid.workbench.assembly.limit_check import LimitCheck
 from sysid.workbench.assembly.line import LineScores
-from sysid.workbench.assembly.stress import Stress
 
 if TYPE_CHECKING:
     from sysid.export import Bundle

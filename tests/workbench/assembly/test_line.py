@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from sysid.composite.members import assembled
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.assembly.line import line_of, places_of, score_line
-from sysid.workbench.assembly.members import assembled
 from sysid.workbench.assembly.proof_config import LineConfig
 from sysid.workbench.assembly.views import line_chart, line_metrics, line_point, line_table
-from tests.workbench.assembly.test_members import TWO_PLACES, config, models, trace
+from tests.composite.test_members import TWO_PLACES, config, models, trace
 
 ASKED = LineConfig(channel="BP", knots={"BP": 1, "BP9": 9}, outputs=("AR",), data="places")
 

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid.composite.round import JointRound
 from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, Status
 from sysid.export import read_bundle
 from sysid.reporting import publish_run
 from sysid.reporting.judging.results import read_judgement_results
-from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest, kind_of

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid.composite.members import score_of
 from sysid.errors import ConfigError
 from sysid.reporting.judging.results import JudgementResults, read_judgement_results
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.members import score_of
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.assembly.starts import committee
 from sysid.workbench.kinds import RunRequest

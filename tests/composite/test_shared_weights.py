@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from sysid.composite.fixed_members import known_model, with_known
+from sysid.composite.members import assembled
+from sysid.composite.round import JointRound
+from sysid.composite.shared_weights import Everywhere
+from sysid.composite.stages import reading_more
 from sysid.errors import ConfigError
 from sysid.models import Cascade, Mapping
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.everywhere import Everywhere
-from sysid.workbench.assembly.joint_round import JointRound
-from sysid.workbench.assembly.known import known_model, with_known
-from sysid.workbench.assembly.members import assembled
-from sysid.workbench.assembly.stages import reading_more
 from sysid.yaml_files import check, parse_yaml
 from tests.models.cascades import network
 

@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from sysid.composite.members import free_runs, mean_squares, placed_outputs, seen_from
+from sysid.composite.shared_weights import Everywhere
+from sysid.composite.stages import Report
 from sysid.estimation import CascadeFit, JointTraining, fit_cascade
 from sysid.estimation.networks.joint import NEGLIGIBLE
 from sysid.models import Cascade, Ends
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.everywhere import Everywhere
-from sysid.workbench.assembly.members import free_runs, mean_squares, placed_outputs, seen_from
 from sysid.workbench.assembly.stage_config import TogetherConfig
-from sysid.workbench.assembly.stages import Report
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

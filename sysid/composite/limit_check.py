@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.composite.members import limits_of
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.members import limits_of
 
 ROUNDING = 1e-9
 """Share of the largest value of a channel below which it is as large as its limit."""

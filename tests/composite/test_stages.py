@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from sysid.composite.stages import reading_more
 from sysid.errors import ConfigError
 from sysid.models import Cascade, NARXModel
-from sysid.workbench.assembly.stages import reading_more
 from tests.models.cascades import network
 
 

@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sysid.composite.members import placed, seen_from, simulated_inputs
 from sysid.errors import ConfigError
 from sysid.models import Cascade, NARXModel
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.member_config import MemberConfig
-from sysid.workbench.assembly.members import placed, seen_from, simulated_inputs
 from sysid.workbench.assembly.stage_config import TogetherConfig
 
 

@@ -26,10 +26,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from sysid.composite.members import bounds_of, placed, placed_outputs
 from sysid.models import NARX, Cascade, NARXModel, Scaling
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.member_config import KnownConfig
-from sysid.workbench.assembly.members import bounds_of, placed, placed_outputs
 
 
 def known_model(known: KnownConfig, like: Trace, units: Dict[str, str] | None = None) -> NARXModel:

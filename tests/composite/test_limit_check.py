@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sysid.composite.fixed_members import with_known
+from sysid.composite.limit_check import check_limits
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.known import with_known
-from sysid.workbench.assembly.limit_check import check_limits
 from sysid.workbench.assembly.views import limits_table
 
 NARX = {"kind": "NARX", "input_delays": [0], "output_delays": 1, "neurons": 2}

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from sysid.composite.fixed_members import known_model
+from sysid.composite.members import assembled, in_place, own_traces, simulated_inputs, whole_score, written
+from sysid.composite.monte_carlo import stress
+from sysid.composite.stages import choose_together, reading_more
 from sysid.errors import ConfigError
 from sysid.models import Mapping, mean_of
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.known import known_model
-from sysid.workbench.assembly.members import assembled, in_place, own_traces, simulated_inputs, whole_score, written
-from sysid.workbench.assembly.stages import choose_together, reading_more
-from sysid.workbench.assembly.stress import stress
 from sysid.workbench.assembly.views import stress_tables
 from sysid.yaml_files import check, parse_yaml
 from tests.models.cascades import network

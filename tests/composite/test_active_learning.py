@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from sysid.composite.active_learning import Growth, Look, grow, sequence_errors
+from sysid.composite.members import assembled
+from sysid.composite.round import JointRound
 from sysid.errors import ConfigError
 from sysid.models import Cascade
 from sysid.reporting.judging.results import read_judgement_results
 from sysid.traces import Trace
-from sysid.workbench.assembly.growth import Growth, Look, grow, sequence_errors
-from sysid.workbench.assembly.joint_round import JointRound
-from sysid.workbench.assembly.members import assembled
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.assembly.stage_config import GrowConfig
 from sysid.workbench.assembly.views import growth_charts, growth_table
 from sysid.workbench.kinds import RunRequest
+from tests.composite.test_members import TWO_PLACES, config, models, trace
 from tests.workbench.assembly.conftest import PIPELINE, write_tanks
-from tests.workbench.assembly.test_members import TWO_PLACES, config, models, trace
 
 ASKED = GrowConfig(data="pool", outputs=("AR", "BP"), within=0.1, add=3, rounds=4)
 SEQUENCES = 28

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from sysid.composite.fixed_members import known_model, with_known
 from sysid.errors import ConfigError
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.known import known_model, with_known
 from sysid.workbench.assembly.member_config import KnownConfig
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.kinds import RunRequest

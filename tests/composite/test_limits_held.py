@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sysid.composite.limits_held import holding, holding_table
 from sysid.models import NARX, Cascade, Limit, Mapping, NARXModel, Scaling
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.limits_held import holding, holding_table
 
 
 def twice(limits: dict[str, Limit]) -> Cascade:

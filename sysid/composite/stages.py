@@ -13,6 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from sysid.composite.members import (
+    Members,
+    assembled,
+    own_traces,
+    simulated_inputs,
+    whole_score,
+)
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, fit_narx
 from sysid.estimation.networks.initialise import Layout
@@ -22,13 +29,6 @@ from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.member_config import MemberConfig
-from sysid.workbench.assembly.members import (
-    Members,
-    assembled,
-    own_traces,
-    simulated_inputs,
-    whole_score,
-)
 from sysid.workbench.assembly.stage_config import OneStepConfig
 from sysid.workbench.fields import TrainingConfig
 

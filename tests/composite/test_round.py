@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from sysid.composite import round as joint_round
+from sysid.composite.round import JointRound
 from sysid.estimation import fit_cascade
 from sysid.models import Cascade
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly import joint_round
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.joint_round import JointRound
 from sysid.workbench.assembly.stage_config import TogetherConfig
 from tests.models.cascades import command, network, service
 
