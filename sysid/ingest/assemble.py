@@ -97,8 +97,7 @@ def assemble(
 def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
     """The channels that are wanted, in their units, and the stamps in seconds."""
     _check_names(wanted.channels, files, table.source)
-    digest = hashlib.sha256(table.source.read_bytes()).hexdigest()
-    notes = [f"read from {table.source.name} (SHA-256 {digest[:16]})", *table.notes]
+    notes = [table.origin or _read_from(table.source), *table.notes]
     stamps = stamps_in_seconds(table, files)
     columns = []
     for channel in wanted.channels:
@@ -116,6 +115,10 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
         marked=_marked(table),
         notes=tuple(notes),
     )
+
+
+def _read_from(source: Path) -> str:
+    return f"read from {source.name} (SHA-256 {hashlib.sha256(source.read_bytes()).hexdigest()[:16]})"
 
 
 def _marked(table: RawTable) -> NDArray[np.bool_]:

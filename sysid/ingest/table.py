@@ -58,6 +58,7 @@ class RawTable:
         metadata: What else the file carries, as text.
         settings: Reader options as they were recognised (``separator``, ``decimal`` ...), so that a
             data-set description can write them down.
+        origin: Where the numbers come from, as a sentence, where ``source`` is no file.
     """
 
     source: Path
@@ -68,6 +69,7 @@ class RawTable:
     notes: tuple[str, ...] = ()
     metadata: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, object] = field(default_factory=dict)
+    origin: str = ""
 
     def __post_init__(self) -> None:
         if not self.columns or len(self.columns[0].values) == 0:

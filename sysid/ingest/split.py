@@ -1,0 +1,171 @@
+"""Roles for records: by share, by time, by a column, or experiment by experiment."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.traces import Role, Trace, TraceSet
+
+Split = float | Sequence[float] | Sequence[str] | Mapping[str, tuple[float, float]] | str | None
+"""How records get their roles; :func:`sysid.ingest.arrays.data` says what each form means."""
+
+ROLES = {role.value: role for role in Role} | {
+    "train": Role.ESTIMATION,
+    "training": Role.ESTIMATION,
+    "fit": Role.ESTIMATION,
+    "est": Role.ESTIMATION,
+    "select": Role.SELECTION,
+    "choose": Role.SELECTION,
+    "val": Role.VALIDATION,
+    "valid": Role.VALIDATION,
+}
+"""Words for roles, ours and those of other libraries."""
+
+SHARES = {2: (Role.ESTIMATION, Role.VALIDATION), 3: (Role.ESTIMATION, Role.SELECTION, Role.VALIDATION)}
+"""What two and three shares are for."""
+
+
+def split_traces(
+    traces: tuple[Trace, ...], split: Split, marks: Sequence[NDArray[Any] | None], *, name: str
+) -> TraceSet:
+    """Give traces their roles, cutting them where the split says so.
+
+    Args:
+        traces: The records, whole.
+        split: How.
+        marks: For each trace the role of each of its samples, where a column says it.
+        name: Name of the data set.
+
+    Returns:
+        The data set.
+
+    Raises:
+        ConfigError: If the split cannot be meant.
+    """
+    if split is None:
+        return TraceSet(name=name, traces=traces, roles={trace.name: Role.ESTIMATION for trace in traces})
+    if isinstance(split, str):
+        parts = [part for trace, mark in zip(traces, marks, strict=True) for part in _by_column(trace, mark)]
+    elif isinstance(split, Mapping):
+        parts = [part for trace in traces for part in _by_time(trace, split)]
+    elif isinstance(split, float | int):
+        parts = _by_share(traces, _shares([float(split), 1.0 - float(split)]))
+    elif all(isinstance(entry, str) for entry in split):
+        parts = _by_experiment(traces, [str(entry) for entry in split])
+    else:
+        parts = _by_share(traces, _shares([float(entry) for entry in split]))
+    named: list[Trace] = []
+    roles: dict[str, Role] = {}
+    for role, part in parts:
+        label = part.name
+        while label in roles:
+            label = f"{part.name}-{1 + sum(one.name.startswith(part.name) for one in named)}"
+        named.append(dataclasses.replace(part, name=label))
+        roles[label] = role
+    return TraceSet(name=name, traces=tuple(named), roles=roles)
+
+
+def _shares(shares: list[float]) -> list[tuple[Role, float]]:
+    if len(shares) not in SHARES or min(shares) <= 0.0 or not np.isclose(sum(shares), 1.0):
+        raise ConfigError(
+            "not a split into shares",
+            where="split",
+            expected="a share between 0 and 1, or two or three shares that add up to 1",
+            got=", ".join(f"{share:g}" for share in shares),
+            remedy="write for example split=0.7, or split=(0.6, 0.2, 0.2) for estimation, selection and validation",
+        )
+    return list(zip(SHARES[len(shares)], shares, strict=True))
+
+
+def _by_share(traces: tuple[Trace, ...], shares: list[tuple[Role, float]]) -> list[tuple[Role, Trace]]:
+    """One record is cut along time; of several, whole experiments go to each role in their order."""
+    n = len(traces[0]) if len(traces) == 1 else len(traces)
+    ends = [0, *np.rint(np.cumsum([share for _, share in shares]) * n).astype(int).tolist()]
+    if any(stop <= start for start, stop in pairwise(ends)):
+        raise ConfigError(
+            "a share of the split is empty",
+            where="split",
+            expected=f"at least one of {n} {'samples' if len(traces) == 1 else 'experiments'} for each role",
+            got=", ".join(f"{role.value} {share:g}" for role, share in shares),
+            remedy="give other shares, or a role for each experiment",
+        )
+    spans = [(role, start, stop) for (role, _), (start, stop) in zip(shares, pairwise(ends), strict=True)]
+    if len(traces) == 1:
+        return [(role, _cut(traces[0], start, stop, role.value)) for role, start, stop in spans]
+    return [(role, trace) for role, start, stop in spans for trace in traces[start:stop]]
+
+
+def _by_experiment(traces: tuple[Trace, ...], words: list[str]) -> list[tuple[Role, Trace]]:
+    if len(words) != len(traces):
+        raise ConfigError(
+            "roles and experiments do not match",
+            where="split",
+            expected=f"a role for each of {len(traces)} experiments",
+            got=", ".join(words),
+            remedy="give one role an experiment",
+        )
+    return [(_role(word), trace) for word, trace in zip(words, traces, strict=True)]
+
+
+def _by_time(trace: Trace, spans: Mapping[str, tuple[float, float]]) -> list[tuple[Role, Trace]]:
+    parts = []
+    fuzz = 1e-6 * trace.sample_time
+    for word, (start, stop) in spans.items():
+        inside = np.flatnonzero((trace.time >= start - fuzz) & (trace.time < stop - fuzz))
+        if not len(inside):
+            raise ConfigError(
+                "a span of the split holds no sample",
+                where=f"split, {word}",
+                expected=f"seconds between {trace.time[0]:g} and {trace.time[-1]:g}",
+                got=f"{start:g} to {stop:g}",
+                remedy="correct the span; its end is not part of it",
+            )
+        parts.append((_role(word), _cut(trace, int(inside[0]), int(inside[-1]) + 1, word)))
+    return parts
+
+
+def _by_column(trace: Trace, marks: NDArray[Any] | None) -> list[tuple[Role, Trace]]:
+    """One part for each stretch of samples that have the same word."""
+    words = [] if marks is None else [str(word) for word in marks.tolist()]
+    if len(words) != len(trace):
+        raise ConfigError(
+            "a record that is resampled cannot be split by a column",
+            where="split",
+            expected=f"a word for each of {len(trace)} samples",
+            got=f"{len(words)} words",
+            remedy="split it by time: {'estimation': (start, stop), ...}",
+        )
+    changes = [0, *(i for i in range(1, len(words)) if words[i] != words[i - 1]), len(words)]
+    return [(_role(words[start]), _cut(trace, start, stop, words[start])) for start, stop in pairwise(changes)]
+
+
+def _role(word: str) -> Role:
+    if word.strip().lower() not in ROLES:
+        raise ConfigError(
+            "unknown role",
+            where="split",
+            expected=f"one of {', '.join(ROLES)}",
+            got=word,
+            remedy="estimation is fitted, selection chooses between fits, validation and test are only scored",
+        )
+    return ROLES[word.strip().lower()]
+
+
+def _cut(trace: Trace, start: int, stop: int, name: str) -> Trace:
+    window = slice(start, stop)
+    return dataclasses.replace(
+        trace,
+        name=name,
+        values=trace.values[window],
+        start_time=float(trace.time[start]),
+        usable=None if trace.usable is None or trace.usable[window].all() else trace.usable[window],
+        weights=None if trace.weights is None else trace.weights[window],
+        provenance=(*trace.provenance, f"samples {start} to {stop - 1} of {len(trace)}"),
+    )

@@ -1,0 +1,68 @@
+"""Roles by share, by time, by a column, or experiment by experiment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sysid.errors import ChannelError, ConfigError
+from sysid.ingest.arrays import data
+
+Y = np.arange(20.0)
+SETS = ["train"] * 8 + ["select"] * 4 + ["test"] * 8
+
+SPLITS: dict[str, tuple[Any, list[tuple[str, str, int, float]]]] = {
+    "all is for estimation": (None, [("record", "estimation", 20, 0.0)]),
+    "one share": (0.6, [("estimation", "estimation", 12, 0.0), ("validation", "validation", 8, 1.2)]),
+    "three shares": (
+        (0.5, 0.25, 0.25),
+        [
+            ("estimation", "estimation", 10, 0.0),
+            ("selection", "selection", 5, 1.0),
+            ("validation", "validation", 5, 1.5),
+        ],
+    ),
+    "spans of time": (
+        {"train": (0.0, 1.0), "test": (1.5, 2.0)},
+        [("train", "estimation", 10, 0.0), ("test", "test", 5, 1.5)],
+    ),
+    "a column": (
+        "set",
+        [("train", "estimation", 8, 0.0), ("select", "selection", 4, 0.8), ("test", "test", 8, 1.2)],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SPLITS)
+def test_a_split_gives_parts_and_roles(case: str) -> None:
+    split, parts = SPLITS[case]
+    traces = data(pd.DataFrame({"y": Y, "set": SETS}), outputs="y", sample_time=0.1, split=split)
+    found = [(one.name, traces.roles[one.name].value, len(one), pytest.approx(one.start_time)) for one in traces]
+    assert found == parts
+
+
+def test_stretches_of_the_same_role_are_experiments_of_their_own() -> None:
+    marks = ["train"] * 5 + ["val"] * 5 + ["train"] * 10
+    traces = data({"y": Y, "set": np.array(marks)}, outputs="y", sample_time=0.1, split="set")
+    assert traces.names == ("train", "val", "train-2")
+
+
+def test_of_several_experiments_whole_ones_go_to_each_role() -> None:
+    traces = data([Y, Y, Y, Y], outputs="y", sample_time=0.1, split=0.75)
+    assert [role.value for role in traces.roles.values()] == ["estimation"] * 3 + ["validation"]
+
+
+@pytest.mark.parametrize(
+    "split", [0.0, 1.0, -0.5, (0.5, 0.6), (0.5, 0.2), (0.25,) * 4, 0.001, {"val": (5.0, 6.0)}, ["x"]]
+)
+def test_a_split_that_cannot_be_meant_is_refused(split: Any) -> None:
+    with pytest.raises(ConfigError):
+        data(Y, sample_time=0.1, split=split)
+
+
+def test_a_column_that_is_not_there_is_refused_by_name() -> None:
+    with pytest.raises(ChannelError):
+        data({"y": Y}, sample_time=0.1, split="set")
