@@ -33,6 +33,7 @@ from sysid.ingest import READERS, load_dataset, read_trace
 from sysid.models import ARX, NARX, AbstractStructure, Mapping, NeuralStateSpace, Start, StartKind, TransferFunction
 from sysid.traces import Role, TraceSet
 from sysid.validation import Evaluation, evaluate
+from sysid.validation.metrics import percent
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
@@ -145,7 +146,7 @@ class Comparison:
         cases = list(next(iter(self.evaluations.values())).cases) if self.evaluations else []
         head = ["free run, fit in percent", *cases]
         rows = [
-            [label, *(f"{found.cases[case].free_run.nrmse_fit:.2f}" for case in cases)]
+            [label, *(percent(found.cases[case].free_run.nrmse_fit) for case in cases)]
             for label, found in self.evaluations.items()
         ]
         widths = [max(len(row[column]) for row in [head, *rows]) for column in range(len(head))]

@@ -326,7 +326,7 @@ def _mark(fit: FitRecord, best: str | None) -> str:
 
 def _word(figures: FiguresRecord) -> str:
     """Why a figure is not a number: a free run that diverged, or a target that does not vary."""
-    return "not defined" if math.isfinite(figures.mse) else DIVERGED
+    return "-" if math.isfinite(figures.mse) else DIVERGED
 
 
 def _mse_cell(case: CaseRecord, kind: str) -> Cell:

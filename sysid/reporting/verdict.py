@@ -89,7 +89,7 @@ def _tiles(fit: FitRecord, cases: Dict[str, CaseRecord]) -> tuple[Tile, ...]:
     factor = min(real_time_factor(case) for case in cases.values())
     return (
         Tile(figure=quantity(mean, f"{fit.unit}²", missing="diverged"), words="mean mse, free run"),
-        Tile(figure=quantity(min(fits), "%", digits=4) if fits else "not defined", words="lowest fit, free run"),
+        Tile(figure=quantity(min(fits), "%", digits=4) if fits else "-", words="lowest fit, free run"),
         Tile(figure=quantity(_largest(errors), fit.unit, missing="diverged"), words="largest error of any sample"),
         Tile(figure=times(factor), words="faster than real time, at least"),
     )

@@ -16,6 +16,7 @@ import numpy as np
 
 from sysid.traces import Role
 from sysid.validation.evaluate import Evaluation
+from sysid.validation.metrics import is_constant, mean_fit
 
 SMALL, LARGE = 1.0 / 3.0, 0.85
 """Amplitudes, as parts of the largest, up to which a case is small, and from which it is full."""
@@ -151,11 +152,11 @@ def _by_amplitude(evaluations: Sequence[Evaluation]) -> dict[Amplitude, tuple[st
     if not evaluations:
         return {}
     unseen = {n: c for n, c in evaluations[0].cases.items() if c.role in {Role.VALIDATION, Role.TEST}}
-    spans = {name: float(np.ptp(case.target)) for name, case in unseen.items()}
+    # A target that does not vary has no amplitude, and no fit in percent either.
+    spans = {name: 0.0 if is_constant(case.target) else float(np.ptp(case.target)) for name, case in unseen.items()}
     largest = max(spans.values(), default=0.0)
     groups: dict[Amplitude, tuple[str, ...]] = {}
     for name, span in spans.items():
-        # A target that does not vary has no amplitude, and no fit in percent either.
         if span > 0.0:
             part = span / largest
             kind = Amplitude.MINIMUM if part <= SMALL else Amplitude.FULL if part >= LARGE else Amplitude.INTERMEDIATE
@@ -165,7 +166,7 @@ def _by_amplitude(evaluations: Sequence[Evaluation]) -> dict[Amplitude, tuple[st
 
 def _best(evaluations: Dict[str, Evaluation], cases: Sequence[str]) -> tuple[str, float]:
     fits = {
-        name: float(np.mean([evaluation.cases[case].free_run.nrmse_fit for case in cases]))
+        name: mean_fit(evaluation.cases[case].free_run.nrmse_fit for case in cases)
         for name, evaluation in evaluations.items()
     }
     name = max(fits, key=lambda key: fits[key] if np.isfinite(fits[key]) else -np.inf)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,7 @@ class Figures:
     Args:
         mse: Mean squared error, in the output's unit squared.
         nrmse_fit: Percent, ``100 (1 - |y - y_hat| / |y - mean(y)|)`` as MATLAB's ``compare`` prints it; NaN for a
-            target that does not vary.
+            target that does not vary beyond rounding.
         max_abs_error: Largest absolute error, in the output's unit.
         r: Correlation coefficient of target and output; NaN where one of them does not vary.
         unit: The output's unit.
@@ -48,7 +49,7 @@ def figures(
         target: Shape ``(n_samples,)``.
         output: Shape ``(n_samples,)``; a value that is not finite makes every figure infinite or NaN.
         unit: Unit of both.
-        counted: Which samples count; all by default.
+        counted: Which samples count; all by default. Where none does, every figure is NaN.
 
     Returns:
         The figures.
@@ -59,15 +60,74 @@ def figures(
     """
     if counted is not None:
         target, output = target[counted], output[counted]
+    if len(target) == 0:
+        return Figures(mse=np.nan, nrmse_fit=np.nan, max_abs_error=np.nan, r=np.nan, unit=unit)
+    still = is_constant(target)
     if not np.isfinite(output).all():
-        return Figures(mse=np.inf, nrmse_fit=-np.inf, max_abs_error=np.inf, r=np.nan, unit=unit)
+        return Figures(mse=np.inf, nrmse_fit=np.nan if still else -np.inf, max_abs_error=np.inf, r=np.nan, unit=unit)
     error = output - target
     spread = float(np.linalg.norm(target - target.mean()))
-    varies = spread > 0.0 and float(np.ptp(output)) > 0.0
     return Figures(
         mse=float(np.mean(error**2)),
-        nrmse_fit=100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0.0 else np.nan,
+        nrmse_fit=np.nan if still else 100.0 * (1.0 - float(np.linalg.norm(error)) / spread),
         max_abs_error=float(np.abs(error).max()),
-        r=float(np.corrcoef(target, output)[0, 1]) if varies else np.nan,
+        r=np.nan if still or is_constant(output) else float(np.corrcoef(target, output)[0, 1]),
         unit=unit,
     )
+
+
+def is_constant(signal: NDArray[np.float64]) -> bool:
+    """Whether a signal moves by no more than the rounding of its values: no figure relative to its spread means a thing.
+
+    Args:
+        signal: Finite, shape ``(n_samples,)``.
+
+    Returns:
+        True also for no sample at all.
+
+    Example:
+        >>> is_constant(np.full(50, 0.3)), is_constant(np.array([0.3, 0.3000001]))
+        (True, False)
+    """
+    if len(signal) == 0:
+        return True
+    return bool(np.ptp(signal) <= _ROUNDING * np.finfo(np.float64).eps * np.abs(signal).max())
+
+
+_ROUNDING = 8.0
+"""Units in the last place that a value which was meant to be constant may have been moved by."""
+
+
+def mean_fit(fits: Iterable[float]) -> float:
+    """Mean of fits in percent over the cases that have one; the others' outputs never change.
+
+    Args:
+        fits: In percent; NaN where the target does not vary.
+
+    Returns:
+        The mean; NaN where no case has a fit.
+
+    Example:
+        >>> mean_fit([80.0, float("nan"), 90.0])
+        85.0
+    """
+    defined = [fit for fit in fits if not np.isnan(fit)]
+    return float(np.mean(defined)) if defined else float("nan")
+
+
+def percent(fit: float) -> str:
+    """A fit as it stands in a table.
+
+    Args:
+        fit: In percent.
+
+    Returns:
+        Two digits after the point; ``-`` where the target does not vary, and ``diverged`` for a run that is not finite.
+
+    Example:
+        >>> percent(99.987), percent(float("nan")), percent(-np.inf)
+        ('99.99', '-', 'diverged')
+    """
+    if np.isnan(fit):
+        return "-"
+    return f"{fit:.2f}" if np.isfinite(fit) else "diverged"

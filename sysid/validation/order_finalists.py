@@ -15,7 +15,7 @@ from sysid.estimation.linear.order_search import OrderLosses
 from sysid.estimation.result import FitResult
 from sysid.models import Mapping, Start
 from sysid.traces import Trace
-from sysid.validation.metrics import Figures, figures
+from sysid.validation.metrics import Figures, figures, mean_fit
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,14 +34,14 @@ class Finalist:
 
     @property
     def mean_fit(self) -> float:
-        """Mean NRMSE fit over the cases in percent; minus infinity where a free run is not finite."""
-        return float(np.mean([case.nrmse_fit for case in self.cases.values()]))
+        """Mean NRMSE fit in percent over cases whose output varies; minus infinity where a free run is not finite."""
+        return mean_fit(case.nrmse_fit for case in self.cases.values())
 
     @property
     def std_fit(self) -> float:
-        """Standard deviation of the NRMSE fit over the cases in percent; NaN where a free run is not finite."""
-        fits = np.array([case.nrmse_fit for case in self.cases.values()])
-        return float(np.std(fits)) if np.isfinite(fits).all() else float("nan")
+        """Standard deviation of the NRMSE fit over the same cases in percent; NaN where a free run is not finite."""
+        fits = np.array([case.nrmse_fit for case in self.cases.values() if not np.isnan(case.nrmse_fit)])
+        return float(np.std(fits)) if len(fits) and np.isfinite(fits).all() else float("nan")
 
     def to_dict(self) -> dict[str, Any]:
         """The figures and the structure as JSON values."""

@@ -155,8 +155,8 @@ def _cases(found: Comparison) -> Section:
             figure_cell(one.ours.free_run.mse, missing=DIVERGED),
             figure_cell(one.theirs.free_run.mse, missing=DIVERGED),
             Cell(text="none" if math.isnan(one.ratio) else times(one.ratio), value=one.ratio, mark="number"),
-            figure_cell(one.ours.free_run.nrmse_fit, digits=4),
-            figure_cell(one.theirs.free_run.nrmse_fit, digits=4),
+            figure_cell(one.ours.free_run.nrmse_fit, missing="-", digits=4),
+            figure_cell(one.theirs.free_run.nrmse_fit, missing="-", digits=4),
             figure_cell(one.ours.free_run.max_abs_error, missing=DIVERGED),
             figure_cell(one.theirs.free_run.max_abs_error, missing=DIVERGED),
         )

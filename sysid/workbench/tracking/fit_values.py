@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.models import NARX, NeuralStateSpace
 from sysid.traces import Role
+from sysid.validation.metrics import mean_fit
 from sysid.workbench.runner.events import DataLoaded, FitReady, RunStarted
 
 if TYPE_CHECKING:
@@ -123,11 +124,12 @@ def metrics(ready: FitReady) -> dict[str, float]:
     """
     fit, cases = ready.fit, ready.evaluation.cases
     unseen = [role for role in (Role.VALIDATION, Role.TEST) if any(case.role is role for case in cases.values())]
+    fits = [case.free_run.nrmse_fit for case in cases.values()]
     found: dict[str, float] = {
         "mean_free_run_mse": ready.evaluation.mean_mse(*unseen),
         "worst_free_run_mse": max(case.free_run.mse for case in cases.values()),
-        "mean_nrmse_fit": _mean_fit([case.free_run.nrmse_fit for case in cases.values() if case.role in unseen]),
-        "least_nrmse_fit": min(case.free_run.nrmse_fit for case in cases.values()),
+        "mean_nrmse_fit": mean_fit(case.free_run.nrmse_fit for case in cases.values() if case.role in unseen),
+        "least_nrmse_fit": min((fit for fit in fits if not math.isnan(fit)), default=math.nan),
         "selection_mse": ready.selection_mse,
         "parameters": fit.model.n_parameters,
         "train_time_s": fit.train_time_s,
@@ -149,12 +151,6 @@ def metrics(ready: FitReady) -> dict[str, float]:
             found[f"free_run_coverage/{case_name}"] = case.intervals.free_run.share
             found[f"one_step_coverage/{case_name}"] = case.intervals.one_step.share
     return {name: float(value) for name, value in found.items() if math.isfinite(value)}
-
-
-def _mean_fit(fits: list[float]) -> float:
-    """Mean over the cases whose target varies, so that a fit is defined; NaN without any."""
-    defined = [fit for fit in fits if not math.isnan(fit)]
-    return float(np.mean(defined)) if defined else math.nan
 
 
 def learning_curve(ready: FitReady) -> list[tuple[int, float]]:
