@@ -114,13 +114,20 @@ class Start:
                 remedy="write start: rest, start: first-sample, or start: {measured: 50}",
             )
 
-    def history(self, inputs: NDArray[np.float64], output: NDArray[np.float64], rest_output: float) -> History:
+    def history(
+        self,
+        inputs: NDArray[np.float64],
+        output: NDArray[np.float64],
+        rest_output: float,
+        usable: NDArray[np.bool_] | None = None,
+    ) -> History:
         """The history that a record begins with.
 
         Args:
             inputs: The record's inputs, shape ``(n_samples, n_inputs)``.
             output: The record's measured output, shape ``(n_samples,)``; read only as the kind allows.
             rest_output: The output's declared rest value.
+            usable: Which samples are not masked; all by default. The first sample is then the first of those.
 
         Returns:
             The history before sample ``n_measured``.
@@ -131,7 +138,8 @@ class Start:
         if self.kind is StartKind.REST:
             return History.at_rest(inputs=inputs[0], output=rest_output)
         if self.kind is StartKind.FIRST_SAMPLE:
-            return History.at_rest(inputs=inputs[0], output=float(output[0]))
+            first = 0 if usable is None or not usable.any() else int(np.argmax(usable))
+            return History.at_rest(inputs=inputs[first], output=float(output[first]))
         if len(output) <= self.n_measured:
             raise TraceError(
                 "the record is too short for its start",

@@ -77,7 +77,7 @@ def figures(
 
 
 def is_constant(signal: NDArray[np.float64]) -> bool:
-    """Whether a signal moves by no more than the rounding of its values: no figure relative to its spread means a thing.
+    """Whether a signal moves by no more than the rounding of its values: nothing relative to its spread means a thing.
 
     Args:
         signal: Finite, shape ``(n_samples,)``.

@@ -71,7 +71,7 @@ def fit_arx(
 
 
 def first_output(traces: Sequence[Trace], mapping: Mapping) -> float:
-    """The mean of the traces' first output samples: the rest value where none is declared.
+    """The mean of the traces' first output samples that are not masked: the rest value where none is declared.
 
     Args:
         traces: Estimation traces.
@@ -80,7 +80,7 @@ def first_output(traces: Sequence[Trace], mapping: Mapping) -> float:
     Returns:
         A value in the output's unit.
     """
-    return float(np.mean([trace[mapping.output][0] for trace in traces]))
+    return float(np.mean([trace[mapping.output][int(np.argmax(trace.usable_samples))] for trace in traces]))
 
 
 def arx_experiments(
@@ -103,7 +103,7 @@ def arx_experiments(
         operating_point: What the records are counted from; ``None`` for the values themselves.
 
     Returns:
-        One experiment per trace.
+        One experiment per trace; rows that look at masked samples do not count.
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
@@ -123,7 +123,7 @@ def arx_experiments(
             got="both",
             remedy="set intercept: false, or give no operating point",
         )
-    experiments = experiments_of(traces, mapping, start, rest_output)
+    experiments = tuple(e.one_step(orders.lags) for e in experiments_of(traces, mapping, start, rest_output))
     return experiments if operating_point is None else tuple(deviation(e, operating_point) for e in experiments)
 
 

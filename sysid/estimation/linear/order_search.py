@@ -16,7 +16,7 @@ from scipy import linalg
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.regression import stack
+from sysid.estimation.linear.regression import root_weights, stack
 from sysid.estimation.networks.provider import experiments_of
 from sysid.kernels import linear_orders as kernel
 from sysid.models import ARX, Lags, Mapping, Start
@@ -230,7 +230,8 @@ def search_orders(
 ) -> OrderLosses:
     """The one-step least-squares loss of every candidate of a grid.
 
-    Each loss is that of :func:`sysid.estimation.fit_arx` on the same traces, computed from one QR factorisation.
+    Each loss is that of :func:`sysid.estimation.fit_arx` on the same traces, computed from one QR factorisation; where
+    samples are masked, over the rows on which the largest candidate looks at none of them.
 
     Args:
         traces: Estimation traces.
@@ -250,10 +251,12 @@ def search_orders(
     """
     m = len(mapping.inputs)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
-    experiments = experiments_of(traces, mapping, start or Start(), rest)
+    given = experiments_of(traces, mapping, start or Start(), rest)
     reach = grid.max_nk + grid.max_nb - grid.min_nk
     input_lags = tuple(range(grid.min_nk, grid.max_nk + grid.max_nb))
     lags = Lags(inputs=(input_lags,) * m, output=tuple(range(1, grid.max_na + 1)))
+    # The rows are the same for every candidate: those on which the largest looks at no masked sample.
+    experiments = [experiment.one_step(lags) for experiment in given]
     X, y = stack(experiments, lags, intercept=False)
     if len(X) <= lags.n_regressors + grid.intercept:
         raise TraceError(
@@ -263,8 +266,8 @@ def search_orders(
             remedy="lower the orders, or use longer traces",
         )
     # The column of the intercept stands first: it is in every candidate.
-    root = np.sqrt(np.concatenate([np.ones(len(e.output)) if e.weights is None else e.weights for e in experiments]))
-    table = np.column_stack([root, X, y])
+    root = root_weights(experiments)
+    table = np.column_stack([root[root > 0.0], X, y])
     norms = np.linalg.norm(table, axis=0)
     triangle = np.ascontiguousarray(linalg.qr(table, mode="r")[0][: table.shape[1]].T)
     tolerance = len(table) * np.finfo(np.float64).eps * norms

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +77,11 @@ def deviation(experiment: Experiment, point: OperatingPoint) -> Experiment:
     history = type(experiment.history)(
         inputs=experiment.history.inputs - np.array(point.inputs), output=experiment.history.output - point.output
     )
-    return Experiment(
+    return replace(
+        experiment,
         inputs=experiment.inputs - np.array(point.inputs),
         output=experiment.output - point.output,
         history=history,
-        weights=experiment.weights,
     )
 
 
@@ -100,22 +100,23 @@ def root_weights(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
 def stack(
     experiments: Sequence[Experiment], lags: Lags, *, intercept: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weighted regressors and targets of several experiments; no row crosses from one into the next.
+    """Weighted regressors and targets of the rows that count; no row crosses from one experiment into the next.
 
     Args:
-        experiments: The records.
+        experiments: The records, with the weights of their rows.
         lags: The regressors.
         intercept: Add a column of ones after them.
 
     Returns:
-        Matrix of shape ``(n_samples_of_all, n_columns)`` and target of shape ``(n_samples_of_all,)``.
+        Matrix of shape ``(n_rows, n_columns)`` and target of shape ``(n_rows,)``.
     """
     X = np.concatenate([regressor_matrix(experiment, lags) for experiment in experiments])
     y = np.concatenate([experiment.output for experiment in experiments])
     if intercept:
         X = np.column_stack([X, np.ones(len(X))])
     root = root_weights(experiments)
-    return X * root[:, None], y * root
+    kept = root > 0.0
+    return X[kept] * root[kept, None], y[kept] * root[kept]
 
 
 def solve(X: NDArray[np.float64], y: NDArray[np.float64], *, ridge: float = 0.0) -> Solution:

@@ -16,7 +16,7 @@ from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, pole_star
 from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.transfer_function_search import AbstractProblem, Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
-from sysid.estimation.networks.provider import Experiment, experiments_of
+from sysid.estimation.networks.provider import Experiment, experiments_of, unit_range
 from sysid.estimation.result import FitResult
 from sysid.models import AbstractModel, Mapping, Scaling, Start, TransferFunction
 from sysid.traces import Trace
@@ -67,7 +67,7 @@ def fit_transfer_function(
     _check(orders, mapping, experiments)
     problem = _Problem(
         experiments=experiments,
-        scaling=Scaling.to_unit_range([e.inputs for e in experiments], [e.output for e in experiments]),
+        scaling=unit_range(experiments),
         orders=orders,
         training=training or TransferFunctionTraining(),
         terms=Terms(
@@ -136,7 +136,7 @@ class _Problem(AbstractProblem):
         if measured:
             inputs = np.concatenate([experiment.history.inputs, inputs])
             output = np.concatenate([experiment.history.output, output])
-            weights = np.concatenate([np.ones(len(experiment.history.output)), weights])
+            weights = np.concatenate([experiment.past_weights, weights])
         scaled, held = self.scaling.scale_inputs(inputs), self.scaling.scale_inputs(past[np.newaxis])[0]
         columns = [
             np.concatenate([np.full(min(k, len(scaled)), held[j]), scaled[: max(len(scaled) - k, 0), j]])

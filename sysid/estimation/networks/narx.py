@@ -23,12 +23,12 @@ from sysid.estimation.networks.gpu_starts import Patrol, Scout
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
 from sysid.estimation.networks.pretraining import StepSamples
-from sysid.estimation.networks.provider import Experiment, RecursionProvider, experiments_of
+from sysid.estimation.networks.provider import Experiment, RecursionProvider, experiments_of, unit_range
 from sysid.estimation.networks.raced import raced_result, raced_status
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import grown
 from sysid.estimation.result import FitResult, Loop
-from sysid.models import NARX, ARXModel, History, Mapping, NARXModel, Scaling, Start
+from sysid.models import NARX, ARXModel, History, Mapping, NARXModel, Start
 from sysid.traces import Trace
 
 
@@ -244,7 +244,7 @@ def _template(
     return NARXModel(
         network=network,
         theta=layout.centre(),
-        scaling=Scaling.to_unit_range([e.inputs for e in experiments], [e.output for e in experiments]),
+        scaling=unit_range(experiments),
         mapping=mapping,
         sample_time=first.sample_time,
         input_units=tuple(first.channel(name).unit for name in mapping.inputs),

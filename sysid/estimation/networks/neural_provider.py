@@ -73,8 +73,10 @@ class NeuralProvider(AbstractProvider):
         u = np.concatenate([history.inputs[:n_past], experiment.inputs])
         target = np.concatenate([history.output[:n_past], experiment.output])
         roots = None
-        if experiment.weights is not None:
-            roots = np.sqrt(np.concatenate([np.ones(n_past), experiment.weights]))
+        before = experiment.past_weights[:n_past]
+        if experiment.weights is not None or not before.all():
+            weights = np.ones(len(experiment.output)) if experiment.weights is None else experiment.weights
+            roots = np.sqrt(np.concatenate([before, weights]))
         oldest = np.concatenate(
             [scaling.scale_inputs(history.inputs[:1])[0], scaling.scale_output(history.output[:1]), [1.0]]
         )

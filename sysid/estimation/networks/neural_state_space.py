@@ -14,11 +14,11 @@ from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
-from sysid.estimation.networks.provider import Experiment, experiments_of
+from sysid.estimation.networks.provider import Experiment, experiments_of, unit_range
 from sysid.estimation.networks.raced import raced_result, raced_status
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import FitResult, Loop
-from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
+from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start
 from sysid.traces import Trace
 
 LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "curriculum", "scouts", "committee", "leave_out")
@@ -106,7 +106,7 @@ def _template(
     first: Trace, mapping: Mapping, network: NeuralStateSpace, experiments: Sequence[Experiment], rest: float
 ) -> NeuralStateSpaceModel:
     """The model but for its parameters."""
-    scaling = Scaling.to_unit_range([e.inputs for e in experiments], [e.output for e in experiments])
+    scaling = unit_range(experiments)
     if network.output == "absolute":
         # An absolute value is one in scaled numbers only where both have the same zero.
         largest = max(float(np.abs(e.output).max()) for e in experiments)

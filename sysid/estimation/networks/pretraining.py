@@ -78,7 +78,7 @@ class StepSamples(AbstractProvider):
 
         Args:
             template: The model, for its scaling and lags.
-            experiments: The records; samples of weight zero are never chosen.
+            experiments: The records; samples of weight zero are never chosen, nor those that look at masked ones.
             layout: Where the parameters stand.
             basis: The basis of training.
             samples: How many to choose; all of them where there are fewer.
@@ -92,7 +92,8 @@ class StepSamples(AbstractProvider):
             u, y = template.recursion.extended(experiment.inputs, experiment.history)
             target = template.scaling.scale_output(experiment.output)
             y[-len(target) :] = target
-            counted = np.ones(len(target), dtype=bool) if experiment.weights is None else experiment.weights > 0.0
+            weights = experiment.one_step(layout.lags).weights
+            counted = np.ones(len(target), dtype=bool) if weights is None else weights > 0.0
             rows.append(lagged(u, y, layout.lags, len(target))[counted])
             targets.append(target[counted])
         regressors = (np.concatenate(rows) - basis.centre) @ basis.matrix.T

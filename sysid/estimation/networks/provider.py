@@ -30,8 +30,9 @@ and no more. Their cost is :math:`N p (1 + n_l)` multiply-adds for the rows, of 
 
 Limits: the second derivatives :math:`\sum w_t e_t\, d^2 \hat y_t / d\theta^2` are left out, as in every Gauss-Newton
 method, which is right where the residuals are small or change sign often. A free run that is unstable has rows that
-grow without bound (:attr:`Linearisation.finite`; outputs are clipped, and a clipped sample has a zero row). Over a
-horizon, and one step ahead, a masked sample does not count, but is still the measured past of the samples after it.
+grow without bound (:attr:`Linearisation.finite`; outputs are clipped, and a clipped sample has a zero row). A masked
+sample is nobody's past: one step ahead the rows that look at it do not count, nor, over a horizon, the run that would
+begin at it; the inputs of a free run go on through the mask as they stand in the record.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.kernels import recursion as kernel
-from sysid.models import History, Mapping, Recursion, Start
+from sysid.models import History, Lags, Mapping, Recursion, Scaling, Start
 from sysid.traces import Trace
 
 BLOCK = 1024
@@ -63,12 +64,17 @@ class Experiment:
         history: The samples before the first.
         weights: Weight of each squared residual, shape ``(n_samples,)``; zero where a sample does not count.
             ``None`` for all ones.
+        usable: Which samples are not masked, shape ``(n_samples,)``; ``None`` for all.
+        past: Which samples of the history are measured and not masked, shape ``(n_past,)``; nothing is known of what
+            came before them. ``None`` where the history is declared: the system had stood there for ever.
     """
 
     inputs: NDArray[np.float64]
     output: NDArray[np.float64]
     history: History
     weights: NDArray[np.float64] | None = None
+    usable: NDArray[np.bool_] | None = None
+    past: NDArray[np.bool_] | None = None
 
     @classmethod
     def from_trace(cls, trace: Trace, mapping: Mapping, start: Start, rest_output: float) -> Experiment:
@@ -88,13 +94,73 @@ class Experiment:
             TraceError: If the trace is not longer than a measured start.
         """
         inputs, output = trace.columns(mapping.inputs), trace.columns([mapping.output])[:, 0]
-        history = start.history(inputs, output, rest_output)
+        history = start.history(inputs, output, rest_output, trace.usable_samples)
         n = start.n_measured
         usable = trace.usable_samples[n:]
         weights = None if usable.all() else usable.astype(np.float64)
         if trace.weights is not None:
             weights = usable * trace.weights[n:]
-        return cls(inputs=inputs[n:], output=output[n:], history=history, weights=weights)
+        return cls(
+            inputs=inputs[n:],
+            output=output[n:],
+            history=history,
+            weights=weights,
+            usable=None if usable.all() else usable,
+            past=trace.usable_samples[:n] if n else None,
+        )
+
+    def one_step(self, lags: Lags) -> Experiment:
+        """The same record as rows that are fitted one step ahead see it.
+
+        A row that looks at a sample which is masked, or which came before the record and was not declared, does not
+        count: what stands there is a filling, and nobody's regressor.
+
+        Args:
+            lags: What a row looks at.
+
+        Returns:
+            The record with the weights of its rows.
+        """
+        known = self._known_rows(lags.depth, {*lags.output, *(lag for of in lags.inputs for lag in of)})
+        if known.all():
+            return self
+        return replace(self, weights=self._weighted(known))
+
+    def within(self, horizon: int, lags: Lags) -> Experiment:
+        """The same record as free runs over a horizon see it, each beginning at measured outputs.
+
+        Args:
+            horizon: Samples after which a run begins anew.
+            lags: What a row looks at.
+
+        Returns:
+            The record; runs that would begin at a masked output do not count.
+        """
+        known = self._known_rows(lags.depth, set(lags.output))
+        if known.all():
+            return self
+        begins = np.arange(len(known)) // horizon * horizon
+        return replace(self, weights=self._weighted(known[begins]))
+
+    def _weighted(self, known: NDArray[np.bool_]) -> NDArray[np.float64]:
+        weights = np.ones(len(known)) if self.weights is None else self.weights
+        return np.where(known, weights, 0.0)
+
+    def _known_rows(self, depth: int, lags: set[int]) -> NDArray[np.bool_]:
+        """Rows whose samples at some lags are measured, or declared to have stood there before the record."""
+        n = len(self.output)
+        usable = np.ones(n, dtype=np.bool_) if self.usable is None else self.usable
+        past = np.ones(depth, dtype=np.bool_) if self.past is None else np.concatenate([np.zeros(depth), self.past])
+        known = np.concatenate([past[len(past) - depth :].astype(np.bool_), usable])
+        rows = np.ones(n, dtype=np.bool_)
+        for lag in lags:
+            rows &= known[depth - lag : depth - lag + n]
+        return rows
+
+    @property
+    def past_weights(self) -> NDArray[np.float64]:
+        """Weights of the history's samples where they are fitted too: zero for those that are masked."""
+        return np.ones(len(self.history.output)) if self.past is None else self.past.astype(np.float64)
 
     @property
     def n_counted(self) -> int:
@@ -211,6 +277,10 @@ class RecursionProvider(AbstractProvider):
         object.__setattr__(self, "n_samples", int(sum(counted)))
 
     def _record(self, experiment: Experiment) -> _Record:
+        if not self.closed:
+            experiment = experiment.one_step(self.template.lags)
+        elif self.horizon is not None:
+            experiment = experiment.within(self.horizon, self.template.lags)
         u, measured = self.template.extended(experiment.inputs, experiment.history)
         target = self.template.scaling.scale_output(experiment.output)
         measured[self.template.lags.depth :] = target
@@ -379,3 +449,17 @@ def experiments_of(
         TraceError: If a trace is not longer than a measured start.
     """
     return tuple(Experiment.from_trace(trace, mapping, start, rest_output) for trace in traces)
+
+
+def unit_range(experiments: Sequence[Experiment]) -> Scaling:
+    """The scaling that maps what the samples range over, but for masked ones, onto -1 to 1.
+
+    Args:
+        experiments: The records.
+
+    Returns:
+        The scaling.
+    """
+    seen = [(e.inputs, e.output) if e.usable is None else (e.inputs[e.usable], e.output[e.usable]) for e in experiments]
+    kept = [pair for pair in seen if len(pair[1])] or [(e.inputs, e.output) for e in experiments]
+    return Scaling.to_unit_range([inputs for inputs, _ in kept], [output for _, output in kept])

@@ -30,7 +30,7 @@ def losses_by_fitting(losses: OrderLosses, traces: list[Trace], start: Start) ->
 
 
 @pytest.mark.parametrize("intercept", [True, False], ids=["intercept", "no intercept"])
-@pytest.mark.parametrize("start", [Start(), Start(kind=StartKind.MEASURED, n_measured=3)], ids=["rest", "measured"])
+@pytest.mark.parametrize("start", [Start(), Start(kind=StartKind.MEASURED, n_measured=4)], ids=["rest", "measured"])
 def test_every_loss_is_that_of_the_fit(intercept: bool, start: Start) -> None:
     grid = OrderGrid(max_na=3, max_nb=3, max_nk=2, min_na=0, min_nb=0, intercept=intercept)
     traces = [record(0), record(1)]
