@@ -19,6 +19,9 @@ from sysid.estimation.least_squares.levenberg_marquardt import Iteration, State
 from sysid.estimation.networks.provider import AbstractProvider
 from sysid.estimation.result import Evidence
 
+MEASURED = ("mse", "damping", "effective_parameters", "elapsed_s")
+"""Figures of an iteration."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Checkpoint:
@@ -86,10 +89,14 @@ class Checkpoint:
         return State(
             theta=theta,
             at=provider.linearise(theta),
-            damping=MarquardtDamping(factor=damping["factor"], growth=damping["growth"], scale=scale),
+            damping=MarquardtDamping(factor=float(damping["factor"]), growth=float(damping["growth"]), scale=scale),
             iteration=int(kept["iteration"]),
             prior=Prior(centre=prior.centre, groups=prior.groups, alphas=alphas, beta=float(kept["beta"])),
             evidence=None if evidence is None else Evidence(**evidence),
-            losses=tuple(kept["losses"]),
-            curve=tuple(Iteration(**entry) for entry in kept["curve"]),
+            losses=tuple(float(loss) for loss in kept["losses"]),
+            # A number that JSON has no word for is kept as a string.
+            curve=tuple(
+                Iteration(iteration=int(entry["iteration"]), **{name: float(entry[name]) for name in MEASURED})
+                for entry in kept["curve"]
+            ),
         )

@@ -154,6 +154,8 @@ class LevenbergMarquardt:
         evidence_after: Iterations before the precisions are first updated: while the fit is far from a
             minimum, its residuals say nothing about noise. ``None`` keeps the prior as it is.
         on_iteration: Called after every iteration.
+        on_state: Given where the fit stands after every iteration, before ``on_iteration``: who keeps it has kept what
+            is announced.
         should_stop: Asked after every iteration; true ends the fit with the status ``INTERRUPTED``.
     """
 
@@ -161,6 +163,7 @@ class LevenbergMarquardt:
     damping: MarquardtDamping = field(default_factory=MarquardtDamping)
     evidence_after: int | None = 20
     on_iteration: Callable[[Iteration], None] = _ignore
+    on_state: Callable[[State], None] = lambda _: None
     should_stop: Callable[[], bool] = lambda: False
 
     def minimise(self, provider: AbstractProvider, theta: NDArray[np.float64], prior: Prior) -> Solution:
@@ -180,7 +183,9 @@ class LevenbergMarquardt:
             state = State(theta=theta, at=provider.linearise(theta), damping=self.damping, prior=prior)
         return self.resume(provider, self._record(state, provider, 0.0))
 
-    def resume(self, provider: AbstractProvider, state: State) -> Solution:
+    def resume(
+        self, provider: AbstractProvider, state: State, *, first_loss: float | None = None, spent_s: float = 0.0
+    ) -> Solution:
         """Go on with a fit.
 
         An interruption from the keyboard ends the fit, not the program: the best parameters so far come
@@ -189,17 +194,20 @@ class LevenbergMarquardt:
         Args:
             provider: Residuals and Jacobians, as in the run before.
             state: Where that run stood.
+            first_loss: Loss that has to be improved on: the state's by default; that of the run's start where a run
+                that was cut off goes on.
+            spent_s: Seconds of the time limit that such a run has spent already.
 
         Returns:
             The solution; it is never worse than the state.
         """
-        first, before = state, state.curve[-1].elapsed_s
+        first, before = state.at.loss if first_loss is None else first_loss, state.curve[-1].elapsed_s
         started = time.perf_counter()
         status: Status | None = None
         with threadpool_limits(1, "blas"):
             try:
                 while status is None:
-                    elapsed = time.perf_counter() - started
+                    elapsed = spent_s + time.perf_counter() - started
                     status = self.termination.check(
                         iteration=state.iteration, elapsed=elapsed, losses=state.losses, damping=state.damping.factor
                     )
@@ -210,7 +218,7 @@ class LevenbergMarquardt:
                         status = Status.INTERRUPTED
             except KeyboardInterrupt:
                 status = Status.INTERRUPTED
-        if status is Status.STALLED and state.at.loss >= first.at.loss:
+        if status is Status.STALLED and state.at.loss >= first:
             status = Status.NOT_IMPROVED
         return Solution(state=state, status=status)
 
@@ -248,9 +256,11 @@ class LevenbergMarquardt:
             effective_parameters=state.evidence.total_effective_parameters if state.evidence else float("nan"),
             elapsed_s=elapsed,
         )
-        self.on_iteration(entry)
         # The objective moves with the precisions, so progress is judged by the residuals' part alone.
-        return replace(state, losses=(*state.losses, state.at.loss), curve=(*state.curve, entry))
+        state = replace(state, losses=(*state.losses, state.at.loss), curve=(*state.curve, entry))
+        self.on_state(state)
+        self.on_iteration(entry)
+        return state
 
 
 def _solve(H: NDArray[np.float64], damping: MarquardtDamping, g: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.basis import RebasedProvider
+from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks.joint_provider import CascadeProvider
@@ -200,14 +201,15 @@ class Joint:
         Returns:
             The best state seen; a start that was given is one of them.
         """
-        began, training = time.perf_counter(), self.training
+        training, began = self.training, time.perf_counter() - checkpoints_of(self.on_progress).earlier_s
         seen = [self._candidate(None, theta, None) for seed, theta in starts if seed is None]
         alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
         interrupted = False
         for look in range(1, training.looks + 1):
             reached: list[tuple[int | None, Solution]] = []
             for number, (seed, where) in enumerate(alive):
-                solution = self._advance(where, look, began, f"{number + 1}/{len(alive)}")
+                name = f"start {'as given' if seed is None else seed}, look {look}"
+                solution = self._advance(where, look, began, f"{number + 1}/{len(alive)}", name)
                 if not isinstance(where, Solution) or solution.state is not where.state:
                     seen.append(self._candidate(seed, solution.theta, solution))
                 reached.append((seed, solution))
@@ -221,14 +223,18 @@ class Joint:
                 break
         return self._result(seen, interrupted=interrupted, seconds=time.perf_counter() - began)
 
-    def _advance(self, where: Solution | NDArray[np.float64], look: int, began: float, which: str) -> Solution:
+    def _advance(
+        self, where: Solution | NDArray[np.float64], look: int, began: float, which: str, name: str
+    ) -> Solution:
         provider = RebasedProvider(inner=self.provider, to_plain=self.layout.to_plain)
-        engine = self._engine(look, began, which)
+        keep = checkpoints_of(self.on_progress)
+        # The run's own time counts towards its limit by itself; what is left of the whole is without it.
+        engine = self._engine(look, began + keep.spent_s(name), which)
         if isinstance(where, Solution):
-            return engine.resume(provider, where.state) if _unfinished(where) else where
+            return keep.resume(name, engine, provider, where.state) if _unfinished(where) else where
         # As for a network alone: the noise is taken to be as large as the start's error.
         beta = 0.5 * provider.n_samples / max(provider.loss(where), np.finfo(np.float64).tiny)
-        return engine.minimise(provider, where, self.layout.prior(alpha=INITIAL_ALPHA, beta=beta))
+        return keep.minimise(name, engine, provider, where, self.layout.prior(alpha=INITIAL_ALPHA, beta=beta))
 
     def _engine(self, look: int, began: float, which: str) -> LevenbergMarquardt:
         training = self.training

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from sysid.estimation.least_squares.checkpoint import Checkpoint
+from sysid.estimation.least_squares.checkpoints import Checkpoints
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.termination import Termination
@@ -78,6 +79,10 @@ class Race:
     resume: Checkpoint | None = None
     prelude: StepSamples | None = None
     curriculum: Sequence[AbstractProvider] = ()
+    checkpoints: Checkpoints = field(default_factory=Checkpoints)
+    """Where the runs of this race, and of others of the same fit, are kept."""
+    name: str = ""
+    """Of the race, where a fit has several."""
     stop: threading.Event = field(default_factory=threading.Event)
     scouted: Sequence[Scout] = ()
     """Starts that were found among many; by default each is drawn."""
@@ -171,6 +176,9 @@ def _rung(
                 future.result()
         except KeyboardInterrupt:
             race.stop.set()
+        except BaseException:
+            race.stop.set()  # nobody waits for the others
+            raise
     if not reached and not latest:  # interrupted before anything had begun: the start as it is
         reached[numbers[0]] = _advance(race, numbers[0], None, share, seconds)
     return reached
@@ -209,26 +217,28 @@ def _work(starts: int, rungs: Sequence[float]) -> float:
 def _advance(race: Race, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
     training = race.training
     iterations = max(1, round(share * training.max_iterations))
-    engine = _engine(race, number, iterations, seconds)
+    engine, keep = _engine(race, number, iterations, seconds), race.checkpoints
+    run = f"{race.name}start {number + 1}, to {iterations}"
     if before is None and number == 0 and race.resume is not None:
         prior = race.layout.prior(_in_basis(race, race.layout.centre()), alpha=INITIAL_ALPHA, beta=1.0)
         seed: int | None = training.seed
-        solution = engine.resume(race.provider, race.resume.state(race.provider, prior))
+        solution = keep.resume(run, engine, race.provider, race.resume.state(race.provider, prior))
     elif before is None:
         seed, theta, centre = _begin(race, number)
         if race.prelude is not None and seed is not None:
             theta = _prelude(race, race.prelude, number, seed, centre)
-        for provider in race.curriculum:
+        for horizon, provider in enumerate(race.curriculum):
             first = replace(engine, termination=Termination(max_iterations=training.curriculum_iterations))
             first = replace(first, on_iteration=lambda _: None)
-            theta = first.minimise(provider, theta, first_prior(training, race.layout, provider, theta, centre)).theta
-        solution = engine.minimise(
-            race.provider, theta, first_prior(training, race.layout, race.provider, theta, centre)
-        )
+            prior = first_prior(training, race.layout, provider, theta, centre)
+            theta = keep.minimise(f"{run}, horizon {horizon}", first, provider, theta, prior).theta
+        prior = first_prior(training, race.layout, race.provider, theta, centre)
+        solution = keep.minimise(run, engine, race.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
-        seed, solution = before.seed, engine.resume(race.provider, before.solution.state)
+        seed, solution = before.seed, keep.resume(run, engine, race.provider, before.solution.state)
     else:
         return before
+    race.iterations[number] = solution.state.iteration  # one that was taken as it was kept has told nobody
     model = race.model(solution.theta)
     return Candidate(number=number, seed=seed, solution=solution, model=model, score=score(race, model))
 
@@ -262,7 +272,9 @@ def _prelude(
         should_stop=race.stop.is_set,
     )
     theta = prelude.draw(np.random.default_rng(seed), centre)
-    return engine.minimise(prelude, theta, first_prior(training, race.layout, prelude, theta, centre)).theta
+    prior = first_prior(training, race.layout, prelude, theta, centre)
+    name = f"{race.name}start {number + 1}, one step ahead"
+    return race.checkpoints.minimise(name, engine, prelude, theta, prior).theta
 
 
 def first_prior(

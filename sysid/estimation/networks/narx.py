@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.least_squares.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.least_squares.checkpoint import Checkpoint
+from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.posterior import calibrate, laplace
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import lagged
@@ -64,7 +65,8 @@ def fit_narx(
         resume: Where the fit of a single start was put aside; it goes on as if it had not been.
         on_checkpoint: Given the checkpoint from which the chosen start can go on.
         vet: Whether a model's free run is stable; the best stable one of the ten best candidates is then chosen.
-        on_progress: Called after every iteration, from the threads that train.
+        on_progress: Called after every iteration, from the threads that train; a
+            :class:`~sysid.estimation.least_squares.checkpoints.Watch` keeps where the fit stands, too.
 
     Returns:
         The best start's model, with the spread over starts in its attempts.
@@ -90,6 +92,7 @@ def fit_narx(
         start=start,
         initial=_initial_parameters(initial, task.template, task.layout, task.to_plain, training.seed),
         on_progress=on_progress,
+        checkpoints=checkpoints_of(on_progress),
         resume=resume,
         prelude=_prelude(training, task, experiments),
         scouted=_scouted(training, task),
@@ -113,7 +116,8 @@ def fit_narx(
     )
     if posterior is not None:
         posterior = calibrate(posterior, chosen.model, experiments_of(selection, mapping, start, rest))
-    fit = raced_result(choice, list(tasks), training, status, time.perf_counter() - began)
+    seconds = race.checkpoints.earlier_s + time.perf_counter() - began
+    fit = raced_result(choice, list(tasks), training, status, seconds)
     return replace(fit, posterior=posterior)
 
 
@@ -162,6 +166,7 @@ def _raced(race: starts.Race, task: _Task, experiments: Sequence[Experiment]) ->
             part = _Task.of(task.template, experiments, race.training, view.without)
             own = replace(
                 own,
+                name=f"without {', '.join(view.without)}, ",
                 layout=PartLayout(part=part.layout, whole=task.layout),
                 provider=part.provider,
                 to_plain=part.to_plain,

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid.errors import ConfigError
+from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
@@ -93,13 +94,15 @@ def fit_neural_state_space(
         start=start,
         initial=None,
         on_progress=on_progress,
+        checkpoints=checkpoints_of(on_progress),
     )
     candidates = starts.run(race)
     choice = choose(candidates, training.choose_by, vet)
     records = [(e.inputs, e.history) for e in experiments]
     records += [(e.inputs, e.history) for e in experiments_of(selection, mapping, start, rest)]
     status = raced_status(choice.chosen, candidates, records, interrupted=race.stop.is_set())
-    return raced_result(choice, candidates, training, status, time.perf_counter() - began)
+    seconds = race.checkpoints.earlier_s + time.perf_counter() - began
+    return raced_result(choice, candidates, training, status, seconds)
 
 
 def _template(

@@ -1,0 +1,101 @@
+"""A fit that was cut off goes on where it was, and ends as if nothing had happened."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sysid.estimation import JointTraining, Training, fit_cascade, fit_narx, fit_neural_state_space
+from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, checkpoints_of
+from sysid.models import NARX, NeuralStateSpace
+from tests.estimation.networks.test_joint_training import disturbed, measured
+from tests.estimation.tank import TANK, tank
+
+NETWORK = NARX(input_delays=1, output_delays=1, neurons=4)
+Fit = Callable[[Callable[[Any], None]], Any]
+
+
+def narx(**options: Any) -> Fit:
+    training = Training(**{"max_iterations": 25, "seed": 5, **options})
+    return lambda told: fit_narx([tank(1)], TANK, NETWORK, training, selection=[tank(2)], on_progress=told)
+
+
+def neural(told: Callable[[Any], None]) -> Any:
+    training = Training(max_iterations=12, starts=2, workers=1)
+    network = NeuralStateSpace(states=2, neurons=2)
+    return fit_neural_state_space([tank(1)], TANK, network, training, selection=[tank(2)], on_progress=told)
+
+
+def cascade(told: Callable[[Any], None]) -> Any:
+    training = JointTraining(max_iterations=12, looks=3)
+    return fit_cascade(disturbed(), [measured()], training=training, selection=[measured(seed=2)], on_progress=told)
+
+
+class CutOffError(Exception):
+    """Stands for whatever ends a fit half way."""
+
+
+FITS = {
+    "one start": narx(),
+    "one step ahead first": narx(prelude=200, prelude_iterations=6, starts=2, workers=1),
+    "raced": narx(starts=4, workers=1),
+    "raced by two": narx(starts=4, workers=2),
+    "open loop": narx(loop="open", starts=2, workers=1),
+    "without evidence": narx(regularisation=0.0),
+    "neural state space": neural,
+    "cascade": cascade,
+}
+
+
+def parameters(fit: Any) -> str:
+    """All numbers of a model, to the last bit."""
+    return json.dumps(fit.model.to_dict())
+
+
+@pytest.mark.parametrize("name", FITS)
+@pytest.mark.parametrize("share", [0.6])
+def test_a_fit_that_was_cut_off_ends_as_one_that_was_not(name: str, share: float) -> None:
+    fit, whole = FITS[name], list[Any]()
+    expected = fit(whole.append)
+    told, kept = [list[Any](), list[Any]()], list[dict[str, Any]]()
+
+    def until(entry: Any) -> None:
+        told[0].append(entry)
+        if len(told[0]) >= share * len(whole):
+            raise CutOffError
+
+    first = Checkpoints(save=kept.append, every_s=0.0)
+    with pytest.raises(CutOffError):
+        fit(Watch(report=until, checkpoints=first))
+    stored = json.loads(json.dumps(kept[-1]).replace("NaN", '"NaN"'))
+    found = fit(Watch(report=told[1].append, checkpoints=Checkpoints(kept=stored, save=kept.append)))
+    assert parameters(found) == parameters(expected)
+    assert found.status is expected.status
+    np.testing.assert_array_equal(found.history["iteration"], expected.history["iteration"])
+
+    def iterations(entries: list[Any]) -> list[tuple[str, int, int]]:
+        return sorted((one.stage, one.start, one.iteration) for one in entries if one.iteration)
+
+    assert iterations([*told[0], *told[1]]) == iterations(whole)
+
+
+def test_what_ended_is_not_done_again() -> None:
+    kept, told = list[dict[str, Any]](), list[Any]()
+    fit = narx(starts=2, workers=1)
+    book = Checkpoints(save=kept.append)
+    expected = fit(Watch(report=lambda _: None, checkpoints=book))
+    assert kept == []  # it took less than the time between two savings
+    book.flush()
+    found = fit(Watch(report=told.append, checkpoints=Checkpoints(kept=kept[-1], save=kept.append)))
+    assert told == []
+    assert parameters(found) == parameters(expected)
+    # What earlier sessions have spent is part of what a fit took.
+    assert found.train_time_s >= kept[0]["spent_s"]
+
+
+def test_who_only_listens_keeps_nothing() -> None:
+    assert checkpoints_of(print).save is None
