@@ -16,7 +16,7 @@ from typing import Any
 __version__ = "0.1.0"
 
 WORDS = (
-    *("load", "fit", "compare", "save", "Comparison"),
+    *("data", "load", "fit", "compare", "save", "Comparison", "Fit", "SystemFit"),
     *("ARX", "NARX", "NeuralStateSpace", "TransferFunction", "Training", "Start", "Role"),
 )
 """What is imported when it is first used: ``sysid --help`` loads none of it."""

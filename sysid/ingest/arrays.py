@@ -131,24 +131,37 @@ def _columns(
     one: Any, inputs: tuple[str, ...] | None, outputs: tuple[str, ...] | None, *, where: str
 ) -> dict[str, NDArray[Any]]:
     """The columns of one record by name; those of an array are the inputs and then the outputs."""
-    if isinstance(one, Mapping):
-        return {str(key): _array(value) for key, value in one.items()}
-    if hasattr(one, "get_columns"):  # polars
-        return {str(column.name): _array(column.to_numpy()) for column in one.get_columns()}
-    if hasattr(one, "data_vars"):  # xarray.Dataset
-        found = {str(key): _array(one[key].values) for key in one.data_vars if one[key].ndim == 1}
-        return {**{str(key): _array(one[key].values) for key in one.coords if one[key].ndim == 1}, **found}
-    if hasattr(one, "columns") and hasattr(one, "index"):  # pandas.DataFrame
-        return {**_index(one.index), **{_label(key): _numpy(one[key]) for key in one.columns}}
-    if hasattr(one, "to_frame") and hasattr(one, "index"):  # pandas.Series
-        return {**_index(one.index), str(one.name if one.name is not None else "y"): _numpy(one)}
+    named = columns_by_name(one)
+    if named is not None:
+        return named
     if isinstance(one, tuple) and len(one) == 2:
         u, y = (_two_dimensional(part, where=where) for part in one)
         return dict(zip([*_given(inputs, u, "u"), *_given(outputs, y, "y")], [*u.T, *y.T], strict=True))
-    array = _array(one)
-    if array.dtype.names:
-        return {name: array[name] for name in array.dtype.names}
-    return _of_matrix(_two_dimensional(array, where=where), inputs, outputs, where=where)
+    return _of_matrix(_two_dimensional(one, where=where), inputs, outputs, where=where)
+
+
+def columns_by_name(values: Any) -> dict[str, NDArray[Any]] | None:
+    """The columns of a table that has names for them.
+
+    Args:
+        values: A frame, a dict of columns, a structured array, or anything else.
+
+    Returns:
+        The columns by name; a frame's index is among them where it is time. ``None`` for what has no names.
+    """
+    if isinstance(values, Mapping):
+        return {str(key): _array(value) for key, value in values.items()}
+    if hasattr(values, "get_columns"):  # polars
+        return {str(column.name): _array(column.to_numpy()) for column in values.get_columns()}
+    if hasattr(values, "data_vars"):  # xarray.Dataset
+        keys = [key for key in (*values.coords, *values.data_vars) if values[key].ndim == 1]
+        return {str(key): _array(values[key].values) for key in keys}
+    if hasattr(values, "columns") and hasattr(values, "index"):  # pandas.DataFrame
+        return {**_index(values.index), **{_label(key): _numpy(values[key]) for key in values.columns}}
+    if hasattr(values, "to_frame") and hasattr(values, "index"):  # pandas.Series
+        return {**_index(values.index), str(values.name if values.name is not None else "y"): _numpy(values)}
+    fields = getattr(getattr(values, "dtype", None), "names", None)
+    return {name: values[name] for name in fields} if fields else None
 
 
 def _of_matrix(

@@ -1,0 +1,30 @@
+"""The short way from Python: data in, fit, compare, plot, save.
+
+Where you say nothing, the choices are those of a pipeline. Everything here is a few lines over the rooms below, which
+take more options: :mod:`sysid.ingest`, :mod:`sysid.estimation`, :mod:`sysid.validation`, :mod:`sysid.reporting` and
+:mod:`sysid.export`.
+
+Example:
+    >>> import numpy as np, sysid
+    >>> u = np.repeat([0.0, 1.0, -1.0, 0.5, 0.0], 20)
+    >>> y = np.zeros(100)
+    >>> for k in range(99):
+    ...     y[k + 1] = 0.8 * y[k] + 0.2 * u[k]
+    >>> traces = sysid.data((u, y), sample_time=0.1)
+    >>> fit = sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=1, nk=1))
+    >>> print(sysid.compare(traces, fit))
+    free run, fit in percent   record
+    ARX [1; 1; 1]              100.00
+"""
+
+from sysid.api.comparison import Comparison, compare
+from sysid.api.fits import Fit, SystemFit
+from sysid.api.fitting import fit, load
+from sysid.api.saving import save
+from sysid.estimation import Training
+from sysid.ingest.arrays import data
+from sysid.models import ARX, NARX, NeuralStateSpace, Start, TransferFunction
+from sysid.traces import Role
+
+__all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "Role", "Start", "SystemFit", "Training"]
+__all__ += ["TransferFunction", "compare", "data", "fit", "load", "save"]

@@ -1,0 +1,131 @@
+"""Models side by side over every case, as MATLAB's ``compare`` sets them: figures, a table, a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sysid.api.fits import SystemFit
+from sysid.estimation import FitResult
+from sysid.models import Start, StartKind
+from sysid.traces import TraceSet
+from sysid.validation import Evaluation, evaluate
+from sysid.validation.metrics import percent
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+FROM_FIRST_SAMPLE = Start(kind=StartKind.FIRST_SAMPLE)
+"""How a free run begins unless told otherwise: at rest at the first measured output."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Comparison:
+    """Models side by side; printed, it is a table of fits as MATLAB's ``compare`` counts them.
+
+    Args:
+        evaluations: By label of the model: what it does on every case, in free run and one step ahead.
+        outputs: By label: name and unit of the output that it is a model of.
+    """
+
+    evaluations: dict[str, Evaluation]
+    outputs: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        cases = list(next(iter(self.evaluations.values())).cases) if self.evaluations else []
+        head = ["free run, fit in percent", *cases]
+        rows = [
+            [label, *(percent(found.cases[case].free_run.nrmse_fit) for case in cases)]
+            for label, found in self.evaluations.items()
+        ]
+        widths = [max(len(row[column]) for row in [head, *rows]) for column in range(len(head))]
+        lines = [
+            f"{row[0]:<{widths[0]}}"
+            + "".join(f"   {cell:>{width}}" for cell, width in zip(row[1:], widths[1:], strict=True))
+            for row in [head, *rows]
+        ]
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The figures as a table: a row for each model and case.
+
+        Returns:
+            Columns ``model``, ``output``, ``case``, ``role``, ``fit`` (percent), ``mse``, ``rmse``, ``max_abs_error``,
+            ``r``, ``one_step_mse`` and ``unit``; all but the one-step figure are of the free run.
+        """
+        import pandas as pd
+
+        rows = [
+            {
+                "model": label,
+                "output": self.outputs.get(label, ("", ""))[0],
+                "case": case,
+                "role": found.role.value,
+                "fit": found.free_run.nrmse_fit,
+                "mse": found.free_run.mse,
+                "rmse": float(np.sqrt(found.free_run.mse)),
+                "max_abs_error": found.free_run.max_abs_error,
+                "r": found.free_run.r,
+                "one_step_mse": found.one_step.mse,
+                "unit": found.free_run.unit,
+            }
+            for label, evaluation in self.evaluations.items()
+            for case, found in evaluation.cases.items()
+        ]
+        return pd.DataFrame(rows)
+
+    def plot(self) -> Figure:
+        """All models over the measured output, one panel for each output and case.
+
+        Returns:
+            A figure of matplotlib's, to restyle, show or save.
+        """
+        from sysid.reporting.figures.comparison_figure import Overlay, comparison_figure
+
+        panels: dict[tuple[str, str], Overlay] = {}
+        for label, evaluation in self.evaluations.items():
+            output, unit = self.outputs.get(label, ("output", ""))
+            for case, found in evaluation.cases.items():
+                panel = panels.setdefault(
+                    (output, case),
+                    Overlay(
+                        case=case, output=output, unit=unit, time=found.time, target=found.target, runs={}, fits={}
+                    ),
+                )
+                panel.runs[label], panel.fits[label] = found.simulated, found.free_run.nrmse_fit
+        return comparison_figure(list(panels.values()))
+
+
+def compare(traces: TraceSet, *fits: FitResult | SystemFit, start: Start = FROM_FIRST_SAMPLE) -> Comparison:
+    """Run fitted models over every case: fed with nothing but inputs and their own past output.
+
+    Args:
+        traces: The cases; those for validation count.
+        fits: What is compared; a fit of several outputs has a row for each.
+        start: How each free run begins, and from which sample on it is scored.
+
+    Returns:
+        The figures; printing them shows a table, ``plot()`` draws them.
+    """
+    single = [
+        (one, output if isinstance(fit, SystemFit) else "")
+        for fit in fits
+        for output, one in (fit.fits.items() if isinstance(fit, SystemFit) else {"": fit}.items())
+    ]
+    evaluations: dict[str, Evaluation] = {}
+    outputs: dict[str, tuple[str, str]] = {}
+    for one, output in single:
+        label = f"{one.model.structure.label} -> {output}" if output else one.model.structure.label
+        label = label if label not in evaluations else f"{label} ({len(evaluations) + 1})"
+        evaluations[label] = evaluate(one.model, traces, start, posterior=one.posterior)
+        outputs[label] = (one.model.mapping.output, one.model.output_unit)
+    return Comparison(evaluations=evaluations, outputs=outputs)

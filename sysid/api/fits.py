@@ -1,0 +1,262 @@
+"""Fits that answer: they simulate, predict, draw, analyse and save themselves."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.estimation import FitResult
+from sysid.ingest.arrays import columns_by_name
+from sysid.models import Cascade, History, Start
+from sysid.traces import Role, Trace, TraceSet
+from sysid.validation.residuals import ResidualAnalysis, analyse_residuals
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+    from sysid.export import Bundle
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Fit(FitResult):
+    """A fit with the data that it was made of.
+
+    Args:
+        traces: The data set.
+        start: How each free run begins where nothing else is said.
+    """
+
+    traces: TraceSet
+    start: Start
+
+    @classmethod
+    def of(cls, result: FitResult, traces: TraceSet, start: Start) -> Fit:
+        """A fit result with its data beside it."""
+        fields = {field.name: getattr(result, field.name) for field in dataclasses.fields(FitResult)}
+        return cls(**fields, traces=traces, start=start)
+
+    def simulate(self, u: Any, *, initial: float | History | tuple[Any, Any] | None = None) -> NDArray[np.float64]:
+        """Free run: the model is fed nothing but inputs and its own past output.
+
+        Args:
+            u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the mapping's order, a frame
+                or dict with columns by name, or a trace.
+            initial: What stands before the first sample: nothing for the system at rest; a number, the output that it
+                has stood at; a pair ``(u, y)`` of the samples before, oldest first; or a history.
+
+        Returns:
+            The output, shape ``(n_samples,)``, in its unit.
+
+        Raises:
+            ChannelError: If an input is missing.
+            TraceError: If the inputs are not as many as the model has.
+        """
+        inputs = inputs_of(u, self.model.mapping.inputs)
+        return self.model.simulate(inputs, self._history(inputs, initial))
+
+    def predict(
+        self, y: Any, u: Any, *, steps: int = 1, initial: float | History | tuple[Any, Any] | None = None
+    ) -> NDArray[np.float64]:
+        """Prediction from measured output.
+
+        Args:
+            y: Measured output, shape ``(n_samples,)``.
+            u: Inputs, as for :meth:`simulate`.
+            steps: How many samples ahead.
+            initial: As for :meth:`simulate`.
+
+        Returns:
+            What each sample was predicted to be ``steps`` before it, shape ``(n_samples,)``, in the output's unit.
+        """
+        inputs = inputs_of(u, self.model.mapping.inputs)
+        output = np.asarray(y, dtype=np.float64).reshape(-1)
+        if len(output) != len(inputs):
+            raise TraceError(
+                "inputs and output have different lengths",
+                expected=f"{len(inputs)} samples of output",
+                got=f"{len(output)}",
+                remedy="give both over the same samples",
+            )
+        return self.model.predict(inputs, output, self._history(inputs, initial), steps=steps)
+
+    def residuals(self, traces: TraceSet | None = None, *, free_run: bool = False) -> ResidualAnalysis:
+        """Are the residuals white, and independent of the inputs?
+
+        Args:
+            traces: The cases; those that the fit was made of by default.
+            free_run: Residuals of the free run in place of those one step ahead.
+
+        Returns:
+            Correlations with their bounds, and the Ljung-Box test.
+        """
+        records = tuple(traces) if traces is not None else self.traces.with_role(Role.ESTIMATION)
+        return analyse_residuals(self.model, records, self.start, free_run=free_run)
+
+    def plot(self, traces: TraceSet | None = None) -> Figure:
+        """Its free run over the measured output, case by case.
+
+        Args:
+            traces: The cases; all of its data set by default.
+
+        Returns:
+            A figure of matplotlib's, to restyle, show or save.
+        """
+        from sysid.api.comparison import compare
+
+        return compare(traces or self.traces, self, start=self.start).plot()
+
+    def save(self, folder: str | Path, *, formats: tuple[str, ...] = ("onnx", "torchscript")) -> Bundle:
+        """Write it as files that run elsewhere; see :func:`sysid.save`."""
+        from sysid.api.saving import save
+
+        return save(self, self.traces, folder, formats=formats, start=self.start)
+
+    def summary(self) -> str:
+        """What was fitted, how it ended, its parameters as far as there is an uncertainty of them, and its fit."""
+        lines = [f"{self.model.structure.label}, {self.model.mapping}", self.status.value]
+        lines += [f"Parameters: {self.model.n_parameters}. Trained for {self.train_time_s:.3g} s."]
+        if self.uncertainty is not None:
+            pairs = zip(
+                self.uncertainty.names, self.uncertainty.values, self.uncertainty.standard_deviations, strict=True
+            )
+            lines += [f"  {name:<16} {value:>12.6g} ± {spread:.3g}" for name, value, spread in pairs]
+        lines += [f"Note: {note}" for note in self.notes]
+        return "\n".join([*lines, str(self._compared)])
+
+    def __repr__(self) -> str:
+        return f"<Fit of {self.model.structure.label}, {self.model.mapping}: {self.status.name}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+    @cached_property
+    def _compared(self) -> Any:
+        from sysid.api.comparison import compare
+
+        return compare(self.traces, self, start=self.start)
+
+    def _history(
+        self, inputs: NDArray[np.float64], initial: float | History | tuple[Any, Any] | None
+    ) -> History | None:
+        if initial is None or isinstance(initial, History):
+            return initial
+        if isinstance(initial, tuple):
+            before = inputs_of(initial[0], self.model.mapping.inputs)
+            return History(inputs=before, output=np.asarray(initial[1], dtype=np.float64).reshape(-1))
+        return History.at_rest(inputs=inputs[0], output=float(initial))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class SystemFit:
+    """Several outputs: one fit each, run as one system.
+
+    Args:
+        fits: By output.
+        model: Their models side by side.
+        traces: The data set.
+        start: How each free run begins where nothing else is said.
+    """
+
+    fits: Dict[str, Fit]
+    model: Cascade
+    traces: TraceSet
+    start: Start
+
+    @classmethod
+    def of(cls, fits: Dict[str, Fit]) -> SystemFit:
+        """Fits of the same data, one an output."""
+        first = next(iter(fits.values()))
+        model = Cascade(models=tuple(fit.model for fit in fits.values()))
+        return cls(fits=fits, model=model, traces=first.traces, start=first.start)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs, in the mapping's order."""
+        return tuple(self.fits)
+
+    def __getitem__(self, output: str) -> Fit:
+        if output not in self.fits:
+            raise ChannelError([output], self.outputs, where="the outputs of a fit")
+        return self.fits[output]
+
+    def simulate(self, u: Any, *, initial: Dict[str, float] | None = None) -> NDArray[np.float64]:
+        """Free run of all outputs.
+
+        Args:
+            u: Inputs, as for :meth:`Fit.simulate`, in the order of the first output's mapping.
+            initial: The output that the system has stood at, by name; the rest values where nothing is said.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``, in the outputs' units.
+        """
+        given = dict(initial or {})
+        strangers = [name for name in given if name not in self.fits]
+        if strangers:
+            raise ChannelError(strangers, self.outputs, where="initial")
+        return np.column_stack([fit.simulate(u, initial=given.get(name)) for name, fit in self.fits.items()])
+
+    def plot(self, traces: TraceSet | None = None) -> Figure:
+        """The free run of each output over its measurement, case by case."""
+        from sysid.api.comparison import compare
+
+        return compare(traces or self.traces, self, start=self.start).plot()
+
+    def save(self, folder: str | Path, *, formats: tuple[str, ...] = ("onnx", "torchscript")) -> Bundle:
+        """Write it as files of several outputs that run elsewhere; see :func:`sysid.save`."""
+        from sysid.api.saving import save
+
+        return save(self, self.traces, folder, formats=formats)
+
+    def summary(self) -> str:
+        """The summaries of its fits."""
+        return "\n\n".join(fit.summary() for fit in self.fits.values())
+
+    def __repr__(self) -> str:
+        return f"<SystemFit of {', '.join(self.outputs)}: {', '.join(fit.status.name for fit in self.fits.values())}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+
+def inputs_of(values: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
+    """Inputs as a matrix in a mapping's order.
+
+    Args:
+        values: An array, a frame, a dict of columns, or a trace.
+        names: The inputs.
+
+    Returns:
+        Shape ``(n_samples, n_inputs)``, float64.
+
+    Raises:
+        ChannelError: If one is missing.
+        ConfigError: If an array has another number of columns.
+    """
+    if isinstance(values, Trace):
+        return values.columns(names)
+    named = columns_by_name(values)
+    if named is not None:
+        missing = [name for name in names if name not in named]
+        if missing:
+            raise ChannelError(missing, list(named), where="the inputs of a simulation")
+        return np.column_stack([np.asarray(named[name], dtype=np.float64) for name in names])
+    array = np.asarray(values.detach().cpu() if hasattr(values, "detach") else values, dtype=np.float64)
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or array.shape[1] != len(names):
+        raise ConfigError(
+            "the inputs do not match the model",
+            expected=f"shape (n_samples, {len(names)}), for {', '.join(names)}",
+            got=f"shape {np.shape(values)}",
+            remedy="give one column an input, in this order, or columns by name",
+        )
+    return array

@@ -1,0 +1,46 @@
+"""Fits as files that run elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sysid.api.fits import Fit, SystemFit
+from sysid.estimation import FitResult
+from sysid.models import Start
+from sysid.traces import TraceSet
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
+
+
+def save(
+    fit: FitResult | SystemFit,
+    traces: TraceSet,
+    folder: str | Path,
+    *,
+    formats: tuple[str, ...] = ("onnx", "torchscript"),
+    start: Start | None = None,
+) -> Bundle:
+    """Write a fit as files that run elsewhere, each checked against its model on every case before it is published.
+
+    Args:
+        fit: The fit; one of several outputs becomes one file of several outputs.
+        traces: The cases that the files are run on.
+        folder: Where the bundle goes: new, empty, or an earlier bundle.
+        formats: Among ``onnx``, ``torchscript``, ``c``, ``fmi2`` and ``fmi3``.
+        start: How each free run begins; as the fit was made by default, and at rest for several outputs.
+
+    Returns:
+        The bundle.
+
+    Raises:
+        ParityError: If a file differs from its model; nothing is published then.
+    """
+    from sysid.export import export_bundle
+
+    if isinstance(fit, SystemFit):
+        fits = {str(one.model.mapping): one for one in fit.fits.values()}
+        return export_bundle(fit.model, traces, Path(folder), outputs=fit.outputs, formats=formats, fits=dict(fits))
+    begun = start or (fit.start if isinstance(fit, Fit) else Start())
+    return export_bundle(fit, traces, Path(folder), start=begun, formats=formats)

@@ -1,0 +1,47 @@
+"""Models side by side: the table, the frame, the picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sysid
+from sysid.api.comparison import Comparison
+
+U = np.repeat([0.0, 1.0, -1.0, 0.5, 0.0], 20)
+Y = np.convolve(U, 0.2 * 0.8 ** np.arange(40))[:100]
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    traces = sysid.data((U, Y), sample_time=0.1, split=0.6, units={"y": "cm"})
+    fits = [sysid.fit(traces, "u -> y", sysid.ARX(na=na, nb=1, nk=0)) for na in (1, 0)]
+    return sysid.compare(traces, *fits)
+
+
+def test_the_frame_has_a_row_for_each_model_and_case(comparison: Comparison) -> None:
+    frame = comparison.to_frame()
+    assert list(frame["case"]) == ["estimation", "validation"] * 2
+    assert set(frame["unit"]) == {"cm"} and set(frame["output"]) == {"y"}
+    assert frame["fit"].max() == pytest.approx(100.0, abs=1e-6)
+    np.testing.assert_allclose(frame["rmse"] ** 2, frame["mse"])
+
+
+def test_the_table_shows_the_figures_of_the_frame(comparison: Comparison) -> None:
+    first = comparison.to_frame()["fit"][0]
+    assert f"{first:.2f}" in str(comparison).splitlines()[1]
+    assert repr(comparison) == str(comparison)
+    assert comparison._repr_html_().startswith("<pre>free run")
+
+
+def test_every_model_is_drawn_over_the_measurement(comparison: Comparison) -> None:
+    figure = comparison.plot()
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["y, estimation", "y, validation"]
+    assert [len(axes.get_lines()) for axes in figure.axes] == [3, 3]
+
+
+def test_nothing_compared_is_an_empty_table() -> None:
+    empty = Comparison(evaluations={})
+    assert str(empty) == "free run, fit in percent"
+    assert empty.to_frame().empty
+    assert empty.plot().axes

@@ -1,0 +1,123 @@
+"""Fits that answer: simulate, predict, residuals, plot, summary, save; one output and several."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+from numpy.testing import assert_allclose, assert_array_equal
+from numpy.typing import NDArray
+
+import sysid
+from sysid.api.fits import inputs_of
+from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.models import History
+
+U = np.repeat([0.0, 1.0, -1.0, 0.5, 0.0], 20)
+ORDERS = sysid.ARX(na=1, nb=1, nk=1)
+
+
+def lag(u: NDArray[np.float64], first: float = 0.0) -> NDArray[np.float64]:
+    y = np.full(len(u), first)
+    for k in range(len(u) - 1):
+        y[k + 1] = 0.8 * y[k] + 0.2 * u[k]
+    return y
+
+
+Y = lag(U)
+
+
+@pytest.fixture(scope="module")
+def fit() -> sysid.Fit:
+    found = sysid.fit(sysid.data((U, Y), sample_time=0.1), "u -> y", ORDERS)
+    assert isinstance(found, sysid.Fit)
+    return found
+
+
+@pytest.fixture(scope="module")
+def system() -> sysid.SystemFit:
+    frame = pd.DataFrame({"u": U, "y": Y, "z": 2.0 * Y + 1.0})
+    found = sysid.fit(sysid.data(frame, inputs="u", outputs=["y", "z"], sample_time=0.1), "u -> y+z", ORDERS)
+    assert isinstance(found, sysid.SystemFit)
+    return found
+
+
+INPUTS: dict[str, Any] = {
+    "one dimension": U,
+    "one column": U[:, None],
+    "list": U.tolist(),
+    "dict": {"u": U, "other": Y},
+    "frame": pd.DataFrame({"other": Y, "u": U}),
+    "trace": sysid.data((U, Y), sample_time=0.1)["record"],
+}
+
+
+@pytest.mark.parametrize("kind", INPUTS)
+def test_a_free_run_takes_inputs_of_any_kind(fit: sysid.Fit, kind: str) -> None:
+    assert_allclose(fit.simulate(INPUTS[kind], initial=0.0), Y, atol=1e-12)
+
+
+def test_a_free_run_begins_where_it_is_told(fit: sysid.Fit) -> None:
+    held = fit.simulate(U, initial=3.0)
+    assert_allclose(held, lag(U, 0.8 * 3.0), atol=1e-12)
+    before = (U[:5], Y[:5])
+    assert_allclose(fit.simulate(U[5:], initial=before), Y[5:], atol=1e-12)
+    assert_array_equal(fit.simulate(U, initial=History.at_rest(inputs=U[:1], output=3.0)), held)
+
+
+def test_a_prediction_starts_each_sample_from_the_measurement(fit: sysid.Fit) -> None:
+    shifted = Y + 1.0
+    expected = 0.8 * np.concatenate([[1.0], shifted[:-1]]) + 0.2 * np.concatenate([U[:1], U[:-1]])
+    assert_allclose(fit.predict(shifted, U, initial=1.0), expected, atol=1e-12)
+
+
+def test_what_does_not_match_the_model_is_refused(fit: sysid.Fit) -> None:
+    with pytest.raises(ConfigError, match="do not match the model"):
+        fit.simulate(np.zeros((10, 2)))
+    with pytest.raises(ChannelError):
+        fit.simulate({"v": U})
+    with pytest.raises(TraceError, match="different lengths"):
+        fit.predict(Y[:-1], U)
+
+
+def test_a_fit_says_what_it_is(fit: sysid.Fit) -> None:
+    assert repr(fit) == "<Fit of ARX [1; 1; 1], u -> y: EXACT>"
+    assert f"{fit.model.structure.label}, u -> y" in fit.summary()
+    assert fit._repr_html_().startswith("<pre>")
+    assert fit.residuals().n_samples == len(U)
+
+
+def test_a_figure_can_be_restyled(fit: sysid.Fit, tmp_path: Path) -> None:
+    figure = fit.plot()
+    assert isinstance(figure, Figure)
+    (axes,) = figure.axes
+    axes.set_title("ours")
+    figure.savefig(tmp_path / "fit.png")
+    assert (tmp_path / "fit.png").stat().st_size > 0
+
+
+def test_several_outputs_are_one_system(system: sysid.SystemFit) -> None:
+    assert system.outputs == ("y", "z")
+    assert_allclose(system.simulate(U, initial={"y": 0.0, "z": 1.0}), np.column_stack([Y, 2.0 * Y + 1.0]), atol=1e-10)
+    assert repr(system) == "<SystemFit of y, z: EXACT, EXACT>"
+    assert system["z"].model.mapping.output == "z"
+    assert len(system.plot().axes) == 2
+    assert system.summary().count("ARX [1; 1; 1], u") == 2
+    with pytest.raises(ChannelError):
+        system["x"]
+    with pytest.raises(ChannelError):
+        system.simulate(U, initial={"x": 0.0})
+
+
+def test_several_outputs_are_saved_as_one_file(system: sysid.SystemFit, tmp_path: Path) -> None:
+    bundle = system.save(tmp_path / "bundle", formats=("onnx",))
+    assert [output["name"] for output in bundle.outputs] == ["y", "z"]
+    assert {file.name for file in bundle.files} == {"step.onnx", "sequence.onnx"}
+
+
+def test_inputs_stand_in_the_order_of_the_mapping() -> None:
+    assert_array_equal(inputs_of({"b": [2.0], "a": [1.0]}, ("a", "b")), [[1.0, 2.0]])
