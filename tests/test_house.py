@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "export": {"validation", "estimation", "models", "kernels", "ingest"},
     "reporting": {"validation", "export", "estimation", "models"},
     "rail": {"airbrake", "validation", "estimation", "models", "kernels", "ingest"},
-    "workbench": {"reporting", "composite", "validation", "export", "estimation", "models", "kernels", "ingest"},
+    "workbench": {"api", "reporting", "composite", "validation", "export", "estimation", "models", "kernels", "ingest"},
     "api": {"reporting", "validation", "export", "estimation", "models", "ingest"},
     "testing.py": {"models"},
 }

@@ -20,11 +20,12 @@ Example:
 from sysid.api.comparison import Comparison, compare
 from sysid.api.fits import Fit, SystemFit
 from sysid.api.fitting import fit, load
+from sysid.api.orders import OrderSearch, search_orders
 from sysid.api.saving import save
 from sysid.estimation import Training
 from sysid.ingest.arrays import data
 from sysid.models import ARX, NARX, NeuralStateSpace, Start, TransferFunction
 from sysid.traces import Role
 
-__all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "Role", "Start", "SystemFit", "Training"]
-__all__ += ["TransferFunction", "compare", "data", "fit", "load", "save"]
+__all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "OrderSearch", "Role", "Start", "SystemFit"]
+__all__ += ["Training", "TransferFunction", "compare", "data", "fit", "load", "save", "search_orders"]

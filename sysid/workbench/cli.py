@@ -189,6 +189,22 @@ def ingest(
     ingest_command(source, propose=propose)
 
 
+@app.command(epilog='Example: sysid orders dryer --mapping "heater -> temperature"')
+def orders(
+    source: Annotated[str, typer.Argument(help="The name of a data set, or a file with traces.")],
+    mapping: Annotated[
+        str | None, typer.Option(help="Inputs and output, as u1+u2 -> y; not needed for two channels.")
+    ] = None,
+    max_na: Annotated[int | None, typer.Option(min=0, help="Largest number of past outputs.")] = None,
+    max_nb: Annotated[int | None, typer.Option(min=0, help="Largest number of past values of each input.")] = None,
+    max_nk: Annotated[int | None, typer.Option(min=0, help="Largest dead time in samples.")] = None,
+) -> None:
+    """Which ARX orders do the data ask for? Every structure by its one-step loss, the best of each size in free run."""
+    from sysid.workbench.commands.orders import orders_command
+
+    orders_command(source, mapping=mapping, max_na=max_na, max_nb=max_nb, max_nk=max_nk)
+
+
 @app.command(epilog="Example: sysid simulate runs/service-brake/bundle new.csv --out simulated.csv")
 def simulate(
     bundle: Annotated[Path, typer.Argument(help="Folder or zip of an exported model or cascade.")],

@@ -1,0 +1,248 @@
+"""Which orders? Every ARX structure of a grid by its one-step loss, and the best of each size in free run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sysid.api.comparison import FROM_FIRST_SAMPLE
+from sysid.api.fits import Fit
+from sysid.errors import ConfigError
+from sysid.estimation.linear import order_search
+from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
+from sysid.models import ARX, Mapping, Start
+from sysid.traces import Role, TraceSet
+from sysid.validation.metrics import percent
+from sysid.validation.order_finalists import Finalist, run_finalists
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+LARGEST = 400_000
+"""Candidates that a search without orders of its own tries at most: some seconds."""
+
+FINALISTS = 40
+"""Candidates that are run freely."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class OrderSearch:
+    """Every candidate with its loss, and a shortlist in free run.
+
+    Args:
+        losses: All candidates.
+        finalists: The shortlist, best first: by the free run over the selection traces where there are some, by BIC
+            otherwise.
+        chosen_by: By what the shortlist is sorted, as a sentence.
+        grid: What was searched.
+        mapping: Inputs and output.
+        traces: The data set.
+        start: How each free run begins.
+    """
+
+    losses: OrderLosses
+    finalists: tuple[Finalist, ...]
+    chosen_by: str
+    grid: OrderGrid
+    mapping: Mapping
+    traces: TraceSet
+    start: Start
+
+    def best(self, criterion: str | None = None) -> ARX:
+        """The structure to go on with.
+
+        Args:
+            criterion: ``AIC``, ``AICc``, ``BIC`` or ``loss``; the first of the shortlist by default.
+
+        Returns:
+            The structure.
+
+        Raises:
+            ConfigError: If there is no such criterion.
+        """
+        if criterion is None:
+            structure = self.finalists[0].fit.model.structure
+            assert isinstance(structure, ARX)  # noqa: S101 - the search fits nothing else
+            return structure
+        known = {one.value.lower(): one for one in Criterion}
+        if criterion.lower() not in known:
+            raise ConfigError(
+                "unknown criterion",
+                where="criterion",
+                expected=", ".join(one.value for one in Criterion),
+                got=criterion,
+                remedy="write one of these, or leave it out for the best free run",
+            )
+        return self.losses.best(known[criterion.lower()])
+
+    @property
+    def fit(self) -> Fit:
+        """The fit of the first of the shortlist."""
+        return Fit.of(self.finalists[0].fit, self.traces, self.start)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader has to know: where the best stands at the end of what was tried."""
+        best, grid = self.best(), self.grid
+        at_end = [
+            f"{name} = {found}"
+            for name, found, largest in (
+                ("na", best.na, grid.max_na),
+                ("nb", max(best.nb), grid.max_nb),
+                ("nk", max(best.nk), grid.max_nk),
+            )
+            if found == largest > 0
+        ]
+        if not at_end:
+            return ()
+        return (f"The best stands at the end of what was tried ({', '.join(at_end)}): allow more.",)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The shortlist as a table, best first.
+
+        Returns:
+            Columns ``structure``, ``parameters``, ``one_step_mse``, ``AIC``, ``AICc``, ``BIC``, ``fit`` (mean over the
+            cases that chose, percent) and ``stable``.
+        """
+        import pandas as pd
+
+        criteria = (Criterion.AIC, Criterion.AICC, Criterion.BIC)
+        rows = [
+            {
+                "structure": one.fit.model.structure.label,
+                "parameters": one.fit.model.n_parameters,
+                "one_step_mse": one.one_step_mse,
+                **{criterion.value: self.score(one, criterion) for criterion in criteria},
+                "fit": one.mean_fit,
+                "stable": bool(np.isfinite(one.mean_fit)),
+            }
+            for one in self.finalists
+        ]
+        return pd.DataFrame(rows)
+
+    def score(self, finalist: Finalist, criterion: Criterion) -> float:
+        """A criterion of one of the shortlist; smaller is better."""
+        return float(self.losses.score(criterion)[self._index(finalist)])
+
+    def plot(self) -> Figure:
+        """Loss against number of parameters, with what each criterion chooses.
+
+        Returns:
+            A figure of matplotlib's.
+        """
+        from sysid.reporting.figures.order_figure import order_figure
+
+        return order_figure(self.losses, unit=self.traces[self.traces.names[0]].channel(self.mapping.output).unit)
+
+    def __str__(self) -> str:
+        head = f"{'structure':<24}{'parameters':>11}{'one-step mse':>14}{'BIC':>12}{'free run, fit %':>17}"
+        lines = [
+            f"{one.fit.model.structure.label:<24}{one.fit.model.n_parameters:>11}{one.one_step_mse:>14.4g}"
+            f"{self.score(one, Criterion.BIC):>12.1f}{percent(one.mean_fit):>17}"
+            for one in self.finalists[:10]
+        ]
+        return "\n".join([f"{len(self.losses):,} structures; {self.chosen_by}", head, *lines, *self.notes])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def _index(self, finalist: Finalist) -> int:
+        orders = finalist.fit.model.structure
+        assert isinstance(orders, ARX)  # noqa: S101 - the search fits nothing else
+        same = (
+            (self.losses.na == orders.na) & (self.losses.nb == orders.nb).all(1) & (self.losses.nk == orders.nk).all(1)
+        )
+        return int(np.flatnonzero(same)[0])
+
+
+def search_orders(
+    traces: TraceSet,
+    mapping: str | Mapping,
+    *,
+    max_na: int | None = None,
+    max_nb: int | None = None,
+    max_nk: int | None = None,
+    start: Start = FROM_FIRST_SAMPLE,
+    workers: int = 2,
+) -> OrderSearch:
+    """Search the orders of an ARX model: the exact loss of every candidate, and the free run of the best of each size.
+
+    Args:
+        traces: The data set; its selection traces choose where there are some.
+        mapping: Which channels go in, which comes out.
+        max_na: Largest number of past outputs; by default as large as the record and the number of inputs allow, ten
+            at most.
+        max_nb: Largest number of past values of each input, likewise.
+        max_nk: Largest dead time, likewise.
+        start: How each free run begins.
+        workers: Threads.
+
+    Returns:
+        The search: its best structure, its table, its picture.
+
+    Raises:
+        ConfigError: If no trace is for estimation, or the grid has more candidates than memory.
+        ChannelError: If a channel of the mapping is missing.
+        TraceError: If the record is too short for the orders.
+
+    Example:
+        >>> import numpy as np, sysid
+        >>> rng = np.random.default_rng(0)
+        >>> u, y = rng.standard_normal(300), np.zeros(300)
+        >>> for k in range(3, 300):
+        ...     y[k] = 1.2 * y[k - 1] - 0.5 * y[k - 2] + u[k - 3] + 0.05 * rng.standard_normal()
+        >>> sysid.search_orders(sysid.data((u, y), sample_time=1.0, split=0.6), "u -> y").best("BIC").label
+        'ARX [2; 1; 3]'
+    """
+    chosen = Mapping.parse(mapping) if isinstance(mapping, str) else mapping
+    estimation = traces.with_role(Role.ESTIMATION)
+    if not estimation:
+        raise ConfigError(
+            "no trace is for estimation",
+            where=f"data set {traces.name}",
+            expected="a trace with that role",
+            got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
+            remedy="give one that role",
+        )
+    grid = _grid(sum(len(trace) for trace in estimation), len(chosen.inputs), (max_na, max_nb, max_nk))
+    losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
+    selection = traces.with_role(Role.SELECTION)
+    found = run_finalists(
+        losses, estimation, chosen, selection or estimation, count=FINALISTS, start=start, workers=workers
+    ).ranked
+    if selection:
+        said = "sorted by the free run over the selection traces"
+    else:
+        bic = {losses.orders(i).label: float(losses.score(Criterion.BIC)[i]) for i in losses.shortlist(FINALISTS)}
+        found = tuple(sorted(found, key=lambda one: bic[one.fit.model.structure.label]))
+        said = "sorted by BIC, for want of selection traces"
+    return OrderSearch(
+        losses=losses, finalists=found, chosen_by=said, grid=grid, mapping=chosen, traces=traces, start=start
+    )
+
+
+def _grid(samples: int, inputs: int, asked: tuple[int | None, int | None, int | None]) -> OrderGrid:
+    """The orders that were asked for; those that were not, up to ten, as far as record and patience allow."""
+    grid = OrderGrid(max_na=1, max_nb=1, max_nk=0)
+    for largest in range(1, 11):
+        na, nb, nk = (largest if one is None else one for one in asked)
+        tried = OrderGrid(max_na=na, max_nb=nb, max_nk=nk, min_na=min(1, na), min_nb=min(1, nb))
+        parameters = na + inputs * (nb + nk) + 1
+        if largest > 1 and (tried.size(inputs) > LARGEST or 4 * parameters > samples):
+            break
+        grid = tried
+    if grid.size(inputs) > 100 * LARGEST:
+        raise ConfigError(
+            "the grid has too many candidates",
+            where="max_na, max_nb, max_nk",
+            expected=f"at most {100 * LARGEST:,} structures",
+            got=f"{grid.size(inputs):,} for {inputs} inputs",
+            remedy="lower the orders, or search the inputs one by one",
+        )
+    return grid
