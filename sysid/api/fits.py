@@ -50,7 +50,7 @@ class Fit(FitResult):
 
         Args:
             u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the mapping's order, a frame
-                or dict with columns by name, or a trace.
+                or dict with columns by name, or a trace; for a model without input the number of samples.
             initial: What stands before the first sample: nothing for the system at rest; a number, the output that it
                 has stood at; a pair ``(u, y)`` of the samples before, oldest first; or a history.
 
@@ -232,7 +232,7 @@ def inputs_of(values: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
     """Inputs as a matrix in a mapping's order.
 
     Args:
-        values: An array, a frame, a dict of columns, or a trace.
+        values: An array, a frame, a dict of columns, or a trace; for a model without input the number of samples.
         names: The inputs.
 
     Returns:
@@ -244,6 +244,8 @@ def inputs_of(values: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
     """
     if isinstance(values, Trace):
         return values.columns(names)
+    if not names and isinstance(values, int):
+        return np.zeros((values, 0))
     named = columns_by_name(values)
     if named is not None:
         missing = [name for name in names if name not in named]

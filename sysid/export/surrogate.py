@@ -79,10 +79,10 @@ class Surrogate:
             models, wiring, limits = (source,), Wiring.of([source]), {}
         if not wiring.inputs:
             raise ConfigError(
-                "nothing goes into the models",
-                expected="at least one channel that none of them computes",
+                "a model without input cannot be exported: nothing would tell its files how long to run",
+                expected="at least one channel that no model computes",
                 got=", ".join(str(model.mapping) for model in models),
-                remedy="wire models of which one reads what comes from outside",
+                remedy="run it in Python: fit.simulate(n_samples, initial=...)",
             )
         ranges, starts = ranges or {}, starts or {}
         identifiers, levels = _identifiers(wiring.channels), _levels(source, wiring)

@@ -24,7 +24,7 @@ class ARX(AbstractStructure):
 
     Args:
         na: Number of past outputs.
-        nb: Number of past values of each input.
+        nb: Number of past values of each input; empty, as ``nk``, for a record without input (an AR model).
         nk: Dead time of each input in samples.
         intercept: Fit a constant beside the lags. Without it, or data as deviations from an operating
             point, an ARX model of pressures around 90 psi is not judged fairly.
@@ -47,7 +47,7 @@ class ARX(AbstractStructure):
     def __post_init__(self) -> None:
         object.__setattr__(self, "nb", _each(self.nb))
         object.__setattr__(self, "nk", _each(self.nk))
-        if self.na < 0 or min(self.nb, default=-1) < 0 or min(self.nk, default=-1) < 0 or len(self.nb) != len(self.nk):
+        if self.na < 0 or min(self.nb, default=0) < 0 or min(self.nk, default=0) < 0 or len(self.nb) != len(self.nk):
             raise ConfigError(
                 "not the orders of an ARX model",
                 expected="na from 0 on, and one nb and one nk from 0 on for each input",
@@ -58,6 +58,8 @@ class ARX(AbstractStructure):
     @property
     def label(self) -> str:
         """As MATLAB writes the orders."""
+        if not self.nb:
+            return f"AR [{self.na}]"
         return f"ARX [{self.na}; {' '.join(map(str, self.nb))}; {' '.join(map(str, self.nk))}]"
 
     @property

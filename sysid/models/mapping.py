@@ -12,11 +12,11 @@ class Mapping:
     """Which channels go in, which comes out; written ``BP+AR -> BC``.
 
     Args:
-        inputs: Names of the input channels, at least one, all different.
+        inputs: Names of the input channels, all different; none for a time series or a decay (``-> BC``).
         output: Name of the output channel.
 
     Raises:
-        ConfigError: If there is no input, or a channel appears twice.
+        ConfigError: If a name is empty, or a channel appears twice.
 
     Example:
         >>> Mapping.parse("BP + AR -> BC")
@@ -29,7 +29,7 @@ class Mapping:
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", tuple(self.inputs))
         names = (*self.inputs, self.output)
-        if not self.inputs or not all(names) or len(set(names)) != len(names):
+        if not all(names) or len(set(names)) != len(names):
             raise ConfigError(
                 "not a mapping of input channels to one output channel",
                 expected="different channel names on both sides, as in BP+AR -> BC",
@@ -38,14 +38,14 @@ class Mapping:
             )
 
     def __str__(self) -> str:
-        return f"{'+'.join(self.inputs)} -> {self.output}"
+        return f"{'+'.join(self.inputs)} -> {self.output}".lstrip()
 
     @classmethod
     def parse(cls, text: str) -> Mapping:
         """Read a mapping from text.
 
         Args:
-            text: Input names joined by ``+``, an arrow, the output name.
+            text: Input names joined by ``+``, or nothing, an arrow, the output name.
 
         Returns:
             The mapping.
@@ -68,4 +68,5 @@ class Mapping:
                 got=text,
                 remedy="write one pipeline, or one mapping, for each output",
             )
-        return cls(inputs=tuple(name.strip() for name in left.split("+")), output=right.strip())
+        inputs = tuple(name.strip() for name in left.split("+")) if left.strip() else ()
+        return cls(inputs=inputs, output=right.strip())

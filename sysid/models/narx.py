@@ -28,7 +28,8 @@ class NARX(AbstractStructure):
     """Delays and neurons of a NARX network, as in MATLAB's ``narxnet``.
 
     Args:
-        input_delays: Lags of every input: ``4`` for 1 to 4, ``"0:3"`` for a range, ``[0, 1, 2, 4]`` for a set.
+        input_delays: Lags of every input: ``4`` for 1 to 4, ``"0:3"`` for a range, ``[0, 1, 2, 4]`` for a set; ``[]``
+            for a record without input (NAR).
             Lag 0 is the direct input x(n). One such entry per input, in a list of lists, sets them apart.
         output_delays: Lags of the output, in the same forms, from 1 on.
         neurons: Number of tanh neurons.
@@ -90,6 +91,8 @@ class NARX(AbstractStructure):
     @property
     def label(self) -> str:
         """Delays and neurons as ``NARX 4/4/20``; other lag sets are written out by their ends and number."""
+        if not self.input_delays:
+            return f"NAR {_short(self.output_delays)}/{self.neurons}{' gated' if self.gated else ''}"
         distinct = dict.fromkeys(self.input_delays)
         inputs = ",".join(_short(lags) for lags in distinct)
         return f"NARX {inputs}/{_short(self.output_delays)}/{self.neurons}{' gated' if self.gated else ''}"

@@ -20,11 +20,11 @@ class VectorMapping:
     """Which channels go in, which come out; written ``STP -> BP+AR+BC``.
 
     Args:
-        inputs: Names of the input channels, at least one.
+        inputs: Names of the input channels; none for a record without input.
         outputs: Names of the output channels, at least one.
 
     Raises:
-        ConfigError: If a side is empty, or a channel appears twice.
+        ConfigError: If there is no output, or a channel appears twice.
 
     Example:
         >>> str(VectorMapping.parse("STP -> BP + AR"))
@@ -38,7 +38,7 @@ class VectorMapping:
         object.__setattr__(self, "inputs", tuple(self.inputs))
         object.__setattr__(self, "outputs", tuple(self.outputs))
         names = (*self.inputs, *self.outputs)
-        if not self.inputs or not self.outputs or not all(names) or len(set(names)) != len(names):
+        if not self.outputs or not all(names) or len(set(names)) != len(names):
             raise ConfigError(
                 "not a mapping of input channels to output channels",
                 expected="different channel names on both sides, as in STP -> BP+AR",
@@ -47,7 +47,7 @@ class VectorMapping:
             )
 
     def __str__(self) -> str:
-        return f"{'+'.join(self.inputs)} -> {'+'.join(self.outputs)}"
+        return f"{'+'.join(self.inputs)} -> {'+'.join(self.outputs)}".lstrip()
 
     @classmethod
     def parse(cls, text: str) -> VectorMapping:
@@ -71,7 +71,7 @@ class VectorMapping:
                 remedy="write -> between inputs and outputs",
             )
         inputs, outputs = (tuple(name.strip() for name in side.split("+")) for side in (left, right))
-        return cls(inputs=inputs, outputs=outputs)
+        return cls(inputs=inputs if left.strip() else (), outputs=outputs)
 
 
 @dataclass(frozen=True, kw_only=True)

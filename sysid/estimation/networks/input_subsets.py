@@ -86,7 +86,7 @@ def views(training: Training, mapping: Mapping) -> list[View]:
         strangers = sorted(set(without) - set(mapping.inputs))
         if strangers:
             raise ChannelError(strangers, mapping.inputs, where="leave_out")
-        if set(without) == set(mapping.inputs):
+        if without and set(without) == set(mapping.inputs):
             raise ConfigError(
                 "nothing is left to see",
                 where="leave_out",

@@ -150,7 +150,7 @@ def _realised(provider: NeuralProvider, order: int) -> NDArray[np.float64]:
         A, B, C, D, constant = _realise(*_regression(signed, s.inputs, order), s)
         theta[s.linear] = np.column_stack([A, B, np.zeros(s.states)]).ravel()
         theta[s.output] = np.concatenate([C, D, [constant]])
-        gain = np.linalg.lstsq(np.eye(s.states) - A, B, rcond=None)[0]
+        gain = np.linalg.lstsq(np.eye(s.states) - A, B, rcond=None)[0] if s.inputs else B
         theta[s.start] = np.column_stack([gain, np.zeros((s.states, 2))]).ravel()
         if rounds > 1:
             runs = [_simulate(A, B, C, D, u) + constant for u, _ in signals]
@@ -175,8 +175,11 @@ def _regression(
 def _realise(
     past: NDArray[np.float64], inputs: NDArray[np.float64], constant: float, s: Sizes
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
-    """Ho-Kalman realisation of the regression's impulse responses."""
-    responses = np.zeros((2 * HORIZON + 1, s.inputs))
+    """Ho-Kalman realisation of the regression's impulse responses; without an input, of its response to what is new."""
+    if s.inputs == 0:
+        inputs = np.ones((1, 1))
+    n_inputs = len(inputs)
+    responses = np.zeros((2 * HORIZON + 1, n_inputs))
     companion = np.eye(len(past), k=-1)
     companion[0] = past
     radius = float(np.abs(linalg.eigvals(companion)).max())
@@ -184,7 +187,7 @@ def _realise(
     shrink = min(1.0, LARGEST_POLE / radius)
     past = past * shrink ** np.arange(1, len(past) + 1)
     for t in range(len(responses)):
-        fresh = inputs[:, t] if t < inputs.shape[1] else np.zeros(s.inputs)
+        fresh = inputs[:, t] if t < inputs.shape[1] else np.zeros(n_inputs)
         responses[t] = fresh + sum(past[i] * responses[t - 1 - i] for i in range(min(len(past), t)))
     places = 1 + np.arange(HORIZON)[:, None] + np.arange(HORIZON)
     hankel = responses[places].reshape(HORIZON, -1)
@@ -194,7 +197,7 @@ def _realise(
     A = np.linalg.lstsq(observable[:-1], observable[1:], rcond=None)[0]
     A *= min(1.0, LARGEST_POLE / max(float(np.abs(linalg.eigvals(A)).max()), 1e-12))
     B = root[:, None] * right[: s.states, : s.inputs]
-    return A, B, observable[0], responses[0], constant
+    return A, B, observable[0], responses[0, : s.inputs], constant
 
 
 def _simulate(

@@ -1,0 +1,57 @@
+"""Records without input: a decay, a time series."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import sysid
+from sysid.errors import ConfigError
+from sysid.models import History, Mapping, StartKind
+
+N = 60
+AFTER_ONE = sysid.Start(kind=StartKind.MEASURED, n_measured=1)
+
+
+def decay(first: float = 2.0) -> np.ndarray:
+    return first * 0.9 ** np.arange(N)
+
+
+def test_a_mapping_may_have_no_input() -> None:
+    assert Mapping.parse("-> y") == Mapping(inputs=(), output="y")
+    assert str(Mapping.parse("-> y")) == "-> y"
+
+
+def test_an_autoregressive_model_has_the_decay_s_pole() -> None:
+    traces = sysid.data(decay(), sample_time=0.1)
+    fit = sysid.fit(traces, "-> y", sysid.ARX(na=1, nb=(), nk=(), intercept=False), start=AFTER_ONE)
+    assert fit.model.structure.label == "AR [1]"
+    assert_allclose(fit.model.coefficients, [0.9], atol=1e-12)
+    assert_allclose(fit.simulate(N - 1, initial=2.0), decay()[1:], atol=1e-12)
+    with pytest.raises(ConfigError, match="without input cannot be exported"):
+        fit.save(Path("bundle"))
+
+
+@pytest.mark.parametrize(
+    ("structure", "label"),
+    [
+        (sysid.NARX(input_delays=[], output_delays=1, neurons=2), "NAR 1/2"),
+        (sysid.NeuralStateSpace(states=1, neurons=2), "NSS 1/2"),
+    ],
+)
+def test_networks_follow_a_decay(structure: object, label: str) -> None:
+    traces = sysid.data([decay(2.0), decay(-1.0)], sample_time=0.1)
+    fit = sysid.fit(traces, "-> y", structure, sysid.Training(max_iterations=200, seed=1), start=AFTER_ONE)
+    assert fit.model.structure.label == label
+    found = sysid.compare(traces, fit, start=AFTER_ONE).to_frame()
+    assert found["fit"].min() > 95.0
+
+
+def test_a_history_is_taken() -> None:
+    traces = sysid.data(decay(), sample_time=0.1)
+    fit = sysid.fit(traces, "-> y", sysid.ARX(na=1, nb=(), nk=()), start=AFTER_ONE)
+    history = History(inputs=np.zeros((1, 0)), output=[1.0])
+    assert_allclose(fit.simulate(3, initial=history), [0.9, 0.81, 0.729], atol=1e-9)
