@@ -20,7 +20,7 @@ from sysid.ingest.assemble import Wanted, assemble, stamps_in_seconds
 from sysid.ingest.headers import parse_header
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.split import Split, split_traces
-from sysid.ingest.table import RawColumn, RawTable, array_column, of_one_length, recognise_time
+from sysid.ingest.table import RawColumn, RawTable, array_column, by_length, recognise_time
 from sysid.ingest.timing import survey
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference, check_unit
@@ -278,7 +278,7 @@ def _table(columns: Mapping[str, NDArray[Any]], *, name: str) -> RawTable:
         numbers = array.astype("timedelta64[ns]").astype(np.int64) / 1e9 if array.dtype.kind == "m" else array
         unit = "s" if key == INDEX or array.dtype.kind == "m" else header.unit
         raw.append(array_column(header.name, numbers, where=name, unit=unit, reference=header.reference))
-    equal = of_one_length(raw, where=name)
+    equal, others = by_length(raw)
     time = INDEX if INDEX in columns else recognise_time(equal)
     # Time is in seconds in every function of ours, unless the column's name says otherwise.
     timed = [replace(one, unit="s") if one.name == time and one.unit is None else one for one in equal]
@@ -286,6 +286,7 @@ def _table(columns: Mapping[str, NDArray[Any]], *, name: str) -> RawTable:
         source=Path(name),
         reader="memory",
         columns=tuple(timed),
+        others=others,
         time=time,
         origin=f"given from memory (SHA-256 {_digest(columns)})",
     )

@@ -97,6 +97,9 @@ def assemble(
 def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
     """The channels that are wanted, in their units, and the stamps in seconds."""
     _check_names(wanted.channels, files, table.source)
+    columns_of = {name: given.column for name, given in files.columns.items()}
+    names = [columns_of.get(channel.name, channel.name) for channel in wanted.channels]
+    table = table.narrowed(names, files.time.column)
     notes = [table.origin or _read_from(table.source), *table.notes]
     stamps = stamps_in_seconds(table, files)
     columns = []
@@ -118,7 +121,9 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
 
 
 def _read_from(source: Path) -> str:
-    return f"read from {source.name} (SHA-256 {hashlib.sha256(source.read_bytes()).hexdigest()[:16]})"
+    with source.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return f"read from {source.name} (SHA-256 {digest[:16]})"
 
 
 def _marked(table: RawTable) -> NDArray[np.bool_]:
@@ -161,6 +166,8 @@ def stamps_in_seconds(table: RawTable, files: FileOptions) -> NDArray[np.float64
     if files.time.step is not None:
         return files.time.step * np.arange(len(table), dtype=np.float64)
     name = files.time.column or table.time
+    if name is None and table.step is not None:
+        return table.step * np.arange(len(table), dtype=np.float64)
     if name is None:
         raise TraceError(
             "no time column was recognised",

@@ -199,7 +199,7 @@ def _generated(description: DatasetDescription, case: str, generator: Generator,
 
 def _read(description: DatasetDescription, case: str, folder: Path) -> Trace:
     source, wish = description.source, description.cases[case]
-    files = source.files or FileOptions()
+    files = wish.read_as(source.files or FileOptions())
     wanted = Wanted(
         name=case,
         channels=description.trace_channels,

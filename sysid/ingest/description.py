@@ -8,7 +8,15 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from sysid.errors import ConfigError, UnitError
-from sysid.ingest.options import FileOptions, GridOptions, Options, RepairOptions
+from sysid.ingest.options import (
+    ColumnOption,
+    FileOptions,
+    GridOptions,
+    Options,
+    RepairOptions,
+    Rows,
+    TimeOption,
+)
 from sysid.traces import Channel, Role
 from sysid.units import Reference, check_unit, convert
 from sysid.yaml_files import FieldError, check, read_yaml
@@ -127,6 +135,11 @@ class CaseDescription(Options):
         file: The file that holds it, relative to the ``dataset.yaml``.
         start: Seconds, in the file's time: what is before is cut off.
         stop: Seconds, in the file's time: what is after is cut off.
+        columns: Its columns, by channel, where they differ from those of ``source.files``.
+        time: Its time column, where it differs.
+        group: Its group, structure or segment in the file.
+        sheet: Its sheet.
+        rows: Its first and last row, counted from 1.
     """
 
     role: Role
@@ -134,6 +147,27 @@ class CaseDescription(Options):
     file: str | None = None
     start: float | None = None
     stop: float | None = None
+    columns: dict[str, ColumnOption] = Field(default_factory=dict)
+    time: TimeOption | None = None
+    group: str | None = None
+    sheet: str | None = None
+    rows: Rows | None = None
+
+    def read_as(self, files: FileOptions) -> FileOptions:
+        """How its file is read.
+
+        Args:
+            files: How the files of the data set are read.
+
+        Returns:
+            The same with what this case says of its own.
+        """
+        own: dict[str, object] = {
+            name: getattr(self, name) for name in ("time", "group", "sheet", "rows") if name in self.model_fields_set
+        }
+        if self.columns:
+            own["columns"] = {**files.columns, **self.columns}
+        return files.model_copy(update=own)
 
     @model_validator(mode="after")
     def _interval(self) -> CaseDescription:
@@ -191,7 +225,7 @@ class DatasetDescription(Options):
         for name, case in self.cases.items():
             fields = case.model_fields_set
             if self.source.generator is not None:
-                needed, foreign = "recipe", fields & {"file", "start", "stop"}
+                needed, foreign = "recipe", fields - {"role", "recipe"}
             else:
                 needed, foreign = "file", fields & {"recipe"}
             if needed not in fields or foreign:

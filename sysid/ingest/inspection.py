@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +13,14 @@ from sysid.errors import ReaderError, UnitError, UserError
 from sysid.ingest.assemble import stamps_in_seconds
 from sysid.ingest.headers import is_unit, split_reference
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
+from sysid.ingest.readers.records import role_of
 from sysid.ingest.reading import read_table
-from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.table import RawColumn, RawTable, RecordChoice
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
+_EVEN_SHARE = 0.9  # of its steps, that are like the usual one
 _STEP_NAMES = frozenset({"ts", "dt", "sample_time", "sampling_time", "sampletime"})
 _UNITS_IN_NAMES = frozenset(
     {"bar", "mbar", "barg", "bara", "Pa", "hPa", "kPa", "MPa", "psi", "psig", "psia", "V", "mV", "A", "mA"}
@@ -42,6 +44,7 @@ class ColumnFinding:
         maximum: Largest finite value, in its unit; NaN if there is none.
         missing: How many values are empty, NaN or infinite.
         problem: Why it cannot be a channel, or the empty text.
+        aside: Why it is not proposed as one, or the empty text.
     """
 
     name: str
@@ -54,6 +57,7 @@ class ColumnFinding:
     maximum: float
     missing: int
     problem: str = ""
+    aside: str = ""
 
     @property
     def constant(self) -> bool:
@@ -77,7 +81,9 @@ class FileFinding:
         unstamped: How many of them have no time stamp.
         needed: The repairs that the file needs, with the gentlest choice of each.
         files: The reader options that the file was read with, where they are not recognised by itself.
+        table: The file as it was read.
         notes: What the reader recognised.
+        cases: The records that the file holds, where they are several; their channels are then those of all.
     """
 
     path: Path
@@ -91,12 +97,14 @@ class FileFinding:
     unstamped: int
     needed: RepairOptions
     files: FileOptions
+    table: RawTable = field(repr=False)
     notes: tuple[str, ...] = field(default=())
+    cases: tuple[CaseFinding, ...] = field(default=())
 
     @property
     def channels(self) -> tuple[ColumnFinding, ...]:
-        """The columns that can be channels."""
-        return tuple(column for column in self.columns if not column.problem)
+        """The columns that are proposed as channels."""
+        return tuple(column for column in self.columns if not column.problem and not column.aside)
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -105,7 +113,7 @@ class FileFinding:
         found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
         timing = self.timing
         if timing is None:
-            found.append("no time stamps")
+            found += ["no time stamps"] if self.time_guessed else []
         else:
             found += [_count(len(timing.backward), "backward time stamp")] if len(timing.backward) else []
             found += [_count(len(timing.duplicates), "duplicate time stamp")] if len(timing.duplicates) else []
@@ -117,8 +125,27 @@ class FileFinding:
                 found.append(f"{column.name}: {column.problem}")
                 continue
             found += [f"{column.name}: {_count(column.missing, 'missing value')}"] if column.missing else []
-            found += [f"{column.name}: never changes"] if column.constant else []
+            found += [f"{column.name}: never changes"] if column.constant and not column.aside else []
         return tuple(found)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseFinding:
+    """What was found in one of several records of a file.
+
+    Args:
+        name: What its case may be called.
+        role: What it may be used for.
+        role_guessed: Whether nothing in the file says so.
+        options: What the case says to read it: ``columns``, ``group``, ``sheet``, ``time``.
+        finding: What is in it.
+    """
+
+    name: str
+    role: str
+    role_guessed: bool
+    options: Mapping[str, object]
+    finding: FileFinding
 
 
 def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileFinding:
@@ -137,6 +164,18 @@ def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileF
         UnitError: If its time column has a unit that is not one of time.
     """
     table, files, repairs = _read_somehow(Path(path), files or FileOptions())
+    files = _written_down(files, table)
+    found = _finding(table, files, repairs)
+    return _of_records(found, table.records, files, repairs) if table.records else found
+
+
+def _written_down(files: FileOptions, table: RawTable) -> FileOptions:
+    """The options with those that had to be guessed from the numbers, so that a description says them."""
+    guessed = {key: table.settings[key] for key in ("transpose", "sheet") if key in table.settings}
+    return files.model_copy(update=guessed)
+
+
+def _finding(table: RawTable, files: FileOptions, repairs: RepairOptions) -> FileFinding:
     time, guessed = _time(table, files)
     timing, unstamped, step = None, 0, time.step or 1.0
     needs: dict[str, str | None] = {}
@@ -147,8 +186,9 @@ def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileF
         timing = survey(known) if len(known) else None
         if timing is not None:
             step, needs = _needs(known, timing)
-    columns = tuple(_column(column) for column in table.columns if column.name != time.column)
-    channels = [column for column in columns if not column.problem]
+    others = tuple(replace(_column(column), problem=_other(column, len(table))) for column in table.others)
+    columns = tuple(_column(column) for column in table.columns if column.name != time.column) + others
+    channels = [column for column in columns if not column.problem and not column.aside]
     needed = {
         "ragged": repairs.ragged,
         "stamps": "drop" if unstamped else None,
@@ -168,7 +208,80 @@ def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileF
         unstamped=unstamped,
         needed=RepairOptions.model_validate(needed),
         files=files,
+        table=table,
         notes=table.notes,
+    )
+
+
+def _other(column: RawColumn, usual: int) -> str:
+    if column.problem is not None:
+        return column.problem.what
+    return f"{len(column.values)} samples, where the record has {usual}"
+
+
+def _of_records(
+    whole: FileFinding, records: Sequence[RecordChoice], files: FileOptions, repairs: RepairOptions
+) -> FileFinding:
+    """The records of a file that go into one data set, and what all of them need."""
+    cases = []
+    for record in records:
+        role = role_of(record.name)
+        cases.append(
+            CaseFinding(
+                name=record.name,
+                role=role or "estimation",
+                role_guessed=role is None,
+                options=record.options,
+                finding=_finding(record.table, files, repairs),
+            )
+        )
+    kinds: dict[object, list[CaseFinding]] = {}
+    for case in cases:
+        if case.finding.channels:
+            kinds.setdefault(_signature(case), []).append(case)
+    if not kinds:
+        return whole
+    chosen = max(kinds.values(), key=len)
+    apart = [case for case in cases if case not in chosen]
+    sizes = ", ".join(f"{case.name} ({case.finding.samples} samples)" for case in chosen)
+    told = [f"{_count(len(chosen), 'record')}: {sizes}"]
+    told += [
+        f"{case.name}: a record with other channels or another sample time: a data set of its own, with "
+        + ", ".join(f"{key}: {value}" for key, value in case.options.items())
+        for case in apart
+    ]
+    first = chosen[0].finding
+    notes = dict.fromkeys([*told, *(note for case in chosen for note in case.finding.notes)])
+    merged = {key: value for case in chosen for key, value in case.finding.needed.model_dump(exclude_none=True).items()}
+    names = [column.name for column in first.channels]
+    return replace(
+        first,
+        columns=tuple(_merged([_by_name(case.finding, name) for case in chosen]) for name in names),
+        samples=min(case.finding.samples for case in chosen),
+        needed=RepairOptions.model_validate(merged),
+        table=whole.table,
+        notes=tuple(notes),
+        cases=tuple(chosen),
+    )
+
+
+def _signature(case: CaseFinding) -> object:
+    found = case.finding
+    units = tuple((column.name, None if column.unit_guessed else column.unit) for column in found.channels)
+    own_time = "time" in case.options
+    return units, found.sample_time, None if own_time else found.time.column, found.time.unit, own_time
+
+
+def _by_name(found: FileFinding, name: str) -> ColumnFinding:
+    return next(column for column in found.channels if column.name == name)
+
+
+def _merged(columns: Sequence[ColumnFinding]) -> ColumnFinding:
+    return replace(
+        columns[0],
+        minimum=min(column.minimum for column in columns),
+        maximum=max(column.maximum for column in columns),
+        missing=sum(column.missing for column in columns),
     )
 
 
@@ -210,7 +323,9 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, bool]:
         return files.time, False
     if files.time.unit == "datetime":
         return TimeOptions(column=table.time, unit="datetime", format=files.time.format), False
-    name = files.time.column or table.time or _rising(table.columns)
+    name = files.time.column or table.time or (_rising(table.columns) if table.step is None else None)
+    if name is None and table.step is not None:
+        return TimeOptions(step=table.step), False
     if name is None:
         return TimeOptions(step=_step_in_a_column(table.columns) or 1.0), True
     column = table.find(name)
@@ -234,9 +349,13 @@ def _step_in_a_column(columns: Sequence[RawColumn]) -> float | None:
 
 
 def _rising(columns: Sequence[RawColumn]) -> str | None:
+    """A column that rises like a clock: nearly always, and by much the same step."""
     for column in columns:
         steps = np.diff(column.values)
-        if column.problem is None and len(steps) and np.mean(steps > 0.0) >= _RISING_SHARE:
+        if column.problem is not None or not len(steps) or np.mean(steps > 0.0) < _RISING_SHARE:
+            continue
+        usual = np.median(steps)
+        if np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
             return column.name
     return None
 
@@ -278,6 +397,7 @@ def _column(column: RawColumn) -> ColumnFinding:
         maximum=float(finite.max()) if len(finite) else float("nan"),
         missing=len(column.values) - len(finite),
         problem=problem,
+        aside=column.aside,
     )
 
 

@@ -79,6 +79,12 @@ def _time_short(value: Any) -> Any:
     return {"column": header.name, "unit": header.unit}
 
 
+ColumnOption = Annotated[ColumnOptions, BeforeValidator(_column_short, json_schema_input_type=str | ColumnOptions)]
+TimeOption = Annotated[TimeOptions, BeforeValidator(_time_short, json_schema_input_type=str | TimeOptions)]
+Rows = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)] | None]
+"""First and last row, counted from 1."""
+
+
 class FileOptions(Options):
     """How the files of a data set are read. What is not given is recognised from the file.
 
@@ -99,14 +105,16 @@ class FileOptions(Options):
         units_line: CSV: whether a line of units follows the header.
         names: CSV: names of all columns, instead of the header's.
         missing: CSV: texts that stand for a missing value, besides empty cells and ``nan``.
-        group: HDF5, MDF4, TDMS: the group that holds the columns; MATLAB: the structure.
+        group: HDF5, MDF, TDMS, MATLAB, NPZ, JSON, LVM: the group, structure or segment that holds the columns.
+        sheet: Excel: name of the sheet.
+        rows: First and last row of the record, counted from 1, both included; ``null`` is the end.
+        transpose: MATLAB, HDF5, NPY, NPZ, JSON: whether the channels of a matrix stand in its rows;
+            ``None`` takes the longer side for time.
     """
 
     reader: str | None = None
-    time: Annotated[TimeOptions, BeforeValidator(_time_short, json_schema_input_type=str | TimeOptions)] = TimeOptions()
-    columns: dict[
-        str, Annotated[ColumnOptions, BeforeValidator(_column_short, json_schema_input_type=str | ColumnOptions)]
-    ] = {}
+    time: TimeOption = TimeOptions()
+    columns: dict[str, ColumnOption] = {}
     units: str | dict[str, str] = {}
     references: Reference | dict[str, Reference] = {}
     separator: Literal[",", ";", "\t"] | None = None
@@ -120,6 +128,9 @@ class FileOptions(Options):
     names: tuple[str, ...] | None = None
     missing: tuple[str, ...] = ()
     group: str | None = None
+    sheet: str | None = None
+    rows: Rows | None = None
+    transpose: bool | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> FileOptions:

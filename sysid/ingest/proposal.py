@@ -47,7 +47,7 @@ def propose_dataset(finding: FileFinding) -> str:
         *_grid(finding),
         *_repairs(finding),
         "cases:",
-        f"  {_text(name)}: {{role: estimation, file: {_text(finding.path.name)}}}",
+        *_cases(finding),
         'provenance: ""',
         'licence: ""',
     ]
@@ -67,21 +67,37 @@ def _channel(column: ColumnFinding) -> str:
     return f"{_mapping(pairs)}  # {told}{column.minimum:g} to {column.maximum:g}"
 
 
+def _cases(finding: FileFinding) -> list[str]:
+    file = finding.path.name
+    if not finding.cases:
+        return [f"  {_text(finding.path.stem)}: {_mapping({'role': 'estimation', 'file': file})}"]
+    lines = []
+    for case in finding.cases:
+        options = dict(case.options)
+        if "time" in options:
+            options["time"] = {"column": options["time"], "unit": case.finding.time.unit}
+        pairs = {"role": case.role, "file": file, **options}
+        told = "role guessed; " if case.role_guessed else ""
+        lines.append(f"  {_text(case.name)}: {_mapping(pairs)}  # {told}{case.finding.samples} samples")
+    return lines
+
+
 def _files(finding: FileFinding) -> list[str]:
     time = finding.time
+    own = any("time" in case.options for case in finding.cases)
     if time.step is not None:
         shown = f"{{step: {time.step!r}}}"
     else:
         pairs = {"column": time.column, "unit": time.unit, "format": time.format}
         shown = _mapping({key: value for key, value in pairs.items() if value is not None})
-    lines = ["  files:", f"    time: {shown}" + ("  # guessed" if finding.time_guessed else "")]
+    lines = [] if own else [f"    time: {shown}" + ("  # guessed" if finding.time_guessed else "")]
     options = finding.files.model_dump(exclude_unset=True, exclude={"time", "columns", "units", "references"})
     lines += [f"    {key}: {_value(value)}" for key, value in options.items()]
     guessed = [column for column in finding.channels if column.unit_guessed]
     lines += [f"    units: {_mapping({column.name: column.unit for column in guessed})}"] if guessed else []
     unsaid = [column for column in finding.channels if column.reference_guessed]
     lines += [f"    references: {_mapping({c.name: c.reference.value for c in unsaid})}"] if unsaid else []
-    return lines
+    return ["  files:", *lines] if lines else ["  files: {}"]
 
 
 def _grid(finding: FileFinding) -> list[str]:
@@ -108,6 +124,10 @@ def _mapping(pairs: Mapping[str, object]) -> str:
 def _value(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return _mapping(value)
+    if value is None:
+        return "null"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     return _text(value) if isinstance(value, str) else repr(value)

@@ -37,7 +37,8 @@ def read_table(path: str | Path, *, files: FileOptions | None = None, repairs: R
     """
     path, files = Path(path), files or FileOptions()
     reader = choose_reader(path, READERS, files.reader)
-    return read_with(reader, path, files, repairs or RepairOptions())
+    table = read_with(reader, path, files, repairs or RepairOptions())
+    return table if files.rows is None else table.between(*files.rows)
 
 
 def read_trace(
@@ -141,6 +142,8 @@ def _all_channels(table: RawTable, files: FileOptions) -> tuple[Channel, ...]:
 
 
 def _step(table: RawTable, files: FileOptions, grid: GridOptions) -> float:
+    if table.step is not None and table.time is None and files.time.column is None:
+        return table.step
     stamps = stamps_in_seconds(table, files)
     stamps = stamps[np.isfinite(stamps)]
     timing = survey(stamps) if len(stamps) else None

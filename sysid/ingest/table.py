@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -34,6 +36,7 @@ class RawColumn:
         description: As found in the file.
         problem: Why the column cannot be used; raised only when it is asked for, so that a column of
             remarks beside the measurements does no harm. Its values are NaN then.
+        aside: Why it is not proposed as a channel, though it can be one.
     """
 
     name: str
@@ -42,6 +45,22 @@ class RawColumn:
     reference: Reference | None = None
     description: str = ""
     problem: ReaderError | None = None
+    aside: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordChoice:
+    """One of several records in a file.
+
+    Args:
+        name: What its case may be called.
+        options: What a case of a ``dataset.yaml`` says to read it: ``columns``, ``group``, ``sheet`` ...
+        table: The record.
+    """
+
+    name: str
+    options: Mapping[str, Any]
+    table: RawTable
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,6 +72,9 @@ class RawTable:
         reader: Name of the reader.
         columns: All of one length, names unique.
         time: Name of the column recognised as time, or ``None``.
+        step: Seconds between rows, where the file says so in place of a time column.
+        others: Columns of other lengths; :meth:`narrowed` brings those of one length together.
+        records: The records that the file seems to hold, where they are several.
         lines: Line in the file of each row, shape ``(n_rows,)``, where the format has lines.
         notes: What the reader recognised or repaired, one sentence each.
         metadata: What else the file carries, as text.
@@ -65,6 +87,9 @@ class RawTable:
     reader: str
     columns: tuple[RawColumn, ...]
     time: str | None = None
+    step: float | None = None
+    others: tuple[RawColumn, ...] = ()
+    records: tuple[RecordChoice, ...] = ()
     lines: NDArray[np.int64] | None = None
     notes: tuple[str, ...] = ()
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -80,11 +105,11 @@ class RawTable:
                 got="no rows" if self.columns else "no columns",
                 remedy="check that the recording was saved, and that the options point at it",
             )
-        unusable = [column.problem for column in self.columns if column.problem is not None]
-        if len(unusable) == len(self.columns):
+        unusable = [column.problem for column in (*self.columns, *self.others) if column.problem is not None]
+        if len(unusable) == len(self.columns) + len(self.others):
             raise unusable[0]
-        names = self.names
-        repeated = sorted({name for name in names if names.count(name) > 1})
+        names = (*self.names, *(column.name for column in self.others))
+        repeated = sorted(name for name, count in Counter(names).items() if count > 1)
         if repeated:
             raise ReaderError(
                 f"two columns are named {', '.join(repeated)}",
@@ -115,13 +140,79 @@ class RawTable:
             ChannelError: If there is none; close names are suggested.
             ReaderError: If the column is there and cannot be used.
         """
+        column = self._named(name)
+        if column.problem is not None:
+            raise column.problem
+        if len(column.values) != len(self):
+            raise _other_length(column, len(self), where=self.source)
+        return column
+
+    def _named(self, name: str) -> RawColumn:
+        columns = (*self.columns, *self.others)
         for wanted in (name, parse_header(name).name):
-            for column in self.columns:
+            for column in columns:
                 if column.name == wanted:
-                    if column.problem is not None:
-                        raise column.problem
                     return column
-        raise ChannelError([name], self.names, where=self.source)
+        raise ChannelError([name], [column.name for column in columns], where=self.source)
+
+    def narrowed(self, names: Sequence[str], time: str | None = None) -> RawTable:
+        """The table of the columns asked for, whose length is compared among themselves alone.
+
+        Args:
+            names: Names of columns, as :meth:`find` takes them.
+            time: Name of the time column; ``None`` is the one that was recognised, if it fits.
+
+        Returns:
+            This table, if all of them are of its own length; else one of the length that they have.
+
+        Raises:
+            ChannelError: If one is missing.
+            ReaderError: If their lengths differ.
+        """
+        chosen = [self._named(name) for name in names]
+        stamps = self._named(time) if time is not None else None
+        asked = [*chosen, *([stamps] if stamps is not None else [])]
+        lengths = {len(column.values) for column in asked if column.problem is None}
+        if not lengths or lengths == {len(self)}:
+            return self
+        if len(lengths) > 1:
+            most = Counter(len(column.values) for column in asked).most_common(1)[0][0]
+            odd = next(column for column in asked if len(column.values) != most)
+            raise _other_length(odd, most, where=self.source)
+        (length,) = lengths
+        alike = tuple(column for column in (*self.columns, *self.others) if len(column.values) == length)
+        rest = tuple(column for column in (*self.columns, *self.others) if len(column.values) != length)
+        known = {column.name for column in alike}
+        own = stamps.name if stamps is not None else self.time if self.time in known else recognise_time(alike)
+        return replace(self, columns=alike, others=rest, time=own, records=(), lines=None)
+
+    def between(self, first: int, last: int | None) -> RawTable:
+        """Some of the rows.
+
+        Args:
+            first: The first row, counted from 1.
+            last: The last row, included; ``None`` is the end.
+
+        Returns:
+            The table of these rows.
+
+        Raises:
+            ReaderError: If there are no such rows.
+        """
+        stop = len(self) if last is None else last
+        if not 1 <= first <= stop <= len(self):
+            raise ReaderError(
+                "rows names rows that the file does not have",
+                where=self.source,
+                expected=f"rows between 1 and {len(self)}",
+                got=f"rows {first} to {'the end' if last is None else last}",
+                remedy=f"correct rows, for example rows: [1, {len(self)}]",
+            )
+        part = slice(first - 1, stop)
+        columns = tuple(replace(column, values=column.values[part]) for column in self.columns)
+        lines = self.lines[part] if self.lines is not None else np.arange(first, stop + 1)
+        note = f"rows {first} to {stop} of {len(self)}"
+        return replace(self, columns=columns, others=(), records=(), lines=lines, notes=(*self.notes, note))
 
     def place(self, row: int) -> str:
         """Where a row is, for messages.
@@ -145,11 +236,13 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
         Its name, or ``None`` if no column is plainly one.
     """
     for column in columns:
-        plain = column.name.casefold().strip()
-        # "t_ms", "time.s": the unit at the end of the name
-        stem = next((plain[: -len(u) - 1] for u in _TIME_UNITS if plain.endswith((f"_{u}", f".{u}"))), plain)
-        if plain in _TIME_NAMES or stem in _TIME_NAMES:
-            return column.name
+        whole = column.name.casefold().strip()
+        # In whatever group it stands: "rig/time", "run{2}.t".
+        for plain in (whole, re.split(r"[/.]", whole)[-1]):
+            # "t_ms", "time.s": the unit at the end of the name
+            stem = next((plain[: -len(u) - 1] for u in _TIME_UNITS if plain.endswith((f"_{u}", f".{u}"))), plain)
+            if plain in _TIME_NAMES or stem in _TIME_NAMES:
+                return column.name
     timed = [column.name for column in columns if column.unit in _TIME_UNITS]
     return timed[0] if timed else None
 
@@ -193,37 +286,35 @@ def array_column(
     )
 
 
-def of_one_length(columns: Sequence[RawColumn], *, where: str) -> tuple[RawColumn, ...]:
-    """Columns of the length of the time column, or else of the commonest length.
+def by_length(columns: Sequence[RawColumn]) -> tuple[tuple[RawColumn, ...], tuple[RawColumn, ...]]:
+    """Columns of the length of the time column, or else of the commonest length, and the others.
 
     Args:
         columns: Columns of any lengths.
-        where: The file, for errors.
 
     Returns:
-        As many columns; those of another length carry their ``problem``.
+        Those of that length, and those of other lengths.
     """
     if not columns:
-        return ()
+        return (), ()
     time = recognise_time(columns)
     sound = [column for column in columns if column.problem is None] or list(columns)
-    lengths = [len(column.values) for column in sound]
+    lengths = Counter(len(column.values) for column in sound)
     by_time = [len(column.values) for column in columns if column.name == time]
-    usual = by_time[0] if by_time else max(set(lengths), key=lambda length: (lengths.count(length), length))
-    return tuple(
-        column if len(column.values) == usual else _other_length(column, usual, where=where) for column in columns
-    )
+    usual = by_time[0] if by_time else max(lengths, key=lambda length: (lengths[length], length))
+    alike = tuple(column for column in columns if len(column.values) == usual)
+    return alike, tuple(column for column in columns if len(column.values) != usual)
 
 
-def _other_length(column: RawColumn, usual: int, *, where: str) -> RawColumn:
-    problem = column.problem or ReaderError(
+def _other_length(column: RawColumn, usual: int, *, where: object) -> ReaderError:
+    return column.problem or ReaderError(
         "a column has another length than the rest",
         where=f"{where}, column {column.name}",
         expected=f"{usual} samples",
         got=f"{len(column.values)} samples",
-        remedy="export it with the others' time base, or name the group that holds what belongs together",
+        remedy="give the columns of one record together (columns: {...} of the case), name the group that holds "
+        "what belongs together, or export it with the others' time base",
     )
-    return replace(column, values=np.full(usual, np.nan), problem=problem)
 
 
 def _seconds(stamps: NDArray[np.datetime64]) -> NDArray[np.float64]:
@@ -245,7 +336,7 @@ def _as_float64(array: NDArray[Any], *, where: str) -> NDArray[np.float64]:
             got=f"values of type {array.dtype}",
             remedy="choose other columns, or export this one as plain real numbers",
         )
-    converted = array.astype(np.float64)
+    converted = array.astype(np.float64, copy=False)
     if array.dtype.kind in "ui" and (np.abs(converted) > _EXACT_INTEGERS).any():
         raise ReaderError(
             "integers are too large for float64",

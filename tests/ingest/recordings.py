@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -98,3 +99,53 @@ def write_tdms(path: Path) -> None:
                 ChannelObject("rig", "u", VOLT, properties={"unit_string": "V", "wf_increment": 0.05}),
             ]
         )
+
+
+def named_columns() -> dict[str, np.ndarray]:
+    return {"time [s]": TIME, "BP [kPa gauge]": PIPE, "u [V]": VOLT}
+
+
+def write_feather(path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import feather
+
+    feather.write_feather(pa.table(named_columns()), path)
+
+
+def write_npz(path: Path) -> None:
+    np.savez_compressed(path, **named_columns())
+
+
+def write_npy(path: Path) -> None:
+    table = np.zeros(len(TIME), dtype=[(name, "f8") for name in named_columns()])
+    for name, values in named_columns().items():
+        table[name] = values
+    np.save(path, table)
+
+
+def write_json(path: Path) -> None:
+    path.write_text(json.dumps({name: values.tolist() for name, values in named_columns().items()}))
+
+
+def write_json_lines(path: Path) -> None:
+    rows = np.column_stack(list(named_columns().values())).tolist()
+    path.write_text("".join(json.dumps(dict(zip(named_columns(), row, strict=True))) + "\n" for row in rows))
+
+
+def write_lvm(path: Path) -> None:
+    head = ["LabVIEW Measurement\t", "Separator\tTab", "Decimal_Separator\t,", "X_Columns\tNo", "***End_of_Header***\t"]
+    head += ["", "Channels\t2", "Samples\t40\t40", "Y_Unit_Label\tkPa gauge\tV", "X0\t0,0\t0,0", "Delta_X\t0,05\t0,05"]
+    head += ["***End_of_Header***\t\t", "X_Value\tBP\tu\tComment"]
+    rows = [f"\t{p!r}\t{v!r}".replace(".", ",") for p, v in zip(PIPE.tolist(), VOLT.tolist(), strict=True)]
+    path.write_text("\n".join([*head, *rows]))
+
+
+def write_excel(path: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    for row in (["Rig 3"], [], ["time", "BP", "u"], ["s", "kPa gauge", "V"]):
+        book.active.append(row)
+    for row in np.column_stack([TIME, PIPE, VOLT]).tolist():
+        book.active.append(row)
+    book.save(path)

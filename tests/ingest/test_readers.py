@@ -19,10 +19,17 @@ from tests.ingest.recordings import (
     write_csv,
     write_csv_european,
     write_csv_tabs,
+    write_excel,
+    write_feather,
     write_hdf5,
+    write_json,
+    write_json_lines,
+    write_lvm,
     write_mat5,
     write_mat73,
     write_mdf4,
+    write_npy,
+    write_npz,
     write_parquet,
     write_tdms,
 )
@@ -38,6 +45,13 @@ CONTRACT = [
     pytest.param("hdf5", "run.h5", write_hdf5, id="hdf5"),
     pytest.param("mdf4", "run.mf4", write_mdf4, id="mdf4"),
     pytest.param("tdms", "run.tdms", write_tdms, id="tdms"),
+    pytest.param("feather", "run.feather", write_feather, id="feather"),
+    pytest.param("numpy", "run.npz", write_npz, id="numpy: several arrays"),
+    pytest.param("numpy", "run.npy", write_npy, id="numpy: a table"),
+    pytest.param("json", "run.json", write_json, id="json: columns"),
+    pytest.param("json", "run.jsonl", write_json_lines, id="json: lines"),
+    pytest.param("lvm", "run.lvm", write_lvm, id="lvm: decimal comma, no column of time"),
+    pytest.param("excel", "run.xlsx", write_excel, id="excel: title, units row"),
 ]
 
 DESCRIPTION = """
@@ -87,7 +101,7 @@ def test_a_file_that_is_not_what_its_ending_says_is_refused(tmp_path: Path, name
 
 @pytest.mark.parametrize(
     ("name", "writer"),
-    [pytest.param(*row.values[1:], id=str(row.id)) for row in CONTRACT if row.values[0] != "csv"],
+    [pytest.param(*row.values[1:], id=str(row.id)) for row in CONTRACT if row.values[0] not in {"csv", "lvm"}],
 )
 @pytest.mark.filterwarnings("ignore:.*MDF4.__del__:pytest.PytestUnraisableExceptionWarning")
 def test_a_file_that_breaks_off_is_refused_or_read_as_far_as_it_goes(
@@ -109,7 +123,9 @@ def test_a_file_that_breaks_off_is_refused_or_read_as_far_as_it_goes(
 
 
 @pytest.mark.parametrize(
-    ("package", "extra", "name"), [("asammdf", "mdf", "run.mf4"), ("nptdms", "tdms", "run.tdms")], ids=["mdf", "tdms"]
+    ("package", "extra", "name"),
+    [("asammdf", "mdf", "run.mf4"), ("nptdms", "tdms", "run.tdms")],
+    ids=["mdf", "tdms"],
 )
 def test_a_missing_extra_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str, extra: str, name: str
@@ -125,6 +141,39 @@ def test_a_missing_extra_is_named(
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(MissingExtraError, match=rf"sysid-workbench\[{extra}\]"):
         read_table(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("package", "content"), [("openpyxl", b"PK\x03\x04"), ("xlrd", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")]
+)
+def test_a_missing_reader_of_workbooks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str, content: bytes
+) -> None:
+    import importlib.util
+
+    (tmp_path / "run.xls").write_bytes(content)
+    real = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else real(name))
+    with pytest.raises(MissingExtraError, match=rf"(?s){package}.*sysid-workbench\[excel\]"):
+        read_table(tmp_path / "run.xls")
+
+
+@pytest.mark.parametrize(
+    ("reader", "writer"),
+    [
+        pytest.param(row.values[0], row.values[2], id=str(row.id))
+        for row in CONTRACT
+        if row.values[0] not in {"csv", "json"}
+    ],
+)
+def test_a_file_is_known_by_its_content_whatever_it_is_called(
+    tmp_path: Path, reader: str, writer: Callable[[Path], None]
+) -> None:
+    suffix = {"numpy": ".npz" if writer is write_npz else ".npy", "excel": ".xlsx", "mdf4": ".mf4"}.get(reader, ".x")
+    writer(tmp_path / f"run{suffix}")
+    (tmp_path / f"run{suffix}").rename(tmp_path / "run.dat")
+    table = read_table(tmp_path / "run.dat")
+    assert (table.reader, len(table)) == (reader, 40)
 
 
 def test_an_unknown_ending_names_the_known_ones(tmp_path: Path) -> None:

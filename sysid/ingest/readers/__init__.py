@@ -4,17 +4,22 @@ Adding a reader is one file with a ``READER`` in it, one line here, and one row 
 of ``tests/ingest/test_readers.py``.
 """
 
-from sysid.ingest.readers import csv_text, hdf5, matlab, mdf4, parquet, tdms
+from sysid.ingest.readers import arrow, csv_text, excel, hdf5, json_text, lvm, matlab, mdf4, numpy_arrays, tdms
 from sysid.ingest.readers.reader import Reader, choose_reader, read_with
 
 READERS: tuple[Reader, ...] = (
     csv_text.READER,
-    parquet.READER,
+    arrow.PARQUET,
+    arrow.FEATHER,
     matlab.READER,
     hdf5.READER,
     mdf4.READER,
     tdms.READER,
+    numpy_arrays.READER,
+    json_text.READER,
+    lvm.READER,
+    excel.READER,
 )
-"""Every reader; a file is read by the one that claims its suffix."""
+"""Every reader; a file is read by the one that knows its first bytes, else by the one that claims its suffix."""
 
 __all__ = ["READERS", "Reader", "choose_reader", "read_with"]

@@ -1,90 +1,245 @@
-"""HDF5: every one- or two-dimensional data set, with its unit in an attribute ``units`` or ``unit``."""
+"""HDF5 and netCDF: every array of one or two dimensions, by the conventions CF of netCDF.
+
+Attributes say the unit (``units``), how numbers are packed (``scale_factor``, ``add_offset``) and what stands
+for a missing one (``_FillValue``, ``missing_value``). netCDF 3 is read by SciPy, netCDF 4 is HDF5.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.readers.nested import matrix_columns
+from sysid.ingest.readers.bounds import check_claim
+from sysid.ingest.readers.leaves import Leaf
 from sysid.ingest.readers.reader import Reader, damaged
-from sysid.ingest.table import RawColumn, RawTable, array_column, of_one_length, recognise_time
+from sysid.ingest.readers.tree import table_of
+from sysid.ingest.table import RawTable
 from sysid.units import Reference
+
+_SINCE = re.compile(r"\s*(\w+)\s+since\s+(.+)", re.IGNORECASE | re.DOTALL)
+_CLASSIC = b"CDF"
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
+    with path.open("rb") as file:
+        classic = file.read(3) == _CLASSIC
+    tree, metadata, notes = _classic_tree(path) if classic else _hdf5_tree(path)
+    return table_of(
+        tree, path=path, reader="hdf5", options=options, separator="/", short=False, metadata=metadata, notes=notes
+    )
+
+
+def _is_mine(head: bytes) -> bool:
+    signature = b"\x89HDF\r\n\x1a\n"
+    return any(head[at : at + 8] == signature for at in (0, 512, 1024, 2048)) or (
+        head[:3] == _CLASSIC and head[3:4] in {b"\x01", b"\x02", b"\x05"}
+    )
+
+
+READER = Reader(
+    name="hdf5",
+    suffixes=(".h5", ".hdf5", ".hdf", ".he5", ".nc", ".nc4", ".cdf", ".netcdf"),
+    read=_read,
+    options=frozenset({"group", "transpose"}),
+    is_mine=_is_mine,
+)
+
+
+def check_claims(path: Path) -> None:
+    """Refuse a file whose arrays claim more than a file may hold.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ReaderError: If they do, or it is no whole HDF5 file.
+    """
     import h5py
+
+    shapes: list[tuple[str, tuple[int, ...]]] = []
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.shape is not None:
+            shapes.append((name, (*item.shape, len(item.dtype.names or ()) or 1)))
 
     try:
-        file = h5py.File(path, "r")
-    except OSError as error:
+        with h5py.File(path, "r") as file:
+            file.visititems(visit)
+    except (OSError, RuntimeError, ValueError) as error:
         raise damaged(path, "HDF5", error) from error
-    with file:
-        root = _group(file, options.group, path)
-        columns: list[RawColumn] = []
-
-        def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset):
-                columns.extend(_columns(name, item, path))
-
-        root.visititems(visit)
-        metadata = {"sysid": text} if (text := _attribute(file, "sysid")) else {}
-    alike = of_one_length(columns, where=str(path))
-    return RawTable(source=path, reader="hdf5", columns=alike, time=recognise_time(alike), metadata=metadata)
+    check_claim(path, shapes)
 
 
-READER = Reader(name="hdf5", suffixes=(".h5", ".hdf5", ".hdf"), read=_read, options=frozenset({"group"}))
+def is_of_matlab(path: Path) -> bool:
+    """Whether an HDF5 file was written by MATLAB.
 
+    Args:
+        path: The file.
 
-def _group(file: Any, name: str | None, path: Path) -> Any:
+    Returns:
+        True if all of its variables say so.
+    """
     import h5py
 
-    if name is None:
-        return file
-    group = file.get(name)
-    if not isinstance(group, h5py.Group):
-        groups: list[str] = []
-        file.visititems(lambda key, item: groups.append(key) if isinstance(item, h5py.Group) else None)
-        raise ReaderError(
-            f"there is no group {name}",
-            where=path,
-            expected=f"one of {', '.join(groups) or 'none: all data sets stand at the top'}",
-            got=name,
-            remedy="correct group, or leave it out",
-        )
-    return group
+    with h5py.File(path, "r") as file:
+        items = [item for name, item in file.items() if not name.startswith("#")]
+        return bool(items) and all("MATLAB_class" in item.attrs for item in items)
 
 
-def _columns(name: str, dataset: Any, path: Path) -> list[RawColumn]:
-    if dataset.dtype.names:  # a table: one column per field
-        table = dataset[()]
-        return [array_column(f"{field}", table[field], where=str(path)) for field in dataset.dtype.names]
-    if dataset.dtype.kind not in "buif":
-        return []
-    unit = _attribute(dataset, "units") or _attribute(dataset, "unit")
-    description = _attribute(dataset, "description") or _attribute(dataset, "long_name") or ""
-    columns = matrix_columns(name, np.asarray(dataset[()]), where=str(path), unit=unit, description=description)
-    reference = _attribute(dataset, "reference")
-    if reference not in {item.value for item in Reference}:
-        return columns
-    return [
-        array_column(
-            column.name,
-            column.values,
-            where=str(path),
-            unit=column.unit,
-            reference=Reference(reference),
-            description=description,
-        )
-        for column in columns
-    ]
+def _hdf5_tree(path: Path) -> tuple[dict[str, Any], dict[str, str], list[str]]:
+    import h5py
+
+    check_claims(path)
+    notes: list[str] = []
+    try:
+        with h5py.File(path, "r") as file:
+            text = _text(file.attrs.get("sysid"))
+            tree = _group(file, notes, seen=set())
+            return _lone_table(tree) or tree, {"sysid": text} if text else {}, notes
+    except (OSError, RuntimeError, ValueError, KeyError) as error:
+        raise damaged(path, "HDF5", error) from error
 
 
-def _attribute(item: Any, name: str) -> str | None:
-    value = item.attrs.get(name)
+class _Table(dict[str, Any]):
+    """The fields of one data set."""
+
+
+def _lone_table(tree: Any) -> _Table | None:
+    """The table of a file that holds nothing else."""
+    while isinstance(tree, dict) and not isinstance(tree, _Table):
+        inner = [value for value in tree.values() if isinstance(value, dict)]
+        if len(inner) != 1 or any(isinstance(value, Leaf) for value in tree.values()):
+            return None
+        tree = inner[0]
+    return tree if isinstance(tree, _Table) else None
+
+
+def _group(group: Any, notes: list[str], seen: set[int]) -> dict[str, Any]:
+    import h5py
+
+    tree: dict[str, Any] = {}
+    steps = {key: group.attrs[key] for key in group.attrs if np.size(group.attrs[key]) == 1}
+    tree.update({f"{key}": value for key, value in steps.items() if isinstance(value, np.generic | int | float)})
+    for name in group:
+        item = group.get(name)
+        identity = h5py.h5o.get_info(item.id).addr if item is not None else 0
+        if isinstance(item, h5py.Group) and identity not in seen:  # a link may lead back
+            tree[name] = _group(item, notes, seen | {identity})
+        elif isinstance(item, h5py.Dataset):
+            tree[name] = _dataset(name, item, notes)
+    return tree
+
+
+def _dataset(name: str, item: Any, notes: list[str]) -> Any:
+    if item.shape is None or item.is_virtual:
+        return None
+    if item.dtype.names:  # a table: one column per field
+        table = item[()]
+        return _Table({field: table[field] for field in item.dtype.names if table[field].dtype.kind in "buif"})
+    if item.dtype.kind not in "buif":
+        return None
+    attributes = {key: item.attrs[key] for key in item.attrs if _is_said(key)}
+    return _leaf(name, np.asarray(item[()]), attributes, notes)
+
+
+def _is_said(key: str) -> bool:
+    # Others may be references that only the library that wrote them follows.
+    return key in {
+        "units", "unit", "description", "long_name", "reference", "scale_factor", "add_offset", "_FillValue",
+        "missing_value", "valid_min", "valid_max", "valid_range", "standard_name", "_Unsigned",
+    }  # fmt: skip
+
+
+def _classic_tree(path: Path) -> tuple[dict[str, Any], dict[str, str], list[str]]:
+    from scipy.io import netcdf_file
+
+    notes: list[str] = []
+    tree: dict[str, Any] = {}
+    try:
+        with netcdf_file(path, "r", mmap=False) as file:
+            check_claim(path, ((name, variable.shape) for name, variable in file.variables.items()))
+            for name, variable in file.variables.items():
+                attributes = dict(variable._attributes)
+                array = np.asarray(variable.data)
+                if array.dtype.kind in "buif":
+                    tree[name] = _leaf(name, array.astype(array.dtype.newbyteorder("=")), attributes, notes)
+            number = {key: value for key, value in file._attributes.items() if np.size(value) == 1}
+            tree |= {key: value for key, value in number.items() if isinstance(value, np.generic | int | float)}
+    except ReaderError:
+        raise
+    except Exception as error:  # SciPy raises TypeError, ValueError, KeyError, struct errors ... on damaged files
+        raise damaged(path, "netCDF", error) from error
+    return tree, {}, notes
+
+
+def _leaf(name: str, array: NDArray[Any], attributes: Mapping[str, Any], notes: list[str]) -> Leaf:
+    unit = _text(attributes.get("units")) or _text(attributes.get("unit"))
+    reference = _text(attributes.get("reference"))
+    since = _SINCE.fullmatch(unit) if unit else None
+    if since is not None:
+        unit = since[1]
+        notes.append(f"{name}: {since[1]} since {since[2].strip()}")
+    if array.size == 1:
+        return Leaf(values=_unpacked(name, array, attributes, notes))
+    return Leaf(
+        values=_unpacked(name, array, attributes, notes),
+        unit=unit,
+        reference=Reference(reference) if reference in {item.value for item in Reference} else None,
+        description=_text(attributes.get("description")) or _text(attributes.get("long_name")) or "",
+    )
+
+
+def _unpacked(name: str, array: NDArray[Any], attributes: Mapping[str, Any], notes: list[str]) -> NDArray[Any]:
+    """The values that packed numbers stand for, NaN for missing ones."""
+    if _text(attributes.get("_Unsigned")) == "true" and array.dtype.kind == "i":
+        array = array.view(array.dtype.str.replace("i", "u"))
+    stand_ins = [
+        value for key in ("_FillValue", "missing_value") for value in np.atleast_1d(attributes.get(key, []))
+        if np.asarray(value).dtype.kind in "buif"
+    ]  # fmt: skip
+    scale, offset = (_number(attributes.get(key)) for key in ("scale_factor", "add_offset"))
+    bounds = _valid(attributes)
+    if not stand_ins and scale is None and offset is None and bounds is None:
+        return array
+    missing = np.zeros(array.shape, dtype=np.bool_)
+    for value in stand_ins:
+        missing |= array == np.asarray(value).astype(array.dtype)
+    if bounds is not None:
+        missing |= (array < bounds[0]) | (array > bounds[1])
+    values = array.astype(np.float64)
+    if scale is not None or offset is not None:
+        values = values * (1.0 if scale is None else scale) + (0.0 if offset is None else offset)
+        told = f"counts * {1.0 if scale is None else scale:g} + {0.0 if offset is None else offset:g}"
+        notes.append(f"{name}: unpacked as {told} (CF attributes)")
+    if missing.any():
+        values[missing] = np.nan
+    return values
+
+
+def _valid(attributes: Mapping[str, Any]) -> tuple[float, float] | None:
+    span = np.atleast_1d(attributes.get("valid_range", []))
+    low = span[0] if len(span) == 2 else attributes.get("valid_min")
+    high = span[1] if len(span) == 2 else attributes.get("valid_max")
+    if low is None and high is None:
+        return None
+    return (-np.inf if low is None else float(np.ravel(low)[0]), np.inf if high is None else float(np.ravel(high)[0]))
+
+
+def _number(value: Any) -> float | None:
+    array = np.atleast_1d(value) if value is not None else np.zeros(0)
+    return float(array[0]) if array.size == 1 and array.dtype.kind in "buif" else None
+
+
+def _text(value: Any) -> str | None:
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.reshape(-1)[0]
     if isinstance(value, bytes):
         return value.decode("utf-8", errors="replace")
-    return value if isinstance(value, str) else None
+    return str(value) if isinstance(value, str) else None

@@ -1,99 +1,239 @@
-"""MATLAB files: version 4 to 7.2 through SciPy, version 7.3 (which is HDF5) through pymatreader.
+"""MATLAB files of versions 4 to 7.3, by mat-io: arrays, structures, cells, saved ``iddata``, tables, time tables.
 
-MATLAB's own objects (``timeseries``, ``table``, ``datetime``, Simulink data sets) are stored in a form
-that only MATLAB reads: they are refused with the line that exports them as plain arrays.
+Objects whose fields nobody but MATLAB can make sense of are refused with the line that exports them as plain arrays.
 """
 
 from __future__ import annotations
 
+import struct
 import warnings
+import zlib
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.readers.nested import columns_of
+from sysid.ingest.readers import hdf5
+from sysid.ingest.readers.bounds import MOST_BYTES, allowed, check_claim, too_large
+from sysid.ingest.readers.leaves import Leaf, refused
+from sysid.ingest.readers.modelica import is_result, result_tree
 from sysid.ingest.readers.reader import Reader, damaged
-from sysid.ingest.table import RawColumn, RawTable, of_one_length, recognise_time
+from sysid.ingest.readers.tree import table_of
+from sysid.ingest.table import RawTable
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_PLAIN = {"double", "single", "logical", "char", "struct", "cell", "sparse"} | {
-    f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
-}
+_COMPRESSED = 15
+_OBJECT = 0xDD000000
+_NOT_NUMBERS = {"cell", "struct", "char", "function_handle", "opaque", "object"}
 
 
-def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
+def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
+    if _is_hdf5(path):
+        hdf5.check_claims(path)
+        if not hdf5.is_of_matlab(path):
+            return hdf5.READER.read(path, options, repairs)
+    variables = _load(path)
+    notes = []
+    if is_result(variables):
+        tree: Mapping[str, Any] = result_tree(variables, path)
+        notes.append("simulation result of Dymola or OpenModelica")
+    else:
+        tree = {name: _node(value, name, path) for name, value in variables.items()}
+    return table_of(tree, path=path, reader="matlab", options=options, notes=notes)
+
+
+def _is_mine(head: bytes) -> bool:
+    if head.startswith(b"MATLAB 5.0 MAT-file") or head.startswith(b"MATLAB 7.3 MAT-file"):
+        return True
+    if len(head) < 20:
+        return False
+    # Version 4 has no mark: type, rows, columns, whether complex, length of the name that follows.
+    for order in "<>":
+        kind, rows, columns, imaginary, length = struct.unpack(f"{order}5i", head[:20])
+        name = head[20 : 20 + length] if 1 < length < 64 else b""
+        if (
+            0 <= kind < 5000
+            and kind % 10 < 3
+            and kind // 10 % 10 < 6
+            and rows >= 0
+            and columns >= 0
+            and imaginary in {0, 1}
+            and name.endswith(b"\0")
+            and name[:-1].replace(b"_", b"a").isalnum()
+        ):
+            return True
+    return False
+
+
+READER = Reader(
+    name="matlab", suffixes=(".mat",), read=_read, options=frozenset({"group", "transpose"}), is_mine=_is_mine
+)
+
+
+def _is_hdf5(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(520)
-    version_73 = _HDF5_SIGNATURE in (head[:8], head[512:520])
-    opaque, tree = _load_73(path) if version_73 else _load_5(path)
-    columns = columns_of(tree, where=str(path), group=options.group)
-    columns += [_refused(name, kind, path) for name, kind in opaque.items()]
-    columns_alike = of_one_length(columns, where=str(path))
-    return RawTable(source=path, reader="matlab", columns=columns_alike, time=recognise_time(columns_alike))
+    return _HDF5_SIGNATURE in (head[:8], head[512:520])
 
 
-READER = Reader(name="matlab", suffixes=(".mat",), read=_read, options=frozenset({"group"}))
-
-
-def _load_5(path: Path) -> tuple[dict[str, str], dict[str, Any]]:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatlabFunction, MatlabObject, MatlabOpaque, MatReadWarning
+def _load(path: Path) -> dict[str, Any]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it sets an option of pandas that is on its way out
+        from matio import load_from_mat, whosmat
 
     try:
         with warnings.catch_warnings():
-            # SciPy gives every object the name None, and warns when there are two.
-            warnings.simplefilter("ignore", MatReadWarning)
-            loaded = loadmat(path, simplify_cells=True)
-    except Exception as error:  # SciPy raises ValueError, TypeError, zlib.error and more on damaged files
+            warnings.simplefilter("ignore")  # what it cannot read comes back as an object, which is refused by name
+            there = whosmat(path)
+            check_claim(path, ((name, shape) for name, (shape, kind) in there.items() if kind not in _NOT_NUMBERS))
+            _check_compressed(path)
+            try:
+                loaded = load_from_mat(path)
+            except (NotImplementedError, ValueError, KeyError, TypeError, AttributeError):
+                loaded = _one_by_one(path, there, load_from_mat)
+    except ReaderError:
+        raise
+    except Exception as error:  # mat-io raises ValueError, TypeError, zlib.error, struct.error ... on damaged files
         raise damaged(path, "MATLAB", error) from error
-    opaque: dict[str, str] = {}
-    tree: dict[str, Any] = {}
-    for name, value in loaded.items():
-        if isinstance(value, MatlabOpaque):
-            record = value.reshape(-1)[0]
-            opaque[_text(record["s0"])] = _text(record["s2"])
-        elif isinstance(value, MatlabObject | MatlabFunction):
-            opaque[name] = str(getattr(value, "classname", "function_handle"))
-        elif not name.startswith("__"):
-            tree[name] = value
-    return opaque, tree
+    return {
+        name: refused(_only_matlab(name, str(there[name][1]), path)) if _is_reference(value) else value
+        for name, value in loaded.items()
+        if not name.startswith("__")
+    }
 
 
-def _text(value: Any) -> str:
-    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+def _is_reference(value: Any) -> bool:
+    """Whether an array only points to an object that the file does not hold in a form that is known."""
+    return (
+        isinstance(value, np.ndarray) and value.dtype == np.uint32 and value.size > 1 and int(value.flat[0]) == _OBJECT
+    )
 
 
-def _load_73(path: Path) -> tuple[dict[str, str], dict[str, Any]]:
-    import h5py
-    from pymatreader import read_mat
-
-    try:
-        with h5py.File(path, "r") as file:
-            kinds = {name: _kind_73(item) for name, item in file.items() if not name.startswith("#")}
-        plain = [name for name, kind in kinds.items() if kind in _PLAIN]
-        tree = read_mat(str(path), variable_names=plain) if plain else {}
-    except (OSError, KeyError, ValueError, RuntimeError) as error:
-        raise damaged(path, "MATLAB 7.3", error) from error
-    return {name: kind for name, kind in kinds.items() if kind not in _PLAIN}, tree
-
-
-def _kind_73(item: Any) -> str:
-    kind = item.attrs.get("MATLAB_class", b"double")
-    text = kind.decode() if isinstance(kind, bytes) else str(kind)
-    # An object may call itself what it likes; this attribute says how it is stored.
-    return f"object {text}" if item.attrs.get("MATLAB_object_decode", 0) else text
+def _one_by_one(path: Path, there: Mapping[str, Any], load: Callable[..., dict[str, Any]]) -> dict[str, Any]:
+    """Every variable that can be read, where one of them cannot."""
+    found: dict[str, Any] = {}
+    for name, (_, kind) in there.items():
+        try:
+            found.update(load(path, variable_names=[name]))
+        except Exception as error:  # noqa: BLE001 - as above; only this variable is lost
+            found[name] = refused(_only_matlab(name, str(kind), path, error))
+    if all(isinstance(value, Leaf) for name, value in found.items() if not name.startswith("__")):
+        raise next(value.problem for value in found.values() if isinstance(value, Leaf) and value.problem)
+    return found
 
 
-def _refused(name: str, kind: str, path: Path) -> RawColumn:
-    problem = ReaderError(
+def _check_compressed(path: Path) -> None:
+    """Refuse a version 5 file whose variables unpack to more than a file may hold."""
+    limit = allowed(path)
+    with path.open("rb") as file:
+        head = file.read(128)
+        if not head.startswith(b"MATLAB 5.0") or 1100 * path.stat().st_size < MOST_BYTES:
+            return  # deflate packs at most some 1,030 times
+        order = "<" if head[126:128] == b"IM" else ">"
+        total = 0
+        for size in _unpacked_sizes(file, order):
+            total += size
+            if total > limit:
+                raise too_large(path, "more than that, unpacked", limit)
+
+
+def _unpacked_sizes(file: BinaryIO, order: str) -> Iterator[int]:
+    """Sizes of the pieces of the compressed elements of a version 5 file, as they are unpacked."""
+    while len(tag := file.read(8)) == 8:
+        kind, length = struct.unpack(f"{order}II", tag)
+        if kind != _COMPRESSED:
+            file.seek(length, 1)
+            continue
+        unpack, left = zlib.decompressobj(), length
+        while left > 0 and (raw := file.read(min(left, 2**16))):
+            left -= len(raw)
+            while raw:
+                yield len(unpack.decompress(raw, 2**22))
+                raw = unpack.unconsumed_tail
+
+
+def _node(value: Any, name: str, path: Path) -> Any:
+    """What mat-io makes of a variable, as a tree."""
+    from matio.utils.matclass import MatlabFunction, MatlabOpaque
+
+    if isinstance(value, MatlabOpaque):
+        return _object(value, name, path)
+    if isinstance(value, MatlabFunction):
+        return None
+    if hasattr(value, "toarray"):
+        return _sparse(value, name, path)
+    if hasattr(value, "columns") and hasattr(value, "index"):
+        return _frame(value)
+    return _array(value, name, path) if isinstance(value, np.ndarray) else value
+
+
+def _array(value: Any, name: str, path: Path) -> Any:
+    if _is_reference(value):
+        return refused(_only_matlab(name, "unknown", path))
+    if value.dtype.names is not None:
+        records = [
+            {field: _node(record[field], field, path) for field in value.dtype.names}
+            for record in value.reshape(-1, order="F")
+        ]
+        return records[0] if len(records) == 1 else records
+    if value.dtype.kind in "US":
+        texts = [str(text).replace("\0", "").rstrip() for text in value.reshape(-1)]
+        return texts[0] if len(texts) == 1 else texts
+    if value.dtype.kind == "O":
+        return [_node(item, name, path) for item in value.reshape(-1, order="F")]
+    return value
+
+
+def _object(value: Any, name: str, path: Path) -> Any:
+    """An object of a class: one of the forms that are known by their fields, else refused."""
+    properties = value.properties
+    if isinstance(properties, np.ndarray) and properties.size == 1:
+        properties = properties.reshape(-1)[0]
+    if isinstance(properties, Mapping):
+        fields = {str(key).strip("_"): _node(item, str(key), path) for key, item in properties.items()}
+        inner = fields.get("TimeInfo")
+        if isinstance(inner, Mapping) and "Time" in inner and "Data" in fields:
+            fields.setdefault("Time", inner["Time"])
+        if {"Time", "Data"} <= fields.keys() or "OutputData" in fields:
+            return fields
+    return refused(_only_matlab(name, str(value.classname), path))
+
+
+def _sparse(value: Any, name: str, path: Path) -> Any:
+    check_claim(path, [(name, value.shape)])
+    return value.toarray()
+
+
+def _frame(frame: Any) -> dict[str, Any]:
+    """A table or a time table."""
+    columns: dict[str, Any] = {}
+    if frame.index.dtype.kind in "Mm":
+        columns["time" if "time" not in map(str.casefold, map(str, frame.columns)) else "row times"] = _stamps(
+            frame.index
+        )
+    for key in frame.columns:
+        values = frame[key].to_numpy()
+        columns[str(key)] = _stamps(frame[key]) if values.dtype.kind in "Mm" else values
+    return columns
+
+
+def _stamps(stamps: Any) -> Leaf:
+    values = np.asarray(stamps)
+    if values.dtype.kind == "m":
+        return Leaf(values=values / np.timedelta64(1, "ns") / 1e9, unit="s")
+    return Leaf(values=values, unit="s")
+
+
+def _only_matlab(name: str, kind: str, path: Path, error: Exception | None = None) -> ReaderError:
+    return ReaderError(
         f"the variable {name} is a MATLAB object, which only MATLAB can read",
         where=path,
-        expected="plain numeric arrays, or structures of them",
-        got=f"class {kind}",
+        expected="plain numeric arrays, structures, cells, iddata, tables",
+        got=f"class {kind}" + (f" ({error})" if error is not None else ""),
         remedy="in MATLAB, for a timeseries ts: t = ts.Time; u = ts.Data; save('plain.mat', 't', 'u'); "
-        "for a table T: s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')",
+        "for a table T: s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's'); "
+        "for iddata z: u = z.u; y = z.y; Ts = z.Ts; save('plain.mat', 'u', 'y', 'Ts')",
     )
-    return RawColumn(name=name, values=np.full(1, np.nan), problem=problem)

@@ -1,4 +1,4 @@
-"""ASAM MDF 4 measurement files, by asammdf (the extra ``mdf``)."""
+"""ASAM MDF measurement files of versions 3 and 4, by asammdf (the extra ``mdf``)."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sysid.errors import MissingExtraError, ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
+from sysid.ingest.readers.joining import Signal, joined_signals
 from sysid.ingest.readers.reader import Reader, damaged
-from sysid.ingest.table import RawColumn, RawTable, array_column
+from sysid.ingest.readers.tree import table_of
+from sysid.ingest.table import RawTable
 
 _MARKS = (b"MDF     ", b"UnFinMF ")
 
@@ -32,30 +33,39 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
         raise damaged(path, "MDF", error) from error
     with file:
         groups = {name: signals for name, signals in _groups(file).items() if signals}
-    chosen = _choose(groups, options.group, path)
-    stamps = chosen[0].timestamps
-    columns = [array_column("time", np.asarray(stamps), where=str(path), unit="s")]
-    columns += [_column(signal, path) for signal in chosen]
-    return RawTable(source=path, reader="mdf4", columns=tuple(columns), time="time")
+    columns, notes = joined_signals(_choose(groups, options.group, path), path)
+    return table_of(columns, path=path, reader="mdf4", options=options.model_copy(update={"group": None}), notes=notes)
 
 
-READER = Reader(name="mdf4", suffixes=(".mf4", ".mdf"), read=_read, options=frozenset({"group"}))
+READER = Reader(
+    name="mdf4",
+    suffixes=(".mf4", ".mdf", ".mf3", ".md3"),
+    read=_read,
+    options=frozenset({"group"}),
+    is_mine=lambda head: head[:8] in _MARKS,
+)
 
 
-def _groups(file: Any) -> dict[str, list[Any]]:
+def _groups(file: Any) -> dict[str, list[Signal]]:
     """Signals with one value per time stamp, by the name of their channel group."""
-    found: dict[str, list[Any]] = {}
+    found: dict[str, list[Signal]] = {}
     for index, group in enumerate(file.groups):
         name = str(getattr(group.channel_group, "acq_name", "") or f"group {index}")
         name = name if name not in found else f"{name} ({index})"
         master = file.masters_db.get(index)
         numbers = [number for number in range(len(group.channels)) if number != master]
-        signals = [file.get(group=index, index=number) for number in numbers]
-        found[name] = [signal for signal in signals if signal.samples.ndim == 1 and len(signal.samples)]
+        signals = [_get(file, index, number) for number in numbers]
+        found[name] = [_signal(s, name) for s in signals if s.samples.ndim == 1 and len(s.samples)]
     return found
 
 
-def _choose(groups: dict[str, list[Any]], wanted: str | None, path: Path) -> list[Any]:
+def _get(file: Any, group: int, index: int) -> Any:
+    signal = file.get(group=group, index=index)
+    # States that the file gives names to are taken by their numbers.
+    return signal if signal.samples.dtype.kind in "buif" else file.get(group=group, index=index, raw=True)
+
+
+def _choose(groups: dict[str, list[Signal]], wanted: str | None, path: Path) -> list[Signal]:
     if wanted is not None:
         if wanted in groups:
             return groups[wanted]
@@ -64,7 +74,7 @@ def _choose(groups: dict[str, list[Any]], wanted: str | None, path: Path) -> lis
             where=path,
             expected=f"one of {', '.join(groups)}",
             got=wanted,
-            remedy="correct group",
+            remedy="correct group, or leave it out",
         )
     signals = [signal for group in groups.values() for signal in group]
     if not signals:
@@ -75,30 +85,19 @@ def _choose(groups: dict[str, list[Any]], wanted: str | None, path: Path) -> lis
             got="none",
             remedy="check that the recording was saved",
         )
-    if all(_same(signals[0].timestamps, signal.timestamps) for signal in signals):
-        return signals
-    raise ReaderError(
-        "the channel groups have different time stamps",
-        where=path,
-        expected="one time base, or the name of the group that is meant",
-        got=", ".join(f"{name} ({len(group[0].samples)} samples)" for name, group in groups.items()),
-        remedy="name one of them (group: ...), or resample in the measurement tool before the export",
-    )
+    return signals
 
 
-def _same(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
-    return first is second or np.array_equal(first, second)
-
-
-def _column(signal: Any, path: Path) -> RawColumn:
+def _signal(signal: Any, group: str) -> Signal:
     samples = np.asarray(signal.samples)
     invalid = signal.invalidation_bits
     if invalid is not None and samples.dtype.kind in "buif":
         samples = np.where(np.asarray(invalid, dtype=bool), np.nan, samples.astype(np.float64))
-    return array_column(
-        signal.name,
-        samples,
-        where=str(path),
+    return Signal(
+        name=signal.name,
+        group=group,
+        values=samples,
+        stamps=np.asarray(signal.timestamps, dtype=np.float64),
         unit=str(signal.unit or "") or None,
         description=str(signal.comment or ""),
     )

@@ -10,7 +10,7 @@ from sysid.errors import ConfigError, ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.table import RawTable
 
-_COMMON = {"reader", "time", "columns", "units", "references"}
+_COMMON = {"reader", "time", "columns", "units", "references", "rows"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,12 +23,14 @@ class Reader:
         read: Reads a file; raises :class:`~sysid.errors.ReaderError` if it is not of this format.
         options: The fields of :class:`~sysid.ingest.options.FileOptions` that mean something to it,
             besides those that mean something to all.
+        is_mine: Whether a file is of this format, by its first 4,096 bytes; ``None`` where they do not tell.
     """
 
     name: str
     suffixes: tuple[str, ...]
     read: Callable[[Path, FileOptions, RepairOptions], RawTable]
     options: frozenset[str] = frozenset()
+    is_mine: Callable[[bytes], bool] | None = None
 
 
 def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None) -> Reader:
@@ -37,13 +39,13 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
     Args:
         path: The file.
         readers: The readers to choose from.
-        name: Name of the reader, if the suffix is not to decide.
+        name: Name of the reader, if content and suffix are not to decide.
 
     Returns:
         The reader.
 
     Raises:
-        ReaderError: If no reader claims the suffix.
+        ReaderError: If no reader knows the content or claims the suffix.
         ConfigError: If there is no reader of that name.
     """
     if name is not None:
@@ -57,9 +59,13 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
             got=name,
             remedy="correct reader",
         )
-    for reader in readers:
-        if path.suffix.lower() in reader.suffixes:
-            return reader
+    by_suffix = next((reader for reader in readers if path.suffix.lower() in reader.suffixes), None)
+    head = _head(path)
+    if by_suffix is not None and by_suffix.is_mine is not None and by_suffix.is_mine(head):
+        return by_suffix
+    by_content = next((reader for reader in readers if reader.is_mine is not None and reader.is_mine(head)), None)
+    if by_content is not None or by_suffix is not None:
+        return by_content or by_suffix  # type: ignore[return-value]  # one of them is there
     raise ReaderError(
         "no reader knows this kind of file",
         where=path,
@@ -67,6 +73,14 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
         got=path.suffix or "a name without an ending",
         remedy="export the traces to one of these, or name the reader (reader: csv)",
     )
+
+
+def _head(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(4096)
+    except OSError:
+        return b""  # the reader says what is wrong
 
 
 def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOptions) -> RawTable:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ import numpy as np
 
 from sysid.errors import MissingExtraError, ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
+from sysid.ingest.readers.joining import Signal, joined_signals
+from sysid.ingest.readers.leaves import Leaf
 from sysid.ingest.readers.reader import Reader, damaged
-from sysid.ingest.table import RawColumn, RawTable, array_column, of_one_length, recognise_time
+from sysid.ingest.readers.tree import table_of
+from sysid.ingest.table import RawTable
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
@@ -21,54 +25,92 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
 
     try:
         file = TdmsFile.read(path)
-        groups = {group.name: group.channels() for group in file.groups()}
+        groups = {group.name: [channel for channel in group.channels() if len(channel)] for group in file.groups()}
     except Exception as error:  # npTDMS raises ValueError, KeyError, struct.error ... on damaged files
         raise damaged(path, "TDMS", error) from error
-    channels = _channels(groups, options.group, path)
-    columns = [_column(channel, path) for channel in channels]
-    if recognise_time(columns) is None:
-        columns = _waveform_time(channels, path) + columns
-    alike = of_one_length(columns, where=str(path))
-    notes = ("the file breaks off in its last segment",) if file.file_status.incomplete_final_segment else ()
-    return RawTable(source=path, reader="tdms", columns=alike, time=recognise_time(alike), notes=notes)
+    notes = ["the file breaks off in its last segment"] if file.file_status.incomplete_final_segment else []
+    tree = _tree({name: channels for name, channels in groups.items() if channels}, options.group, path, notes)
+    return table_of(tree, path=path, reader="tdms", options=options, separator="/", notes=notes)
 
 
-READER = Reader(name="tdms", suffixes=(".tdms",), read=_read, options=frozenset({"group"}))
+READER = Reader(
+    name="tdms",
+    suffixes=(".tdms",),
+    read=_read,
+    options=frozenset({"group"}),
+    is_mine=lambda head: head.startswith(b"TDSm"),
+)
 
 
-def _channels(groups: dict[str, list[Any]], wanted: str | None, path: Path) -> list[Any]:
-    filled = {name: [channel for channel in channels if len(channel)] for name, channels in groups.items()}
-    filled = {name: channels for name, channels in filled.items() if channels}
-    if wanted is None and len(filled) == 1:
-        return next(iter(filled.values()))
-    if wanted in filled:
-        return filled[wanted]
-    raise ReaderError(
-        "the file holds several groups" if wanted is None else f"there is no group {wanted}",
-        where=path,
-        expected=f"one of {', '.join(filled) or 'none: the file holds no samples'}",
-        got="no choice among them" if wanted is None else wanted,
-        remedy="name the group that is meant (group: ...)",
+def _tree(groups: dict[str, list[Any]], wanted: str | None, path: Path, notes: list[str]) -> dict[str, Any]:
+    if not groups:
+        raise ReaderError(
+            "the file holds no samples",
+            where=path,
+            expected="at least one channel with samples",
+            got=f"groups {', '.join(groups)}" if groups else "none",
+            remedy="check that the recording was saved",
+        )
+    channels = [channel for members in groups.values() for channel in members]
+    names = [channel.name for channel in channels]
+    if wanted is None and len(groups) > 1 and len(set(names)) == len(names) and all(map(_has_clock, channels)):
+        # Groups of other channels that one clock has stamped are one recording.
+        return _columns(channels, "", path, notes)
+    return {name: _columns(members, name, path, notes) for name, members in groups.items()}
+
+
+def _columns(channels: Sequence[Any], group: str, path: Path, notes: list[str]) -> dict[str, Leaf]:
+    """The channels of a group: at their own time stamps joined on one grid, where they have any."""
+    timed = [channel for channel in channels if _has_clock(channel)]
+    own = {channel.name: _leaf(channel) for channel in channels}
+    if not timed or any(channel.name.casefold() == "time" for channel in channels):
+        return own
+    if len(timed) < len(channels) and len({len(channel) for channel in channels}) > 1:
+        notes.append(f"{group}: channels without a clock beside others: put side by side as they stand")
+        return own
+    starts = [_start(channel) for channel in timed]
+    known = [start for start in starts if start is not None]
+    first = min(known, default=None)
+    signals = []
+    for channel, start in zip(timed, starts, strict=True):
+        late = 0.0 if start is None or first is None else float((start - first) / np.timedelta64(1, "ns")) / 1e9
+        signals.append(_signal(channel, group, late))
+    joined, told = joined_signals(signals, path)
+    notes.extend(told)
+    return joined | {name: leaf for name, leaf in own.items() if name not in joined}
+
+
+def _has_clock(channel: Any) -> bool:
+    step = channel.properties.get("wf_increment")
+    return isinstance(step, int | float | np.generic) and float(step) > 0.0
+
+
+def _start(channel: Any) -> np.datetime64 | None:
+    start = channel.properties.get("wf_start_time")
+    try:
+        return None if start is None else np.datetime64(start).astype("datetime64[ns]")
+    except (ValueError, TypeError):
+        return None
+
+
+def _signal(channel: Any, group: str, late: float) -> Signal:
+    leaf, properties = _leaf(channel), channel.properties
+    begin = late + float(properties.get("wf_start_offset", 0.0))
+    stamps = begin + float(properties["wf_increment"]) * np.arange(len(channel), dtype=np.float64)
+    return Signal(
+        name=channel.name,
+        group=group,
+        values=leaf.values,
+        stamps=stamps,
+        unit=leaf.unit,
+        description=leaf.description,
     )
 
 
-def _column(channel: Any, path: Path) -> RawColumn:
+def _leaf(channel: Any) -> Leaf:
     properties = channel.properties
-    return array_column(
-        channel.name,
-        np.asarray(channel[:]),
-        where=str(path),
+    return Leaf(
+        values=np.asarray(channel[:]),
         unit=str(properties.get("unit_string") or properties.get("unit") or "") or None,
         description=str(properties.get("description") or ""),
     )
-
-
-def _waveform_time(channels: list[Any], path: Path) -> list[RawColumn]:
-    """Time from the waveform properties, where there is no time channel."""
-    for channel in channels:
-        step = channel.properties.get("wf_increment")
-        if step:
-            start = float(channel.properties.get("wf_start_offset", 0.0))
-            stamps = start + float(step) * np.arange(len(channel))
-            return [array_column("time", stamps, where=str(path), unit="s")]
-    return []

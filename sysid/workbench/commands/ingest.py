@@ -11,7 +11,6 @@ from rich.table import Table
 from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
 from sysid.ingest.assemble import stamps_in_seconds
-from sysid.ingest.reading import read_table
 from sysid.reporting.figures.record_figure import record_figure
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import svg
@@ -84,7 +83,8 @@ def _show_file(found: FileFinding, propose: Path | None) -> None:
         )
     target = console()
     every = f"one every {found.sample_time:g} s, {(found.samples - 1) * found.sample_time:g} s in all"
-    step = every if found.time.step is None else f"no time stamps: {found.time.step:g} s between them is a guess"
+    guessed = found.time.step is not None and found.time_guessed
+    step = f"no time stamps: {found.time.step:g} s between them is a guess" if guessed else every
     target.print(f"{found.path}: read as {found.reader}, {found.samples} samples, {step}", soft_wrap=True)
     table = Table(header_style="bold")
     for heading in ("column", "unit", "from", "to", "missing", "remark"):
@@ -92,7 +92,7 @@ def _show_file(found: FileFinding, propose: Path | None) -> None:
     for column in found.columns:
         reference = "" if column.reference is Reference.NONE else f" {column.reference.value}"
         guess = "?" if column.unit_guessed or column.reference_guessed else ""
-        remark = column.problem or ("never changes" if column.constant else "")
+        remark = column.problem or column.aside or ("never changes" if column.constant else "")
         unit = f"{column.unit}{reference}{guess}"
         span = (f"{column.minimum:.6g}", f"{column.maximum:.6g}")
         table.add_row(escape(column.name), escape(unit), *span, str(column.missing), escape(remark))
@@ -113,8 +113,8 @@ def _picture(found: FileFinding) -> str:
     """Draw the channels into the current folder, and say where, or why not."""
     if not found.channels:
         return "none, as there is no column to draw"
-    files = found.files.model_copy(update={"time": found.time})
-    table = read_table(found.path, files=files, repairs=found.needed)
+    first = found.cases[0].finding if found.cases else found
+    files, table = first.files.model_copy(update={"time": first.time}), first.table
     labels = {column.name: f"{column.name} [{column.unit}]" for column in found.channels}
     with styled():
         figure = record_figure(

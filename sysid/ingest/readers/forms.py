@@ -1,0 +1,151 @@
+"""Structures that are known by their fields: saved ``iddata``, ``timeseries``, Simulink's structure with time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from sysid.errors import ReaderError
+from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, refused, texts_of
+
+_SECONDS = {
+    "": 1.0, "seconds": 1.0, "second": 1.0, "s": 1.0, "sec": 1.0, "milliseconds": 1e-3, "ms": 1e-3,
+    "microseconds": 1e-6, "nanoseconds": 1e-9, "minutes": 60.0, "min": 60.0, "hours": 3600.0, "h": 3600.0,
+    "days": 86400.0, "weeks": 604800.0, "months": 2629746.0, "years": 31556952.0,
+}  # fmt: skip
+
+
+def understood(node: Any) -> Any:
+    """A tree with the structures that are known replaced by their columns.
+
+    Args:
+        node: The tree.
+
+    Returns:
+        The tree of columns.
+    """
+    if isinstance(node, list):
+        return [understood(item) for item in node]
+    if not isinstance(node, Mapping) or isinstance(node, Whole):
+        return node
+    for is_one, columns in _FORMS:
+        if is_one(node):
+            return columns(node)
+    return {str(key): understood(value) for key, value in node.items()}
+
+
+def _is_iddata(node: Mapping[str, Any]) -> bool:
+    return "OutputData" in node and ("InputData" in node or "Ts" in node)
+
+
+def _iddata(node: Mapping[str, Any]) -> Any:
+    if texts_of(node.get("Domain"))[:1] in {("Frequency",), ("frequency",)}:
+        problem = ReaderError(
+            "the file holds frequency-domain data",
+            expected="iddata over time",
+            got="Domain = 'Frequency'",
+            remedy="in MATLAB: z = ifft(z); and save z again",
+        )
+        return {"OutputData": refused(problem)}
+    outputs, inputs = _experiments(node.get("OutputData")), _experiments(node.get("InputData"))
+    count = max(len(outputs), len(inputs))
+    records = [_experiment(node, _at(inputs, index), _at(outputs, index), index) for index in range(count)]
+    if count == 1:
+        return records[0]
+    names = texts_of(node.get("ExperimentName"))
+    return dict(zip(names, records, strict=True)) if len(set(names)) == count else records
+
+
+def _experiments(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list) else [value]
+
+
+def _at(values: list[Any], index: int) -> Any:
+    return values[index] if index < len(values) else None
+
+
+def _experiment(node: Mapping[str, Any], inputs: Any, outputs: Any, index: int) -> Whole:
+    second = _SECONDS.get(" ".join(texts_of(node.get("TimeUnit"))).casefold())
+    record = Whole()
+    stamps, step = leaf_of(_of(node, "SamplingInstants", index)), number_of(_of(node, "Ts", index))
+    start = number_of(_of(node, "Tstart", index))
+    rows = max((_rows(data) for data in (inputs, outputs)), default=0)
+    if stamps is not None and len(stamps.values) == rows:
+        record["time"] = Leaf(values=stamps.values.astype(float) * (second or 1.0), unit="s")
+    elif step is not None and start is not None and np.isfinite(start):
+        record["time"] = Leaf(values=(start + step * np.arange(rows)) * (second or 1.0), unit="s")
+    elif step is not None:
+        record["Ts"] = step * (second or 1.0)
+    for letter, kind, data in (("u", "Input", inputs), ("y", "Output", outputs)):
+        matrix = data.values if isinstance(data, Leaf) else data
+        if not isinstance(matrix, np.ndarray) or matrix.size < 2:
+            continue
+        matrix = matrix.reshape(-1, 1) if matrix.ndim == 1 or 1 in matrix.shape else matrix
+        names, units = texts_of(node.get(f"{kind}Name")), texts_of(node.get(f"{kind}Unit"))
+        for column in range(matrix.shape[1]):
+            name = names[column] if column < len(names) and names[column] else f"{letter}{column + 1}"
+            unit = units[column] if column < len(units) and units[column] else None
+            record[name if name not in record else f"{name} ({kind.lower()})"] = Leaf(
+                values=matrix[:, column], unit=unit
+            )
+    return record
+
+
+def _of(node: Mapping[str, Any], field: str, index: int) -> Any:
+    """A field of an ``iddata``, which is a cell of one for each experiment where there are several."""
+    value = node.get(field)
+    return _at(value, index) if isinstance(value, list) else value
+
+
+def _rows(data: Any) -> int:
+    return (
+        max(data.shape)
+        if isinstance(data, np.ndarray) and data.ndim == 2 and 1 in data.shape
+        else (len(data) if isinstance(data, np.ndarray) and data.ndim else 0)
+    )
+
+
+def _is_timeseries(node: Mapping[str, Any]) -> bool:
+    return leaf_of(node.get("Time")) is not None and leaf_of(node.get("Data")) is not None
+
+
+def _timeseries(node: Mapping[str, Any]) -> Any:
+    stamps, data = leaf_of(node["Time"]), leaf_of(node["Data"])
+    if stamps is None or data is None:
+        return node
+    name = next(iter(texts_of(node.get("Name"))), "") or "Data"
+    info = node.get("DataInfo")
+    unit = next(iter(texts_of(info.get("Units"))), None) if isinstance(info, Mapping) else None
+    about = node.get("TimeInfo")
+    clock = next(iter(texts_of(about.get("Units"))), "s") if isinstance(about, Mapping) else "s"
+    second = _SECONDS.get(clock.casefold())
+    return {
+        "time": Leaf(values=stamps.values * second if second else stamps.values, unit="s" if second else clock),
+        name: Leaf(values=data.values, unit=unit or data.unit or None),
+    }
+
+
+def _is_structure_with_time(node: Mapping[str, Any]) -> bool:
+    return "time" in node and "signals" in node
+
+
+def _structure_with_time(node: Mapping[str, Any]) -> Any:
+    signals = node["signals"] if isinstance(node["signals"], list) else [node["signals"]]
+    columns: dict[str, Any] = {}
+    if (stamps := leaf_of(node["time"])) is not None:
+        columns["time"] = Leaf(values=stamps.values, unit="s")
+    for index, signal in enumerate(signals):
+        if isinstance(signal, Mapping) and "values" in signal:
+            label = next(iter(texts_of(signal.get("label"))), "") or f"signal_{index + 1}"
+            columns[label if label not in columns else f"{label} ({index + 1})"] = signal["values"]
+    return columns
+
+
+_FORMS: tuple[tuple[Callable[[Mapping[str, Any]], bool], Callable[[Mapping[str, Any]], Any]], ...] = (
+    (_is_iddata, _iddata),
+    (_is_timeseries, _timeseries),
+    (_is_structure_with_time, _structure_with_time),
+)
+"""By what a structure is known, and the columns it stands for."""

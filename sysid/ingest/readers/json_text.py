@@ -1,0 +1,155 @@
+"""JSON and JSON lines: columns by name, rows as records, or the layouts that pandas writes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sysid.errors import ReaderError
+from sysid.ingest.options import FileOptions, RepairOptions
+from sysid.ingest.readers.bounds import too_large
+from sysid.ingest.readers.leaves import Leaf
+from sysid.ingest.readers.reader import Reader, damaged
+from sysid.ingest.readers.tree import table_of
+from sysid.ingest.table import RawTable
+
+_MOST_BYTES = 2**30
+"""Of Python objects, which JSON becomes before it is numbers."""
+_OPENING, _ITEM = 96, 40  # bytes that a list or a mapping takes, and an item in one
+_DEEPEST = 64
+
+
+def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
+    raw = path.read_bytes()
+    _check_size(raw, path)
+    try:
+        content = _content(raw.decode("utf-8-sig"))
+        tree = _tree(content, 0)
+    except (ValueError, RecursionError) as error:
+        raise damaged(path, "JSON", error) from error
+    if not isinstance(tree, dict):
+        tree = {"column": tree}
+    return table_of(tree, path=path, reader="json", options=options)
+
+
+READER = Reader(
+    name="json",
+    suffixes=(".json", ".jsonl", ".ndjson"),
+    read=_read,
+    options=frozenset({"group", "transpose"}),
+)
+
+
+def _check_size(raw: bytes, path: Path) -> None:
+    """Refuse what would take more memory as objects than a file may, by counting its marks."""
+    openings = raw.count(b"[") + raw.count(b"{")
+    claimed = _OPENING * openings + _ITEM * (raw.count(b",") + openings)
+    if claimed > _MOST_BYTES:
+        raise too_large(path, f"about {claimed / 2**20:.0f} MB of lists and numbers", _MOST_BYTES)
+    depth = deepest = 0
+    for byte in raw[: 2**16]:
+        depth += (byte in b"[{") - (byte in b"]}")
+        deepest = max(deepest, depth)
+    if deepest > _DEEPEST:
+        raise ReaderError(
+            "the file nests its lists too deep",
+            where=path,
+            expected=f"at most {_DEEPEST} levels",
+            got=f"{deepest} levels in its first 65,536 bytes",
+            remedy="export the records as a list of objects, or one list of numbers by name",
+        )
+
+
+def _content(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        lines = [line for line in text.splitlines() if line.strip()]
+        if len(lines) < 2 or error.lineno < 2:
+            raise
+        return [json.loads(line) for line in lines]
+
+
+def _tree(node: Any, depth: int) -> Any:
+    if isinstance(node, Mapping):
+        if isinstance(node.get("data"), list) and isinstance(node.get("columns"), list):
+            rows = node["data"]  # pandas, orient="split"
+            return {str(name): _vector([row[at] for row in rows]) for at, name in enumerate(node["columns"])}
+        if isinstance(node.get("data"), list) and isinstance(node.get("schema"), Mapping):
+            return _tree(node["data"], depth + 1)  # pandas, orient="table"
+        if _is_by_row(node):
+            return _vector(list(node.values()))
+        return {str(key): _tree(value, depth + 1) for key, value in node.items()}
+    if not isinstance(node, list):
+        return node
+    if node and all(isinstance(item, Mapping) for item in node):
+        return _objects(node, depth)
+    if node and all(isinstance(item, list) for item in node):
+        return _matrix(node)
+    return _vector(node)
+
+
+def _is_by_row(node: Mapping[str, Any]) -> bool:
+    """Whether the keys are row numbers: what pandas writes by default."""
+    return (
+        len(node) > 1
+        and all(str(key).isdigit() for key in node)
+        and not any(isinstance(value, list | Mapping) for value in node.values())
+    )
+
+
+def _objects(items: list[Any], depth: int) -> Any:
+    """Rows as records, signals with a name each, or several records."""
+    for key in ("values", "data", "samples"):
+        if all("name" in item and isinstance(item.get(key), list) for item in items):
+            return {
+                str(item["name"]): Leaf(
+                    values=np.asarray(_vector(item[key])), unit=item.get("unit", item.get("units")) or None
+                )
+                for item in items
+            }
+    names = list(dict.fromkeys(str(key) for item in items for key in item))
+    if any(isinstance(value, list | Mapping) for item in items for value in item.values()):
+        return [_tree(item, depth + 1) for item in items]
+    return {name: _vector([item.get(name) for item in items]) for name in names}
+
+
+def _matrix(rows: list[list[Any]]) -> Any:
+    widths = {len(row) for row in rows}
+    flat = not any(isinstance(item, list | Mapping) for row in rows for item in row)
+    if len(widths) == 1 and flat:
+        if rows[0] and all(isinstance(item, str) for item in rows[0]) and len(rows) > 2:
+            return {str(name): _vector([row[at] for row in rows[1:]]) for at, name in enumerate(rows[0])}
+        columns = [_vector([row[at] for row in rows]) for at in range(widths.pop())]
+        if columns and all(isinstance(column, np.ndarray) and column.dtype.kind == "f" for column in columns):
+            return np.column_stack(columns)
+    return [_vector(row) if flat else _tree(row, 0) for row in rows]
+
+
+def _vector(items: list[Any]) -> Any:
+    """Numbers as an array (null is missing), dates and times as such, texts as they are."""
+    known = [item for item in items if item is not None]
+    if known and all(isinstance(item, bool | int | float) for item in known):
+        try:
+            return np.array([np.nan if item is None else float(item) for item in items])
+        except OverflowError:
+            return np.array(items, dtype=np.str_)
+    if known and all(isinstance(item, str) for item in known):
+        stamps = _stamps(items)
+        return np.array([str(item) for item in items]) if stamps is None else stamps
+    return items
+
+
+def _stamps(texts: list[Any]) -> Any:
+    try:
+        stamps = [None if text is None else datetime.fromisoformat(text) for text in texts]
+        first = next(stamp for stamp in stamps if stamp is not None)
+        seconds = [np.nan if stamp is None else (stamp - first).total_seconds() for stamp in stamps]
+    except (ValueError, TypeError, StopIteration):
+        return None
+    return Leaf(values=np.array(seconds), unit="s")

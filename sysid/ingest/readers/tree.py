@@ -1,0 +1,270 @@
+"""Named arrays inside named groups (structures, cells, HDF5 groups, JSON objects) to columns.
+
+A tree is made of mappings, of lists (the elements of a cell or structure array), and of leaves: arrays,
+with what the file says about them. Scalars named like a sample time or a sample rate give the step of
+the columns beside and below them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ReaderError
+from sysid.ingest.headers import parse_header
+from sysid.ingest.options import FileOptions
+from sysid.ingest.readers.forms import understood
+from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of
+from sysid.ingest.readers.records import Found, joined, records_of
+from sysid.ingest.table import RawTable, array_column, by_length, recognise_time
+
+_STEPS = {"ts", "dt", "sample_time", "sampletime", "sampling_time", "samplingtime", "sample_period", "sampling_period"}
+_STEPS |= {"samplingperiod", "sampleperiod", "sampling_interval", "sample_interval", "wf_increment", "t_s", "delta_t"}
+_RATES = {"fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "samplingrate", "sampling_frequency"}
+_RATES |= {"sample_frequency", "samplingfrequency", "samplefrequency", "sfreq"}
+_DEEPEST = 40
+
+
+def table_of(
+    tree: Mapping[str, Any],
+    *,
+    path: Path,
+    reader: str,
+    options: FileOptions,
+    separator: str = ".",
+    short: bool = True,
+    metadata: Mapping[str, str] | None = None,
+    notes: Sequence[str] = (),
+) -> RawTable:
+    """The columns in a tree.
+
+    Args:
+        tree: Names to arrays, leaves, texts, lists or further mappings.
+        path: The file.
+        reader: Name of the reader.
+        options: ``group`` names a part of the tree, ``transpose`` turns matrices.
+        separator: What stands between the names of a group and what is in it.
+        short: Whether names lose the groups that all of them stand in.
+        metadata: What else the file carries.
+        notes: What the reader recognised.
+
+    Returns:
+        The columns of the commonest length (of that of the time column, if there is one), those of other lengths
+        beside them, and the records that they seem to be.
+
+    Raises:
+        ReaderError: If there is no such group, or nothing in it is a column.
+    """
+    walk = _Walk(where=str(path), separator=separator, transpose=options.transpose)
+    shown = understood(tree)
+    outer = walk.step_beside(shown, None)
+    if options.group is not None:
+        shown, outer = _group(shown, options.group, walk, outer)
+    found = list(walk.columns(shown, (), outer))
+    found, head = _without_common_prefix(found, separator) if short else (found, "")
+    named = [walk.named(item) for item in found]
+    alike, others = by_length([item.column for item in named])
+    steps = {item.step for item in named if len(item.column.values) == (len(alike[0].values) if alike else 0)}
+    time = recognise_time(alike)
+    step = steps.pop() if len(steps) == 1 and time is None else None
+    turned = [f"{name}: its rows are taken as channels, as it is {r} x {c}" for name, (r, c) in walk.turned.items()]
+    settings = {"transpose": True} if walk.turned else {}
+    told = [f"sample time {step:g} s, from the file"] if step is not None else []
+    table = RawTable(
+        source=path,
+        reader=reader,
+        columns=alike,
+        others=others,
+        time=time,
+        step=step,
+        notes=(*notes, *turned, *told),
+        metadata=metadata or {},
+        settings=settings,
+    )
+    return replace(
+        table, records=records_of(table, named, separator=separator, head=joined(options.group or "", head, separator))
+    )
+
+
+def _group(tree: Any, name: str, walk: _Walk, step: float | None) -> tuple[Any, float | None]:
+    rest, here, beside = name.strip(walk.separator), tree, step
+    while rest:
+        pairs = [(key, value) for key, value in _named_children(here) if isinstance(value, Mapping | list)]
+        match = next((pair for pair in pairs if pair[0] == rest), None)
+        if match is None:
+            heads = [
+                pair for pair in pairs if rest.startswith(pair[0]) and rest[len(pair[0])] in f"{walk.separator}{{("
+            ]
+            match = max(heads, key=lambda pair: len(pair[0]), default=None)
+        if match is None:
+            names = list(_group_names(tree, walk.separator))[:40]
+            raise ReaderError(
+                f"there is no group {name}",
+                where=walk.where,
+                expected=f"one of {', '.join(names) or 'none: all stands at the top'}",
+                got=name,
+                remedy="correct group, or leave it out",
+            )
+        rest, here = rest[len(match[0]) :].removeprefix(walk.separator), match[1]
+        beside = walk.step_beside(here, beside)
+    return here, beside
+
+
+def _named_children(node: Any) -> list[tuple[str, Any]]:
+    """The groups in a node by the names that they can be called by."""
+    if isinstance(node, list):
+        return [(mark.format(index + 1), item) for index, item in enumerate(node) for mark in ("{{{}}}", "({})")]
+    return list(node.items()) if isinstance(node, Mapping) else []
+
+
+def _group_names(node: Any, separator: str, prefix: str = "", depth: int = 0) -> Iterator[str]:
+    if depth > _DEEPEST:
+        return
+    if isinstance(node, list):
+        for index, item in enumerate(node):
+            if isinstance(item, Mapping):
+                yield f"{prefix}{{{index + 1}}}"
+                yield from _group_names(item, separator, f"{prefix}{{{index + 1}}}{separator}", depth + 1)
+        return
+    for key, value in node.items() if isinstance(node, Mapping) else ():
+        if isinstance(value, Mapping):
+            yield f"{prefix}{key}"
+            yield from _group_names(value, separator, f"{prefix}{key}{separator}", depth + 1)
+        elif isinstance(value, list):
+            yield from _group_names(value, separator, f"{prefix}{key}", depth + 1)
+
+
+@dataclass(kw_only=True)
+class _Walk:
+    """Goes through a tree; remembers which matrices it turned."""
+
+    where: str
+    separator: str
+    transpose: bool | None
+
+    def __post_init__(self) -> None:
+        self.turned: dict[str, tuple[int, int]] = {}
+
+    def step_beside(self, node: Any, outer: float | None) -> float | None:
+        """The sample time that stands in a mapping, else the one from further out."""
+        if not isinstance(node, Mapping):
+            return outer
+        for key, value in node.items():
+            name, number = str(key).casefold().strip(), number_of(value)
+            if number is not None and number > 0.0 and np.isfinite(number):
+                if name in _STEPS:
+                    return number
+                if name in _RATES:
+                    return 1.0 / number
+        return outer
+
+    def columns(self, node: Any, path: tuple[str, ...], step: float | None, *, whole: bool = False) -> Iterator[Found]:
+        """Every column below a node, as it comes."""
+        if len(path) > _DEEPEST:
+            raise ReaderError(
+                f"the file nests its groups more than {_DEEPEST} deep",
+                where=self.where,
+                expected="columns in groups of a few levels",
+                got=f"{self.separator.join(path)[:80]} ...",
+                remedy="export the arrays that are meant to a file of their own",
+            )
+        if isinstance(node, list):
+            for index, item in enumerate(node):
+                yield from self.columns(
+                    item, (*path[:-1], f"{path[-1] if path else ''}{{{index + 1}}}"), step, whole=whole
+                )
+            return
+        if not isinstance(node, Mapping):
+            return
+        whole = whole or isinstance(node, Whole)
+        step, units = self.step_beside(node, step), _units_beside(node)
+        leaves = {str(key): leaf for key, value in node.items() if (leaf := leaf_of(value)) is not None}
+        cells = {str(key): parts for key, value in node.items() if (parts := _cell(value)) is not None}
+        elements = [leaf for cell in cells.values() for _, leaf in cell]
+        lengths = {len(leaf.values) for leaf in (*leaves.values(), *elements) if leaf.vector}
+        for key, value in node.items():
+            name = str(key)
+            if name in cells:
+                for index, part in cells[name]:
+                    yield from self._leaf(
+                        name, part, path, step, index=index, whole=whole, lengths=lengths, units=units
+                    )
+            elif name in leaves:
+                yield from self._leaf(name, leaves[name], path, step, whole=whole, lengths=lengths, units=units)
+            elif isinstance(value, Mapping | list):
+                yield from self.columns(value, (*path, name), step, whole=whole)
+
+    def _leaf(
+        self,
+        name: str,
+        leaf: Leaf,
+        path: tuple[str, ...],
+        step: float | None,
+        *,
+        lengths: set[int],
+        units: Mapping[str, str],
+        whole: bool,
+        index: int | None = None,
+    ) -> Iterator[Found]:
+        array = leaf.values
+        header = parse_header(name) if leaf.unit is None else None
+        base = header.name if header is not None else name
+        unit = leaf.unit or (header.unit if header is not None else None) or units.get(name)
+        reference = leaf.reference or (header.reference if header is not None else None)
+        if array.ndim == 2:
+            array = self._standing(base, array, lengths)
+        cell = "" if index is None else f"{{{index + 1}}}"
+        parts = [("", array)] if array.ndim == 1 else [(f"_{i + 1}", array[:, i]) for i in range(array.shape[1])]
+        names = leaf.names if leaf.names and len(leaf.names) == len(parts) else None
+        for number, (suffix, values) in enumerate(parts):
+            stem = names[number] if names else f"{base}{suffix}"
+            full = names[number] if names else f"{base}{cell}{suffix}"
+            column = array_column(
+                full, values, where=self.where, unit=unit, reference=reference, description=leaf.description
+            )
+            column = replace(column, problem=column.problem or leaf.problem, aside=leaf.aside)
+            yield Found(path=path, stem=stem, cell=index, column=column, step=step, whole=whole)
+
+    def _standing(self, name: str, array: NDArray[Any], lengths: set[int]) -> NDArray[Any]:
+        """A matrix with its channels in columns."""
+        rows, columns = array.shape
+        wide = self.transpose
+        if wide is None:
+            beside = [rows in lengths, columns in lengths]
+            # What stands beside it says which side is time; else the longer one is.
+            wide = beside[1] if beside[0] != beside[1] else 1 < rows < columns
+            if wide:
+                self.turned[name] = (rows, columns)
+        return array.T if wide else array
+
+    def named(self, found: Found) -> Found:
+        """The column under the full name of its place."""
+        prefix = "".join(f"{part}{self.separator}" for part in found.path)
+        return replace(found, column=replace(found.column, name=f"{prefix}{found.column.name}"))
+
+
+def _cell(value: Any) -> list[tuple[int, Leaf]] | None:
+    """The arrays in a cell array that holds no structures, and their places in it."""
+    if not isinstance(value, list) or not value or any(isinstance(item, Mapping) for item in value):
+        return None
+    parts = [(index, leaf) for index, item in enumerate(value) if (leaf := leaf_of(item)) is not None]
+    return parts or None
+
+
+def _units_beside(node: Mapping[str, Any]) -> dict[str, str]:
+    """A mapping ``units`` beside the arrays gives their units by name."""
+    units = node.get("units", node.get("unit"))
+    return {str(k): v for k, v in units.items() if isinstance(v, str)} if isinstance(units, Mapping) else {}
+
+
+def _without_common_prefix(found: list[Found], separator: str) -> tuple[list[Found], str]:
+    head = ""
+    while found and found[0].path and len({item.path[:1] for item in found}) == 1:
+        head = joined(head, found[0].path[0], separator)
+        found = [replace(item, path=item.path[1:]) for item in found]
+    return found, head
