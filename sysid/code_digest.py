@@ -50,15 +50,17 @@ QUIET_BASES = frozenset({"ABC", "Protocol", "Generic", "BaseModel", "Enum", "Str
 """Classes of other packages that call no method of theirs by a name that we have given it."""
 
 
-@cache
-def code_digest(*roots: Callable[..., Any] | str, files: tuple[str, ...] = ()) -> str:
+def code_digest(*roots: Callable[..., Any] | str, without: tuple[str, ...] = (), files: tuple[str, ...] = ()) -> str:
     """SHA-256 over the code that some functions run.
 
     It is taken once in a process: what runs is what was imported then, whatever is written meanwhile.
 
     Args:
         roots: Functions or classes, or their addresses as ``"package.module:name"``, or a whole ``"package.module"``.
-            Of a class every method counts.
+            Of a class every method counts. A class of which an object is passed in, where only its base is named, is
+            to be among them.
+        without: Addresses, modules or packages that are not followed, such as configurations, whose values are in the
+            key, or a table of which the entry that is used is among the roots.
         files: Folders of templates, styles and the like that the result depends on too, such as
             ``"sysid/reporting/templates"``; every file in them that is not Python counts.
 
@@ -72,7 +74,12 @@ def code_digest(*roots: Callable[..., Any] | str, files: tuple[str, ...] = ()) -
         >>> code_digest("sysid.units:convert") == code_digest("sysid.units:convert", "sysid.units:convert")
         True
     """
-    sha = hashlib.sha256("\n".join(_labels(_addresses(roots))).encode())
+    return _digest(_addresses(roots), without, files)
+
+
+@cache
+def _digest(addresses: tuple[str, ...], without: tuple[str, ...], files: tuple[str, ...]) -> str:
+    sha = hashlib.sha256("\n".join(_labels(addresses, without)).encode())
     for folder in files:
         top, _, rest = folder.partition("/")
         for file in sorted((_home(top) / rest).rglob("*")):
@@ -80,6 +87,11 @@ def code_digest(*roots: Callable[..., Any] | str, files: tuple[str, ...] = ()) -
                 sha.update(f"\n{file.name}\n".encode())
                 sha.update(file.read_bytes())
     return sha.hexdigest()
+
+
+def look_again() -> None:
+    """Forget what was taken, so that code that was written meanwhile counts."""
+    _digest.cache_clear()
 
 
 def _home(package: str) -> Path:
@@ -90,41 +102,44 @@ def _home(package: str) -> Path:
     return Path(spec.origin).parent
 
 
-def reached(*roots: Callable[..., Any] | str) -> set[str]:
+def reached(*roots: Callable[..., Any] | str, without: tuple[str, ...] = ()) -> set[str]:
     """The definitions that :func:`code_digest` covers.
 
     Args:
         roots: As there.
+        without: As there.
 
     Returns:
         Their addresses.
     """
-    return {unit.address for unit in _closure(_addresses(roots))[1]}
+    return {unit.address for unit in _closure(_addresses(roots), without)[1]}
 
 
-def _addresses(roots: Iterable[Callable[..., Any] | str]) -> list[str]:
-    return sorted({root if isinstance(root, str) else f"{root.__module__}:{root.__qualname__}" for root in roots})
+def _addresses(roots: Iterable[Callable[..., Any] | str]) -> tuple[str, ...]:
+    named = {root if isinstance(root, str) else f"{root.__module__}:{root.__qualname__}" for root in roots}
+    return tuple(sorted(named))
 
 
-def _labels(addresses: Sequence[str]) -> list[str]:
+def _labels(addresses: Sequence[str], without: Sequence[str]) -> list[str]:
     """What each definition that is reached does, sorted, whatever its place."""
-    sources, units = _closure(addresses)
+    sources, units = _closure(addresses, without)
     labels = {unit: unit.digest for unit in units}
     for _ in range(ROUNDS):
         labels = {unit: _label(labels, sources.meaning(unit).names, labels[unit]) for unit in units}
     return sorted(set(labels.values()))
 
 
-def _closure(addresses: Sequence[str]) -> tuple[_Sources, list[_Unit]]:
+def _closure(addresses: Sequence[str], without: Sequence[str]) -> tuple[_Sources, list[_Unit]]:
     """Every definition that is reached, and where they were found."""
     sources = _Sources(ours=frozenset({"sysid", *(address.split(":")[0].split(".")[0] for address in addresses)}))
     found: dict[_Unit, None] = {}
     asked: set[str] = set()
     unasked: defaultdict[str, list[_Unit]] = defaultdict(list)
-    waiting = [unit for address in addresses for unit in sources.at_address(address)]
+    roots = {unit for address in addresses for unit in sources.at_address(address)}
+    waiting = list(roots)
     while waiting:
         unit = waiting.pop()
-        if unit in found:
+        if unit in found or (unit not in roots and unit.is_in(without)):
             continue
         found[unit] = None
         meaning = sources.meaning(unit)
@@ -141,7 +156,7 @@ def _closure(addresses: Sequence[str]) -> tuple[_Sources, list[_Unit]]:
 def _label(labels: dict[_Unit, str], names: dict[str, list[_Unit | str]], own: str) -> str:
     """A definition's label with what its names mean."""
     said = sorted(
-        f"{name}={','.join(sorted(one if isinstance(one, str) else labels[one] for one in found))}"
+        f"{name}={','.join(sorted(one if isinstance(one, str) else labels.get(one, '') for one in found))}"
         for name, found in names.items()
     )
     return _sha("\n".join([own, *said]))
@@ -183,6 +198,10 @@ class _Unit:
     def digest(self) -> str:
         """Of its code alone."""
         return _sha("".join([self.owner, *self.reader.text]))
+
+    def is_in(self, places: Iterable[str]) -> bool:
+        """Whether it is one of some addresses, or stands in one of some modules or packages."""
+        return any(f"{self.address}:".startswith((f"{one}.", f"{one}:")) for one in places)
 
     @property
     def address(self) -> str:

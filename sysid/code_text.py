@@ -137,8 +137,9 @@ class StatementReader:
         if in_class:
             self.follow(node.annotation)
             return False
-        self._write(node, without=("annotation",))
         self.follow(node.annotation)
+        if node.value is not None:
+            self._write(ast.Assign(targets=[node.target], value=node.value))
         return True
 
     def _function(self, node: ast.FunctionDef | ast.AsyncFunctionDef, _in_class: bool) -> bool:

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "sysid"
 FILES = sorted(file for file in PACKAGE.rglob("*.py"))
 
-WORDS = {"errors", "atomic", "units", "traces", "content", "yaml_files"}
+WORDS = {"errors", "atomic", "code_digest", "code_text", "units", "traces", "content", "yaml_files"}
 """Single files that every room may use."""
 
 MAY_IMPORT: dict[str, set[str]] = {

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -19,11 +17,6 @@ from sysid.airbrake.variant import VARIANTS, Variant
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
-
-GENERATOR_VERSION = hashlib.sha256(
-    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-).hexdigest()[:16]
-"""Digest of this room's source: traces kept from before a change of the physics are made again."""
 
 COMMAND = "command"
 """The quantity that is the driver's handle."""

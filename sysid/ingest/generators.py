@@ -1,7 +1,7 @@
 """Generators: what makes traces from a recipe, found by name among the installed packages.
 
-A generator is a function registered in the entry-point group ``sysid.generators``. If its module has a
-``GENERATOR_VERSION``, a change of it makes cached traces void.
+A generator is a function registered in the entry-point group ``sysid.generators``. A change of the code that it runs
+in its package makes cached traces void; where its module has a ``GENERATOR_VERSION``, a change of that does.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from importlib.metadata import entry_points
 from typing import Any, Protocol
 
 import sysid
+from sysid.code_digest import code_digest
 from sysid.errors import ConfigError, SysidError
 from sysid.traces import Channel, Trace
 
@@ -115,6 +116,16 @@ def find_generator(name: str, *, where: object) -> Generator:
         )
     entry = found[name]
     generate: Callable[..., Trace] = entry.load()
-    own = getattr(sys.modules.get(generate.__module__), "GENERATOR_VERSION", "")
     package = entry.dist.version if entry.dist is not None else ""
-    return Generator(name=name, version=f"{sysid.__version__}/{package}/{own}", generate=generate)
+    return Generator(name=name, version=f"{sysid.__version__}/{package}/{_own_version(generate)}", generate=generate)
+
+
+def _own_version(generate: Callable[..., Trace]) -> str:
+    """What a generator says that it is, or the digest of its code; nothing where there is no source to read."""
+    declared = getattr(sys.modules.get(generate.__module__), "GENERATOR_VERSION", None)
+    if declared is not None:
+        return str(declared)
+    try:
+        return code_digest(generate if hasattr(generate, "__qualname__") else type(generate))[:16]
+    except (LookupError, OSError, SyntaxError, ValueError):
+        return ""

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import sysid
+from sysid.code_digest import code_digest
 from sysid.errors import ConfigError, SysidError
 from sysid.ingest import Generator, find_generator
 from sysid.traces import Channel, Trace
@@ -33,7 +34,12 @@ def test_the_version_holds_the_modules_own(ramp: Any, monkeypatch: pytest.Monkey
 
     before = find_generator("ramp", where="x").version
     monkeypatch.setattr(sys.modules[type(ramp).__module__], "GENERATOR_VERSION", 7, raising=False)
-    assert find_generator("ramp", where="x").version == f"{before}7"
+    assert find_generator("ramp", where="x").version == f"{before.rpartition('/')[0]}/7"
+
+
+def test_without_one_the_version_is_the_digest_of_the_code() -> None:
+    generator = find_generator("abdx", where="here")
+    assert generator.version.endswith(f"/{code_digest(generator.generate)[:16]}")
 
 
 @pytest.mark.parametrize(("name", "remedy"), [("rampe", "did you mean ramp"), ("abdx", "install the package")])

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-import sysid
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.variant import VARIANTS
+from sysid.code_digest import code_digest
 from sysid.content import content_folders
 from sysid.errors import ConfigError, SysidError
 from sysid.models import AbstractModel, Cascade
@@ -111,13 +111,8 @@ class TrainJudge:
 
     @property
     def version(self) -> str:
-        """Digest of the source that a result depends on, beside the models."""
-        package = Path(sysid.__file__).parent
-        sha = hashlib.sha256()
-        for room in ("rail", "airbrake", "kernels"):
-            for file in sorted((package / room).glob("*.py")):
-                sha.update(file.read_bytes())
-        return sha.hexdigest()
+        """Digest of the code that a result depends on; the models are of any class."""
+        return code_digest(_Judged, _Erring, brake_of, "sysid.models:model_from_dict", "sysid.models:cascade_from_dict")
 
     def steps(self, options: ConsequenceOptions, subjects: Subjects) -> list[Step]:
         """What is to be done.

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-import sysid
 from sysid.airbrake.consist import Consist
+from sysid.code_digest import code_digest
 from sysid.rail.dynamics.train import heavy_haul
 from sysid.rail.traces.cycles import HabitSettings, command_of, drive_cycle, line_cycle
 from sysid.rail.traces.stop_cycles import SAMPLE_TIME, stop_cycle
@@ -94,13 +92,8 @@ class CycleMaker:
 
     @property
     def version(self) -> str:
-        """Digest of the source that a command depends on."""
-        package = Path(sysid.__file__).parent
-        sha = hashlib.sha256()
-        for room in ("rail", "airbrake"):
-            for file in sorted((package / room).glob("*.py")):
-                sha.update(file.read_bytes())
-        return sha.hexdigest()
+        """Digest of the code that a command depends on."""
+        return code_digest(_Drive)
 
     def steps(self, options: CycleOptions) -> list[Step]:
         """One step for each trace.

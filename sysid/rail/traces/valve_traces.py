@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from sysid.airbrake import generate as airbrake
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Trace
-
-GENERATOR_VERSION = f"{airbrake.GENERATOR_VERSION}/{hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]}"
-"""Traces kept from before a change of the physics are made again."""
 
 
 def generate(

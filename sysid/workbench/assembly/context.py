@@ -2,24 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from sysid.code_digest import code_digest
 from sysid.content import content_folders
 from sysid.estimation import FitProgress, FitResult
 from sysid.traces import TraceSet
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import Joined
 from sysid.workbench.fits.record import is_final, read_fit, write_fit
+from sysid.workbench.fits.steps import STORED_BY
 from sysid.workbench.runner import events
-from sysid.workbench.runner.store import RunFolder, code_digest, digest, strict
+from sysid.workbench.runner.store import RunFolder, digest, strict
 
-CODE = ("estimation", "models", "kernels")
-"""Rooms whose code a fit depends on."""
 SEEDS_OF_A_START = 10_000
 """How far the seeds of one start are from the next one's: its candidates' are a thousand apart."""
+
+
+def training_code(work: Callable[..., Any], models: Iterable[object]) -> str:
+    """Digest of the code that a training runs; what the YAML asks for is not code, and is among the terms of its key.
+
+    Args:
+        work: Does it.
+        models: That it is given, which are of any class.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    function = work.func if isinstance(work, partial) else work
+    return code_digest(function, *{type(model) for model in models}, STORED_BY, without=("sysid.workbench",))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,6 +122,7 @@ class Context:
         title: str,
         terms: Mapping[str, Any],
         work: Callable[[Callable[[FitProgress], None]], FitResult],
+        models: Iterable[object] = (),
     ) -> tuple[FitResult, str]:
         """A fit that is stored under what it depends on.
 
@@ -115,11 +131,12 @@ class Context:
             title: Of the step.
             terms: What it depends on, beside the code.
             work: Does it; given whom to tell after every iteration.
+            models: That the work is given.
 
         Returns:
             The fit, and the digest of what it depends on.
         """
-        key = digest(strict({"code": code_digest(*CODE), "terms": dict(terms)}))
+        key = digest(strict({"code": training_code(work, models), "terms": dict(terms)}))
         name, title = self.named(name), self.titled(title)
         folder = self.store.fit(name)
         self.tell(events.StepStarted(step=title))

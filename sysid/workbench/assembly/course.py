@@ -21,13 +21,13 @@ from sysid.models import Cascade
 from sysid.traces import Trace
 from sysid.workbench.assembly.begun import begun, read_whole
 from sysid.workbench.assembly.candidates import Candidates, fit_candidates
-from sysid.workbench.assembly.context import CODE, Context
+from sysid.workbench.assembly.context import Context, training_code
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.rounds import RoundDone
 from sysid.workbench.assembly.stage_config import TogetherConfig
 from sysid.workbench.fits.record import is_final
 from sysid.workbench.runner import events
-from sysid.workbench.runner.store import code_digest, digest, read_json, strict, write_json
+from sysid.workbench.runner.store import digest, read_json, strict, write_json
 
 BEGUN = "as it was begun from"
 ONE_STEP = "each alone, one step ahead"
@@ -110,6 +110,7 @@ class Course:
                         selection=selection,
                         max_iterations=asked.max_iterations,
                     ),
+                    models.values(),
                 )
                 changed = {**models, name: model_of(fit)}
                 score = whole_score(assembled(self.context.config, changed), selection, outputs)
@@ -201,7 +202,8 @@ class Course:
         selection = [*self.material.selection, *also, *chosen_by]
         ready = JointRound.of(config, one, whole, estimation=traces, selection=selection)
         asked_for = one.model_dump(mode="json", exclude={"again", "also"})  # their traces are among the round's
-        key = digest(strict({"code": code_digest(*CODE), "together": asked_for, **ready.terms}))
+        code = training_code(JointRound.fit, ready.part.models)
+        key = digest(strict({"code": code, "together": asked_for, **ready.terms}))
         fit = self._round(self.context.named(name), self.context.titled(title), key, ready)
         start = None if config.starts == 1 else self.context.start
         self.rounds.append(RoundDone.of(config, one, ready, fit, name=called, start=start))

@@ -66,7 +66,7 @@ def _check_stored(store: RunFolder, pipeline: Pipeline, chosen: FitConfig, data:
     for fit in pipeline.config.fits:
         keys[fit.name] = steps.fit_key(fit, pipeline.config, data, keys[fit.initial] if fit.initial else None)
     key = keys[chosen.name]
-    scores = steps.scores_key(key, data, pipeline.config)
+    scores = steps.scores_key(key, chosen.structure, data, pipeline.config)
     if not (store.is_done(f"fit-{chosen.slug}", key) and store.is_done(f"scores-{chosen.slug}", scores)):
         raise ConfigError(
             f"the fit {chosen.name} is not stored as the pipeline now stands",

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sysid.code_digest import code_digest
 from sysid.errors import ConfigError, SysidError
 from sysid.estimation import FitProgress, FitResult, Training
 from sysid.reporting.comparing.published import read_published
@@ -30,7 +31,7 @@ from sysid.workbench.fits.record import (
 from sysid.workbench.runner import events
 from sysid.workbench.runner.environment import environment
 from sysid.workbench.runner.naming import nearby
-from sysid.workbench.runner.store import RunFolder, code_digest, digest, strict, write_bytes, write_json
+from sysid.workbench.runner.store import RunFolder, digest, strict, write_bytes, write_json
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -216,7 +217,7 @@ class _Run:
     ) -> tuple[str, steps.Scores, bool]:
         """The key of the figures, the figures, and whether they were stored."""
         config, folder, step = self.pipeline.config, self.store.fit(fit.slug), f"scores-{fit.slug}"
-        key = steps.scores_key(fit_key, data, config)
+        key = steps.scores_key(fit_key, fit.structure, data, config)
         if reuse and self._done(step, key):
             return key, read_scores(folder), True
         scores = steps.score(result, data, config)
@@ -306,7 +307,8 @@ def report_key(results: Results) -> str:
         64 hexadecimal digits.
     """
     # As text: an infinity that was never written differs, as a number, from the nothing that is read back.
-    return digest({"results": results.model_dump_json(), "code": code_digest("reporting")})
+    code = code_digest("sysid.reporting.report:write_report", files=("sysid/reporting/templates",))
+    return digest({"results": results.model_dump_json(), "code": code})
 
 
 def _undated(results: Results) -> str:

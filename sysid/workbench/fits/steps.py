@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sysid.code_digest import code_digest
 from sysid.errors import ConfigError
 from sysid.estimation import (
     FitProgress,
@@ -25,18 +26,42 @@ from sysid.estimation import (
     fit_neural_state_space,
     fit_transfer_function,
 )
-from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
+from sysid.models import ARX, NARX, AbstractStructure, NeuralStateSpace, TransferFunction
 from sysid.traces import Role
 from sysid.validation import Evaluation, evaluate, evaluate_case
 from sysid.workbench.annotation import by_state, find_annotator
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
-from sysid.workbench.runner.store import code_digest, digest
+from sysid.workbench.runner.store import digest
 from sysid.workbench.stability import StabilityCheck
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
     from sysid.export.run_times import RunTime
+
+FITTED_BY: Mapping[type[AbstractStructure], tuple[Callable[..., Any], ...]] = {
+    ARX: (fit_arx,),
+    TransferFunction: (fit_transfer_function,),
+    NARX: (fit_narx, StabilityCheck),
+    NeuralStateSpace: (fit_neural_state_space, StabilityCheck),
+}
+"""What a fit of each structure runs."""
+
+STORED_BY = "sysid.workbench.fits.record:write_fit"
+CONFIGURATION = ("sysid.workbench.fits.config", "sysid.workbench.fits.data", "sysid.workbench.fields")
+"""How a YAML is read is no code that a result depends on: what was read is among the terms of its key."""
+
+
+def fit_code(structure: AbstractStructure) -> str:
+    """Digest of the code that a fit runs, and that stores it.
+
+    Args:
+        structure: What is fitted.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    return code_digest(*FITTED_BY[type(structure)], STORED_BY)
 
 
 def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | None) -> str:
@@ -64,7 +89,7 @@ def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | N
         "stability": {**config.stability.model_dump(), "sequences": [trace.digest for trace in data.sequences]}
         if network
         else None,
-        "code": code_digest("estimation", "models", "kernels"),
+        "code": fit_code(fit.structure),
     }
     return digest(_plain(terms | _common(config)))
 
@@ -157,18 +182,22 @@ class Scores:
     selection_mse: float
 
 
-def scores_key(fit: str, data: Data, config: PipelineConfig) -> str:
+def scores_key(fit: str, structure: AbstractStructure, data: Data, config: PipelineConfig) -> str:
     """Digest of everything that a fit's figures depend on.
 
     Args:
         fit: Key of the fit.
+        structure: What was fitted.
         data: The traces.
         config: The pipeline.
 
     Returns:
         64 hexadecimal digits.
     """
-    code = code_digest("validation", "models", "kernels")
+    here = ("steps:score", "evidence:residuals", "record:write_scores")
+    # What fits a structure names the class of its models, whose methods are run.
+    made_by = [f"sysid.workbench.fits.{one}" for one in here]
+    code = code_digest(*made_by, *FITTED_BY[type(structure)], without=CONFIGURATION)
     terms = {
         "fit": fit,
         "traces": data.traces.digest,
@@ -255,7 +284,9 @@ def export_key(scores: str, config: PipelineConfig) -> str:
         64 hexadecimal digits.
     """
     export = None if config.export is None else config.export.model_dump(mode="json", exclude={"fit"})
-    return digest({"scores": scores, "export": export, "code": code_digest("export", "models", "kernels")})
+    files = ("sysid/export/templates", "sysid/export/fmi_headers", "sysid/export/schemas")
+    code = code_digest("sysid.export:export_bundle", "sysid.models:model_from_dict", files=files)
+    return digest({"scores": scores, "export": export, "code": code})
 
 
 def export(

@@ -89,7 +89,7 @@ def plan(pipeline: Pipeline, folder: Path, *, fresh: bool = False) -> tuple[Plan
     planned = [loading]
     for fit in config.fits:
         keys[fit.name] = steps.fit_key(fit, config, data, keys[fit.initial] if fit.initial else None)
-        scores[fit.name] = steps.scores_key(keys[fit.name], data, config)
+        scores[fit.name] = steps.scores_key(keys[fit.name], fit.structure, data, config)
         step = f"Fitting {fit.name}, {fit.structure.label}"
         if not fresh and store.is_done(f"fit-{fit.slug}", keys[fit.name]):
             planned.append(PlannedStep(step=step, stored=True, seconds=0.0, basis="stored"))

@@ -18,7 +18,6 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,6 @@ import numpy as np
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-import sysid
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, UserError
 
@@ -116,25 +114,6 @@ def digest(value: object) -> str:
         True
     """
     return hashlib.sha256(json.dumps(value, sort_keys=True, ensure_ascii=True).encode()).hexdigest()
-
-
-@cache
-def code_digest(*rooms: str) -> str:
-    """SHA-256 over the source of some rooms, so that changed code never reuses what older code computed.
-
-    Args:
-        rooms: Folders of the package, such as ``"estimation"``.
-
-    Returns:
-        64 hexadecimal digits.
-    """
-    package = Path(sysid.__file__).parent
-    sha = hashlib.sha256(sysid.__version__.encode())
-    for room in rooms:
-        for file in sorted((package / room).rglob("*.py")):
-            sha.update(file.relative_to(package).as_posix().encode())
-            sha.update(file.read_bytes())
-    return sha.hexdigest()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,14 +14,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sysid.models import NARX
+from sysid.code_digest import code_digest
+from sysid.models import NARX, structure_from_dict
 from sysid.reporting.sweep.record import FIGURES, Trial
+from sysid.workbench.fits.steps import FITTED_BY
 from sysid.workbench.runner.events import StepProgress, Watcher
-from sysid.workbench.runner.store import code_digest, digest, strict
+from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.store import Clock, TrialStore
-from sysid.workbench.sweep.trial import FAILED, Bench, Job
+from sysid.workbench.sweep.trial import FAILED, Bench, Job, run_job
 from sysid.workbench.sweep.workers import AbstractWorkers
 
 FORMAT = 1
@@ -79,7 +81,6 @@ class Driver:
             "pipeline": {name: self.bench.pipeline.get(name) for name in ("mapping", "start", "rest")},
             "traces": self.bench.traces.digest,
             "selection": [trace.digest for trace in self.bench.selection],
-            "code": code_digest("estimation", "models", "kernels"),
         }
         object.__setattr__(self, "_shared", digest(terms))
         object.__setattr__(self, "_progress", _Progress(driver=self))
@@ -192,6 +193,7 @@ class Driver:
     def _keyed(self, job: Job) -> Job:
         terms = {
             "shared": self._shared,
+            "code": _code(job.structure),
             "structure": job.structure,
             "training": job.training,
             "iterations": job.iterations,
@@ -244,6 +246,13 @@ class Driver:
         return trial
 
 
+def _code(structure: Mapping[str, Any]) -> str:
+    """Digest of the code that a job runs: not of the estimators of other structures, or of how YAML is read."""
+    choices = ("sysid.workbench.fits.steps:fit_traces", "sysid.models.store:model_from_dict")
+    configuration = ("sysid.workbench.fits.config", "sysid.workbench.fits.data", "sysid.workbench.fields")
+    return code_digest(run_job, *FITTED_BY[type(structure_from_dict(structure))], without=(*choices, *configuration))
+
+
 def as_trial(outcome: Mapping[str, Any]) -> Trial:
     """What is told of a job's result: all but the fit itself.
 
@@ -253,8 +262,6 @@ def as_trial(outcome: Mapping[str, Any]) -> Trial:
     Returns:
         The trial, without a place in the ranges.
     """
-    from sysid.models import structure_from_dict
-
     kept = {name: value for name, value in outcome.items() if name not in {"fit", "checkpoint"}}
     label = structure_from_dict(outcome["structure"]).label
     # A warm start that is no point of the grid has the number 0, which no trial has.

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import sysid
+from sysid import code_digest
+from sysid.code_digest import look_again
 from sysid.estimation import FitResult, Status
 from sysid.models import Start
 from sysid.reporting.results import Results, read_results
@@ -21,7 +26,7 @@ from sysid.workbench.fits.data import load_data
 from sysid.workbench.fits.record import read_fit, read_scores
 from sysid.workbench.fits.run import run_pipeline
 from sysid.workbench.runner import events
-from sysid.workbench.runner.store import RunFolder, code_digest
+from sysid.workbench.runner.store import RunFolder
 
 FITS = ("ARX", "open loop", "closed loop")
 
@@ -166,6 +171,52 @@ def test_a_damaged_result_is_done_again(workspace: Path) -> None:
     assert second.fits[1].cases["run-3"].free_run == first.fits[1].cases["run-3"].free_run
 
 
+@pytest.fixture
+def own_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A copy of the package, which stands for its code wherever that is looked at."""
+    copy = tmp_path / "code" / "sysid"
+    shutil.copytree(Path(sysid.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(code_digest, "_home", lambda _: copy)
+    look_again()
+    yield copy
+    look_again()
+
+
+def change(file: Path, old: str, new: str) -> None:
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    look_again()
+
+
+def fit_keys(workspace: Path) -> dict[str, str]:
+    """What each stored fit depends on, by its stamp."""
+    stamps = (workspace / "run" / ".steps").glob("fit-*.json")
+    return {file.stem: json.loads(file.read_text(encoding="utf-8"))["key"] for file in stamps}
+
+
+@pytest.mark.usefixtures("no_report")
+def test_results_outlive_words_and_no_change_of_what_made_them(workspace: Path, own_code: Path) -> None:
+    _, stored = run(workspace)
+    assert stored == dict.fromkeys(FITS, False)
+    change(own_code / "estimation" / "linear" / "arx.py", '"""', '"""Said better: ')
+    change(own_code / "estimation" / "networks" / "narx.py", "import numpy", "# A comment.\nimport numpy")
+    (own_code / "export" / "modelica.py").write_text("def export_modelica():\n    return 1\n", encoding="utf-8")
+    look_again()
+    _, stored = run(workspace)
+    assert stored == dict.fromkeys(FITS, True)
+    before = fit_keys(workspace)
+    change(own_code / "kernels" / "recursion.py", "range(n_steps)", "range(0, n_steps)")
+    _, stored = run(workspace)
+    assert stored == dict.fromkeys(FITS, False)
+    # The figures of all are made with it, but the least squares of an ARX are not.
+    assert {name: key == before[name] for name, key in fit_keys(workspace).items()} == {
+        "fit-arx": True,
+        "fit-open-loop": False,
+        "fit-closed-loop": False,
+    }
+
+
 KILLER = """
 import os, signal, sys
 from pathlib import Path
@@ -200,7 +251,7 @@ def test_a_killed_run_goes_on_where_it_was(workspace: Path, about_to_write: str,
     done = subprocess.run([sys.executable, "-c", KILLER, about_to_write], check=False)
     assert done.returncode == -signal.SIGKILL
     # Both runs shall see the same code, also while somebody is working on it.
-    code_digest.cache_clear()
+    look_again()
     results, stored = run(workspace)
     assert stored == {name: name in kept for name in FITS}
     assert [fit.name for fit in results.fits] == list(FITS)

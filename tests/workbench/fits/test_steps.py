@@ -34,7 +34,7 @@ def keys(workspace: Path, text: str | None = None) -> dict[str, str]:
     found: dict[str, str] = {}
     for fit in config.fits:
         found[fit.name] = steps.fit_key(fit, config, data, found.get(fit.initial or ""))
-        found[f"{fit.name} scores"] = steps.scores_key(found[fit.name], data, config)
+        found[f"{fit.name} scores"] = steps.scores_key(found[fit.name], fit.structure, data, config)
     return found
 
 
@@ -89,7 +89,7 @@ def test_a_changed_record_concerns_what_reads_it(workspace: Path, record: int, c
 
 def test_changed_code_concerns_everything(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = keys(workspace)
-    monkeypatch.setattr(steps, "code_digest", lambda *_: "other code")
+    monkeypatch.setattr(steps, "code_digest", lambda *_, **__: "other code")
     assert not set(keys(workspace).values()) & set(before.values())
 
 

@@ -17,7 +17,6 @@ import pytest
 from sysid.workbench.runner.store import (
     BusyError,
     RunFolder,
-    code_digest,
     read_arrays,
     read_json,
     strict,
@@ -87,11 +86,6 @@ def test_damage_means_not_done(stamped: RunFolder, file: str, content: str | Non
     damaged = stamped.path / file
     damaged.unlink() if content is None else damaged.write_text(content, encoding="utf-8")
     assert not stamped.is_done("fit-a", "key")
-
-
-def test_changed_code_changes_its_digest() -> None:
-    assert code_digest("models") != code_digest("models", "kernels")
-    assert code_digest("models") == code_digest.__wrapped__("models")
 
 
 def test_two_at_once_are_refused(tmp_path: Path) -> None:
