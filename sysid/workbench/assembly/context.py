@@ -23,11 +23,11 @@ SEEDS_OF_A_START = 10_000
 """How far the seeds of one start are from the next one's: its candidates' are a thousand apart."""
 
 
-def training_code(work: Callable[..., Any], models: Iterable[object]) -> str:
+def training_code(work: Callable[..., Any] | str, models: Iterable[object]) -> str:
     """Digest of the code that a training runs; what the YAML asks for is not code, and is among the terms of its key.
 
     Args:
-        work: Does it.
+        work: Does it, or its address.
         models: That it is given, which are of any class.
 
     Returns:

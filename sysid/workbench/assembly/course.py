@@ -202,7 +202,7 @@ class Course:
         selection = [*self.material.selection, *also, *chosen_by]
         ready = JointRound.of(config, one, whole, estimation=traces, selection=selection)
         asked_for = one.model_dump(mode="json", exclude={"again", "also"})  # their traces are among the round's
-        code = training_code(JointRound.fit, ready.part.models)
+        code = training_code(f"{JointRound.__module__}:JointRound.fit", ready.part.models)
         key = digest(strict({"code": code, "together": asked_for, **ready.terms}))
         fit = self._round(self.context.named(name), self.context.titled(title), key, ready)
         start = None if config.starts == 1 else self.context.start
