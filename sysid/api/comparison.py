@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-FROM_FIRST_SAMPLE = Start(kind=StartKind.FIRST_SAMPLE)
-"""How a free run begins unless told otherwise: at rest at the first measured output."""
+ESTIMATED = Start(kind=StartKind.ESTIMATED)
+"""How a free run begins unless told otherwise: its initial state is estimated from the first samples of each record."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -105,7 +105,7 @@ class Comparison:
         return comparison_figure(list(panels.values()))
 
 
-def compare(traces: TraceSet, *fits: FitResult | SystemFit, start: Start = FROM_FIRST_SAMPLE) -> Comparison:
+def compare(traces: TraceSet, *fits: FitResult | SystemFit, start: Start = ESTIMATED) -> Comparison:
     """Run fitted models over every case: fed with nothing but inputs and their own past output.
 
     Args:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from sysid.api.comparison import FROM_FIRST_SAMPLE
+from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit, SystemFit
 from sysid.errors import ConfigError
 from sysid.estimation import (
@@ -59,7 +59,7 @@ def fit(
     structure: AbstractStructure,
     training: Training | None = None,
     *,
-    start: Start = FROM_FIRST_SAMPLE,
+    start: Start = ESTIMATED,
     rest_output: float | None = None,
     initial: FitResult | None = None,
 ) -> Fit | SystemFit:

@@ -17,7 +17,7 @@ from sysid.errors import ParityError
 from sysid.export.exporter import ExportedFile, Runner
 from sysid.export.exporters import exporter
 from sysid.export.surrogate import Surrogate
-from sysid.models import AbstractModel, Cascade, History, Start
+from sysid.models import AbstractModel, Cascade, History, Start, beginning
 from sysid.traces import Trace, TraceSet
 
 RANDOM_SEQUENCES = 100
@@ -105,8 +105,8 @@ def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[
 
 def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, start: Start) -> ParityCase:
     inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
-    history = start.history(inputs, target, model.rest_output)
-    inputs = inputs[start.n_measured :]
+    begun = beginning(model, inputs, target, start, trace.usable_samples)
+    history, inputs = begun.history, inputs[begun.first :]
     output, change = model.simulate(inputs, history), float(_disturbances(surrogate)[0])
     disturbed = model.simulate(inputs, History(inputs=history.inputs, output=history.output + change))
     return ParityCase(

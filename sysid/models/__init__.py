@@ -2,6 +2,7 @@
 
 from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.beginning import Beginning, beginning
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_batch import simulate_family
 from sysid.models.cascade_mean import mean_of
@@ -32,6 +33,7 @@ __all__ = [
     "AbstractModel",
     "AbstractStructure",
     "Activity",
+    "Beginning",
     "Cascade",
     "CascadeRun",
     "Domain",
@@ -58,6 +60,7 @@ __all__ = [
     "VectorNARXModel",
     "VectorScaling",
     "Wiring",
+    "beginning",
     "cascade_from_dict",
     "mean_of",
     "model_from_dict",

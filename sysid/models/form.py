@@ -26,6 +26,22 @@ class AbstractForm(ABC):
     def numbers(self) -> NDArray[np.float64]:
         """Every number of the form, flat."""
 
+    @property
+    @abstractmethod
+    def memory(self) -> int:
+        """Samples of a record from which the state after them can be told."""
+
+    def refined(self, history: History) -> History:
+        """The history with which the free run that begins at its oldest samples comes closest to its output.
+
+        Args:
+            history: Measured samples, oldest first.
+
+        Returns:
+            The same history where :meth:`simulate` finds that state itself.
+        """
+        return history
+
     @abstractmethod
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run: the model is fed its own past output.

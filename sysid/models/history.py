@@ -21,6 +21,7 @@ class History:
     Args:
         inputs: Shape ``(n_past, n_inputs)``.
         output: Shape ``(n_past,)``.
+        usable: Which outputs are not masked, shape ``(n_past,)``; ``None`` for all. A state is estimated from those.
 
     Raises:
         TraceError: If the two have different lengths, or there is no sample.
@@ -32,6 +33,7 @@ class History:
 
     inputs: NDArray[np.float64]
     output: NDArray[np.float64]
+    usable: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         inputs = np.array(self.inputs, dtype=np.float64, ndmin=2)
@@ -59,6 +61,11 @@ class History:
         """
         return cls(inputs=np.atleast_2d(np.asarray(inputs, dtype=np.float64)), output=np.array([output]))
 
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which outputs are not masked, as an array."""
+        return np.ones(len(self.output), dtype=np.bool_) if self.usable is None else self.usable
+
     def padded(self, n_past: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The last ``n_past`` samples, the oldest one held where the history is shorter.
 
@@ -82,6 +89,7 @@ class StartKind(enum.Enum):
     REST = "rest"
     FIRST_SAMPLE = "first-sample"
     MEASURED = "measured"
+    ESTIMATED = "estimated"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,10 +101,13 @@ class Start:
     * ``first-sample``: the same with the first measured output held.
     * ``measured``: the first ``n_measured`` samples of the record are the history; scoring begins after
       them, as in the public benchmarks.
+    * ``estimated``: the state before the record is estimated from its first samples, for each record and each model,
+      and scoring begins after them (:mod:`sysid.models.beginning`). A fit takes nothing for granted of what came before
+      a record: rows of lags begin where all of them are measured, and initial states are fitted with the parameters.
 
     Args:
-        kind: Which of the three.
-        n_measured: Samples used, for ``measured`` alone.
+        kind: Which of the four.
+        n_measured: Samples used, for ``measured``; and for ``estimated``, where 0 leaves the choice to the model.
 
     Raises:
         ConfigError: If ``n_measured`` does not go with the kind.
@@ -106,12 +117,17 @@ class Start:
     n_measured: int = 0
 
     def __post_init__(self) -> None:
-        if (self.kind is StartKind.MEASURED) != (self.n_measured > 0):
+        fits = (
+            self.n_measured >= 0
+            if self.kind is StartKind.ESTIMATED
+            else ((self.kind is StartKind.MEASURED) == (self.n_measured > 0))
+        )
+        if not fits:
             raise ConfigError(
                 "the number of measured samples does not go with the kind of start",
                 expected="n_measured above 0 for a measured start, and 0 otherwise",
                 got=f"{self.kind.value} with n_measured = {self.n_measured}",
-                remedy="write start: rest, start: first-sample, or start: {measured: 50}",
+                remedy="write start: estimated, start: rest, start: first-sample, or start: {measured: 50}",
             )
 
     def history(
@@ -121,7 +137,7 @@ class Start:
         rest_output: float,
         usable: NDArray[np.bool_] | None = None,
     ) -> History:
-        """The history that a record begins with.
+        """The history that a record begins with, before any model is known.
 
         Args:
             inputs: The record's inputs, shape ``(n_samples, n_inputs)``.
@@ -130,14 +146,15 @@ class Start:
             usable: Which samples are not masked; all by default. The first sample is then the first of those.
 
         Returns:
-            The history before sample ``n_measured``.
+            The history before sample ``n_measured``. For an estimated start it is the first sample held, which stands
+            for what is not known yet.
 
         Raises:
             TraceError: If the record is not longer than the measured start.
         """
         if self.kind is StartKind.REST:
             return History.at_rest(inputs=inputs[0], output=rest_output)
-        if self.kind is StartKind.FIRST_SAMPLE:
+        if self.kind is not StartKind.MEASURED:
             first = 0 if usable is None or not usable.any() else int(np.argmax(usable))
             return History.at_rest(inputs=inputs[first], output=float(output[first]))
         if len(output) <= self.n_measured:

@@ -22,6 +22,9 @@ HISTORY_NOISE = 1e-2
 """Standard deviation of the output's history in scaled numbers, beside a state whose deviation from what the oldest
 sample says is of order 1: weak enough to matter only where the history does not show a state."""
 
+SHARPENED, LEAST_NOISE = 4, 1e-10
+"""Times that the history's noise is taken from what the state leaves of it, where that is less; and its least."""
+
 CORRECTIONS = 50
 """Levenberg-Marquardt steps at most to find the state that a history shows; mostly a handful suffice."""
 
@@ -112,7 +115,7 @@ class NeuralForm(AbstractForm):
 
     A history gives the state thus: its oldest sample is a system that has stood there (``E``); where it holds more
     samples, the state :math:`x_0` there minimises :math:`|\hat y(x_0) - y|^2/\sigma^2 + |x_0 - E z_0|^2` over the
-    history, and the model runs on through it.
+    history, :math:`\sigma` being what is left of the output there, and the model runs on through it.
 
     Args:
         sizes: States, inputs, neurons.
@@ -151,6 +154,11 @@ class NeuralForm(AbstractForm):
         """The flat parameters."""
         return self.theta
 
+    @property
+    def memory(self) -> int:
+        """Twice as many samples as states, and one more."""
+        return 2 * self.sizes.states + 1
+
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""
         scaled = self.scaled(inputs)
@@ -179,7 +187,7 @@ class NeuralForm(AbstractForm):
         x = self.resting(scaled[0], float(output[0]))
         if len(output) == 1:
             return x
-        x = self.corrected(scaled, output, x)
+        x = self.corrected(scaled, output, x, history.known)
         self.run(scaled, x)
         return x
 
@@ -197,7 +205,11 @@ class NeuralForm(AbstractForm):
         return np.asarray(np.clip(E @ np.concatenate([inputs, [output, 1.0]]), -self.bound, self.bound))
 
     def corrected(
-        self, scaled: NDArray[np.float64], output: NDArray[np.float64], x: NDArray[np.float64]
+        self,
+        scaled: NDArray[np.float64],
+        output: NDArray[np.float64],
+        x: NDArray[np.float64],
+        known: NDArray[np.bool_] | None = None,
     ) -> NDArray[np.float64]:
         """The state before some samples that their output shows, near the one expected.
 
@@ -205,10 +217,12 @@ class NeuralForm(AbstractForm):
             scaled: Scaled inputs, shape ``(n_samples, n_inputs)``.
             output: Scaled output, shape ``(n_samples,)``.
             x: State expected, shape ``(n_states,)``.
+            known: Which outputs are not masked, shape ``(n_samples,)``; all by default.
 
         Returns:
             Shape ``(n_states,)``.
         """
+        seen = _Seen(scaled, output, np.ones(len(output), dtype=np.bool_) if known is None else known)
         # What is expected may lie far outside where the records were, and from there the output may not show the way:
         # descents begin all around.
         expected = np.clip(x, -1.0, 1.0)
@@ -216,26 +230,35 @@ class NeuralForm(AbstractForm):
         if self.rectified:
             # Across the kink of an absolute value no descent leads. With either sign given there is no kink.
             signed = replace(self, rectified=False, low=-np.inf, high=np.inf)
-            around += [signed._descended(scaled, sign * output, around[1], expected) for sign in (1.0, -1.0)]
-        found = [self._descended(scaled, output, begin, expected) for begin in around]
-        return min(found, key=lambda x: self._misfit(scaled, output, x, expected))
+            around += [
+                signed._descended(replace(seen, output=sign * output), around[1], expected, HISTORY_NOISE)
+                for sign in (1.0, -1.0)
+            ]
+        descents = [self._descended(seen, begin, expected, HISTORY_NOISE) for begin in around]
+        found = min(descents, key=lambda x: self._misfit(seen, x, expected, HISTORY_NOISE))
+        # The less the state leaves of the output, the less what was expected has a say.
+        noise, spare = HISTORY_NOISE, int(np.count_nonzero(seen.known)) - len(x)
+        for _ in range(SHARPENED if spare > 0 else 0):
+            level = max(float(np.linalg.norm(self._away(seen, found))) / spare**0.5, LEAST_NOISE)
+            if not level < noise / 2.0:
+                break
+            noise = level
+            found = self._descended(seen, found, expected, noise)
+        return found
 
     def _descended(
-        self,
-        scaled: NDArray[np.float64],
-        output: NDArray[np.float64],
-        x: NDArray[np.float64],
-        expected: NDArray[np.float64],
+        self, seen: _Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float
     ) -> NDArray[np.float64]:
         """Levenberg-Marquardt from one state."""
         n = len(x)
-        damping, best = 1e-3, self._misfit(scaled, output, x, expected)
+        damping, best = 1e-3, self._misfit(seen, x, expected, noise)
         for _ in range(CORRECTIONS):
-            y, J = self._linearised(scaled, x)
-            H = J.T @ J / HISTORY_NOISE**2 + np.eye(n)
-            g = J.T @ (y - output) / HISTORY_NOISE**2 + (x - expected)
+            J = self._linearised(seen.inputs, x)[seen.known]
+            away = self._away(seen, x)[seen.known]
+            H = J.T @ J / noise**2 + np.eye(n)
+            g = J.T @ away / noise**2 + (x - expected)
             trial = x - linalg.solve(H + damping * np.diag(np.diag(H)), g, assume_a="pos")
-            misfit = self._misfit(scaled, output, trial, expected)
+            misfit = self._misfit(seen, trial, expected, noise)
             if misfit < best:
                 done = best - misfit < 1e-9 * best
                 x, best, damping = trial, misfit, damping / 10.0
@@ -293,24 +316,29 @@ class NeuralForm(AbstractForm):
             )
         return self.scaling.scale_inputs(inputs)
 
-    def _linearised(
-        self, scaled: NDArray[np.float64], x: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Output and its derivative with respect to the state before the first sample."""
+    def _linearised(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivative of the output with respect to the state before the first sample."""
         n, dynamic = self.sizes.states, self.sizes.dynamic.stop
         S = np.zeros((n, dynamic + n))
         S[:, dynamic:] = np.eye(n)
         y = np.empty(len(scaled))
         J = np.empty((len(scaled), dynamic + n + self.sizes.output.stop - self.sizes.output.start))
         kernel.sensitivities(scaled, x.copy(), S, *self.arguments(self.theta), y, J)
-        return y, J[:, dynamic : dynamic + n]
+        return J[:, dynamic : dynamic + n]
 
-    def _misfit(
-        self,
-        scaled: NDArray[np.float64],
-        output: NDArray[np.float64],
-        x: NDArray[np.float64],
-        expected: NDArray[np.float64],
-    ) -> float:
-        away = self.run(scaled, x.copy()) - output
-        return float(away @ away / HISTORY_NOISE**2 + np.sum((x - expected) ** 2))
+    def _away(self, seen: _Seen, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Output minus what was seen, zero where that is masked."""
+        return np.where(seen.known, self.run(seen.inputs, x.copy()) - seen.output, 0.0)
+
+    def _misfit(self, seen: _Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float) -> float:
+        away = self._away(seen, x)
+        return float(away @ away / noise**2 + np.sum((x - expected) ** 2))
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Scaled inputs and output of a history, and which outputs are not masked."""
+
+    inputs: NDArray[np.float64]
+    output: NDArray[np.float64]
+    known: NDArray[np.bool_]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -155,6 +156,42 @@ class Recursion(AbstractForm):
         kernel.free_run(u, y, *self._arguments(len(inputs)))
         return self.scaling.unscale_output(y[self.lags.depth :])
 
+    @property
+    def memory(self) -> int:
+        """Lags before the first row, and rows to tell the outputs among them."""
+        return self.lags.depth + max(self.lags.output, default=0)
+
+    def refined(self, history: History) -> History:
+        """Past outputs by Gauss-Newton on those before the first row, followed by the free run from there.
+
+        Masked outputs take no part. A single Gauss-Newton step is exact for a linear model.
+
+        Args:
+            history: Measured samples, oldest first.
+
+        Returns:
+            The history with the model's own outputs; as it is where it is no longer than the lags, or the run is lost.
+        """
+        depth, own = self.lags.depth, max(self.lags.output, default=0)
+        if own == 0 or len(history.output) <= depth:
+            return history
+        u, measured = self.scaling.scale_inputs(history.inputs), self.scaling.scale_output(history.output)
+        places = slice(depth - own, len(measured))
+        known = history.known[places]
+
+        def run(past: NDArray[np.float64]) -> NDArray[np.float64]:
+            y = measured.copy()
+            y[depth - own : depth] = past
+            kernel.free_run(u, y, *self._arguments(len(measured) - depth))
+            return y[places]
+
+        found = _gauss_newton(run, measured[depth - own : depth], measured[places], known)
+        if found is None:
+            return history
+        y = measured.copy()
+        y[places] = run(found)
+        return History(inputs=history.inputs, output=self.scaling.unscale_output(y))
+
     def predict(
         self, inputs: NDArray[np.float64], output: NDArray[np.float64], history: History, steps: int
     ) -> NDArray[np.float64]:
@@ -179,3 +216,39 @@ class Recursion(AbstractForm):
         lags = self.lags
         tables = (lags.input_channel, lags.input_lag, lags.output_lag)
         return (lags.depth, n_steps, *tables, self.theta, self.neurons, self.low, self.high)
+
+
+_STEPS, _APART = 12, 1e-5
+"""Gauss-Newton steps at most, and how far apart outputs are put for a derivative, in scaled numbers."""
+
+
+def _gauss_newton(
+    run: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    start: NDArray[np.float64],
+    target: NDArray[np.float64],
+    known: NDArray[np.bool_],
+) -> NDArray[np.float64] | None:
+    """What to begin a run with so that it comes closest to a target; ``None`` where no run is finite."""
+
+    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(known, run(x) - target, 0.0)
+
+    x, r = start.copy(), residual(start)
+    if not np.isfinite(r).all():
+        return None
+    for _ in range(_STEPS):
+        moved = [residual(x + step) - residual(x - step) for step in _APART * np.eye(len(x))]
+        J = np.column_stack(moved) / (2.0 * _APART)
+        if not np.isfinite(J).all():
+            return x
+        step, share, better = np.linalg.lstsq(J, -r, rcond=1e-10)[0], 1.0, False
+        while not better and share > 1e-3:
+            trial = residual(x + share * step)
+            better = bool(np.isfinite(trial).all() and trial @ trial < r @ r)
+            if better:
+                gained = r @ r - trial @ trial
+                x, r = x + share * step, trial
+            share /= 4.0
+        if not better or gained < 1e-12 * (r @ r):
+            break
+    return x

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,14 @@ from sysid.models.history import History
 from sysid.models.scaling import Scaling
 
 HISTORY_NOISE = 1e-6
-"""Variance of the output's history relative to what the model explains, when a state is estimated from it: small
+"""Variance of the output's history relative to what the model explains, where it is too short to tell its noise: small
 enough to follow a clean record, large enough that states which it does not show stay at their equilibrium."""
+
+EXACT = 1e-18
+"""Variance of what a state leaves unexplained, relative to the output's, below which a history has no noise."""
+
+AT_ONE = 1e-9
+"""Distance from 1 below which an eigenvalue is that of an integrator, which stays wherever it is."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,12 +31,14 @@ class StateSpace(AbstractForm):
     r"""``x(t+1) = A x(t) + B u(t)``, ``y(t) = C x(t) + D u(t) + c`` in scaled numbers.
 
     The state comes from the history: the equilibrium at its oldest inputs, run on through its inputs; where it holds
-    more than one sample, the part of its output that this does not explain moves the state by
+    more than one sample, the part of its output that this does not explain moves the state by its least squares
+    solution. Where that leaves a residual, of variance :math:`\lambda`, it is
 
     .. math:: x_0 = P O^T (O P O^T + \lambda I)^{-1} (y - \hat y)
 
     the mean of a state with covariance :math:`P`, that of white inputs, given the output; :math:`O` is the
-    observability matrix. A history of one sample is a system at rest, whose output is the model's.
+    observability matrix. A history of one sample is a system at rest, whose output is the model's; of an integrator,
+    which may rest anywhere, it is the sample's.
 
     Args:
         A: Shape ``(n_state, n_state)``.
@@ -75,13 +84,34 @@ class StateSpace(AbstractForm):
         Returns:
             Shape ``(n_state,)``.
         """
-        inputs = self._checked(history.inputs)
-        x = self.equilibrium(inputs[0])
+        inputs, output = self._checked(history.inputs), self.scaling.scale_output(history.output)
         if len(inputs) == 1:
-            return x
-        x = x + self._correction(inputs, self.scaling.scale_output(history.output), x)
+            return self._resting(inputs[0], float(output[0]))
+        x = self.equilibrium(inputs[0]) if self._radius < 1.0 - AT_ONE else np.zeros(self.n_state)
+        x = x + self._correction(inputs, output, x, history.known)
         self._run(inputs, x)
         return x
+
+    @property
+    def memory(self) -> int:
+        """Twice as many samples as states but for dead times, which are among the states once."""
+        moving = int(np.count_nonzero(np.abs(linalg.eigvals(self.A)) > AT_ONE)) if self.n_state else 0
+        return self.n_state + moving + 1
+
+    @cached_property
+    def _radius(self) -> float:
+        """Largest magnitude of an eigenvalue."""
+        return float(np.abs(linalg.eigvals(self.A)).max(initial=0.0)) if self.n_state else 0.0
+
+    def _resting(self, inputs: NDArray[np.float64], output: float) -> NDArray[np.float64]:
+        """Equilibrium at scaled inputs, with the output where the model leaves it open."""
+        x = self.equilibrium(inputs)
+        if abs(self._radius - 1.0) > AT_ONE:
+            return x
+        _, sizes, rows = linalg.svd(np.eye(self.n_state) - self.A)
+        free = rows[sizes <= AT_ONE * max(float(sizes[0]), 1.0)]
+        level = output - float(self.C @ x + self.D @ inputs) - self.constant
+        return np.asarray(x + free.T @ linalg.lstsq((free @ self.C)[np.newaxis], [level])[0]) if len(free) else x
 
     def equilibrium(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The state at which the system stays while its inputs are held.
@@ -94,7 +124,7 @@ class StateSpace(AbstractForm):
         """
         if self.n_state == 0:
             return np.zeros(0)
-        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A, self.B @ inputs)[0])
+        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A, self.B @ inputs, cond=AT_ONE)[0])
 
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""
@@ -119,23 +149,39 @@ class StateSpace(AbstractForm):
         return y[:, 0] + self.constant
 
     def _correction(
-        self, scaled: NDArray[np.float64], output: NDArray[np.float64], x: NDArray[np.float64]
+        self,
+        scaled: NDArray[np.float64],
+        output: NDArray[np.float64],
+        x: NDArray[np.float64],
+        known: NDArray[np.bool_],
     ) -> NDArray[np.float64]:
-        """How far the state at the history's begin is from equilibrium, judged by its output."""
+        """How far the state at the history's begin is from the one expected, judged by its output."""
         missing = output - self._run(scaled, x.copy())
-        spread = self._covariance()
         observed = np.empty((len(scaled), self.n_state))
         row = self.C.copy()
         for t in range(len(scaled)):
             observed[t] = row
             row = row @ self.A
+        observed, missing = observed[known], missing[known]
+        if not np.isfinite(observed).all() or not len(missing):
+            return np.zeros(self.n_state)
+        size = np.linalg.norm(observed, axis=0)
+        scale = np.where(size > 0.0, size, 1.0)
+        found, _, rank, _ = linalg.lstsq(observed / scale, missing, cond=1e-10)
+        left = missing - (observed / scale) @ found
+        level = float(left @ left) / max(len(left) - rank, 1)
+        clean = level <= EXACT * max(float(output @ output) / len(output), np.finfo(np.float64).tiny)
+        if (len(left) > rank and clean) or self._radius >= 1.0 - AT_ONE:
+            return np.asarray(found / scale)
+        spread = self._covariance()
         seen = observed @ spread @ observed.T
-        level = HISTORY_NOISE * max(float(np.trace(seen)) / len(seen), np.finfo(np.float64).tiny)
+        if len(left) <= rank:
+            level = HISTORY_NOISE * max(float(np.trace(seen)) / len(seen), np.finfo(np.float64).tiny)
         return np.asarray(spread @ observed.T @ linalg.lstsq(seen + level * np.eye(len(seen)), missing)[0])
 
     def _covariance(self) -> NDArray[np.float64]:
         """Covariance of the state under white inputs; the identity where the system is not stable."""
-        if np.abs(linalg.eigvals(self.A)).max(initial=0.0) >= 1.0:
+        if self._radius >= 1.0:
             return np.eye(self.n_state)
         return np.asarray(linalg.solve_discrete_lyapunov(self.A, self.B @ self.B.T))
 

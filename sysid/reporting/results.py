@@ -84,6 +84,7 @@ class CaseRecord(_Record):
     one_step: FiguresRecord = Field(description="One step ahead from measured output: open loop.")
     run_time_s: Number = Field(description="Seconds that the free run took: median of repeats, warm.")
     n_samples: int = Field(ge=1)
+    begins_at: int = Field(default=0, description="Sample of the case at which the free run begins and is scored.")
     simulated_s: Number = Field(description="Length of the case in seconds.")
     coverage: dict[str, CoverageRecord] | None = Field(
         default=None, description="Of the output's interval, free_run and one_step, where the fit has a posterior."

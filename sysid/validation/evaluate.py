@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation import Posterior
 from sysid.estimation.networks.provider import Experiment
-from sysid.models import AbstractModel, Start
+from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.intervals import CaseIntervals, case_intervals
 from sysid.validation.metrics import Figures, figures
@@ -32,6 +32,7 @@ class CaseResult:
         target: Measured output, shape ``(n_samples,)``.
         simulated: Free run, shape ``(n_samples,)``.
         predicted: One step ahead, shape ``(n_samples,)``.
+        first: Sample of the trace at which the free run begins; those before gave it its history and are not scored.
         intervals: Of the output, where the fit has a posterior.
         by_state: By the name of a state: figures of the free run while it lasts, and its share of the samples that
             count; ``None`` where nobody said in which state a sample is.
@@ -46,6 +47,7 @@ class CaseResult:
     target: NDArray[np.float64]
     simulated: NDArray[np.float64]
     predicted: NDArray[np.float64]
+    first: int = 0
     intervals: CaseIntervals | None = None
     by_state: Dict[str, tuple[Figures, float]] | None = None
 
@@ -60,6 +62,7 @@ class CaseResult:
                 "one_step": self.one_step.to_dict(),
                 "run_time_s": self.run_time_s,
                 "n_samples": len(self.target),
+                "begins_at": self.first,
                 "simulated_s": float(self.time[-1] - self.time[0]),
             }
             | ({} if self.intervals is None else {"coverage": self.intervals.to_dict()})
@@ -139,8 +142,8 @@ def evaluate_case(
         ChannelError: If the trace lacks a channel of the mapping.
     """
     inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
-    history = start.history(inputs, target, model.rest_output)
-    scored = slice(start.n_measured, None)
+    begun = beginning(model, inputs, target, start, trace.usable_samples)
+    history, scored = begun.history, slice(begun.first, None)
     inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
     simulated = model.simulate(inputs, history)
     seconds = []
@@ -151,7 +154,7 @@ def evaluate_case(
     predicted = model.predict(inputs, target, history)
     intervals = None
     if posterior is not None:
-        experiment = Experiment.from_trace(trace, model.mapping, start, model.rest_output)
+        experiment = Experiment.for_model(trace, model, start)
         intervals = case_intervals(posterior, model, experiment, simulated, predicted)
     return CaseResult(
         case=trace.name,
@@ -159,6 +162,7 @@ def evaluate_case(
         free_run=figures(target, simulated, model.output_unit, counted),
         one_step=figures(target, predicted, model.output_unit, counted),
         run_time_s=float(np.median(seconds)),
+        first=begun.first,
         time=trace.time[scored],
         target=target,
         simulated=simulated,

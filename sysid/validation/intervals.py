@@ -181,7 +181,7 @@ def predict_interval(
         )
     if not 0.0 < level < 1.0:
         raise ConfigError("not a probability", where="level", expected="between 0 and 1", got=level)
-    experiment = Experiment.from_trace(trace, fit.model.mapping, start or Start(), fit.model.rest_output)
+    experiment = Experiment.for_model(trace, fit.model, start or Start())
     closed = loop is Loop.CLOSED
     model, inputs, history = fit.model, experiment.inputs, experiment.history
     output = model.simulate(inputs, history) if closed else model.predict(inputs, experiment.output, history)

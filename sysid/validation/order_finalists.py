@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.order_search import OrderLosses
 from sysid.estimation.result import FitResult
-from sysid.models import Mapping, Start
+from sysid.models import Mapping, Start, beginning
 from sysid.traces import Trace
 from sysid.validation.metrics import Figures, figures, mean_fit
 
@@ -136,7 +136,7 @@ def free_run_figures(fit: FitResult, case: Trace, start: Start) -> Figures:
     """
     model = fit.model
     inputs, target = case.columns(model.mapping.inputs), case.columns([model.mapping.output])[:, 0]
-    history = start.history(inputs, target, model.rest_output)
-    scored = slice(start.n_measured, None)
-    output: NDArray[np.float64] = model.simulate(inputs[scored], history)
+    begun = beginning(model, inputs, target, start, case.usable_samples)
+    scored = slice(begun.first, None)
+    output: NDArray[np.float64] = model.simulate(inputs[scored], begun.history)
     return figures(target[scored], output, model.output_unit, case.usable_samples[scored])

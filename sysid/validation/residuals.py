@@ -24,7 +24,7 @@ from scipy import stats
 from scipy.fft import irfft, next_fast_len, rfft
 
 from sysid.errors import TraceError
-from sysid.models import AbstractModel, Start
+from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Trace
 
 REACH = 20
@@ -208,8 +208,8 @@ def analyse_residuals(
 
 def _record(model: AbstractModel, trace: Trace, start: Start, free_run: bool) -> _Record:
     inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
-    history = start.history(inputs, target, model.rest_output)
-    scored = slice(start.n_measured, None)
+    begun = beginning(model, inputs, target, start, trace.usable_samples)
+    history, scored = begun.history, slice(begun.first, None)
     inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
     output = model.simulate(inputs, history) if free_run else model.predict(inputs, target, history)
     return _Record(np.where(counted, target - output, 0.0), inputs, counted)

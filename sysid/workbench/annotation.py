@@ -14,7 +14,6 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from sysid.errors import ConfigError
-from sysid.models import Start
 from sysid.traces import Trace, TraceSet
 from sysid.validation import CaseResult, Evaluation
 from sysid.validation.metrics import figures
@@ -125,21 +124,20 @@ def weighted(trace: Trace, annotator: Annotator, weights: Mapping[str, float]) -
     return dataclasses.replace(trace, weights=of_samples / mean)
 
 
-def by_state(evaluation: Evaluation, traces: TraceSet, annotator: Annotator, start: Start) -> Evaluation:
+def by_state(evaluation: Evaluation, traces: TraceSet, annotator: Annotator) -> Evaluation:
     """An evaluation with the figures of the free run state by state.
 
     Args:
         evaluation: On annotated traces.
         traces: These.
         annotator: That annotated them.
-        start: How each free run began, and from which sample on it is scored.
 
     Returns:
         The same with ``by_state`` in each case.
     """
 
     def split(case: CaseResult) -> CaseResult:
-        trace, scored = traces[case.case], slice(start.n_measured, None)
+        trace, scored = traces[case.case], slice(case.first, None)
         states, counted = trace[annotator.channel][scored].astype(np.int64), trace.usable_samples[scored]
         found = {}
         for number, label in enumerate(annotator.labels):

@@ -114,22 +114,24 @@ def _start(value: object) -> Start:
     try:
         if isinstance(value, str) and value != StartKind.MEASURED.value:
             return Start(kind=StartKind(value))
-        if isinstance(value, Dict) and set(value) == {StartKind.MEASURED.value} and type(value["measured"]) is int:
-            return Start(kind=StartKind.MEASURED, n_measured=value["measured"])
+        if isinstance(value, Dict) and len(value) == 1 and set(value) <= {"measured", "estimated"}:
+            ((kind, n),) = value.items()
+            if type(n) is int:
+                return Start(kind=StartKind(kind), n_measured=n)
     except ConfigError as error:
         raise as_field_error(error) from error
     except ValueError:
         pass
     raise FieldError(
         "not a way to start a free run",
-        expected="rest, first-sample, or {measured: 50} for 50 measured samples",
+        expected="estimated, rest, first-sample, or {measured: 50} for 50 measured samples",
         got=repr(value),
-        remedy="choose one of the three",
+        remedy="choose one of the four, or leave start out: it is then estimated",
     )
 
 
 def _start_text(start: Start) -> str | dict[str, int]:
-    return {"measured": start.n_measured} if start.kind is StartKind.MEASURED else start.kind.value
+    return {start.kind.value: start.n_measured} if start.n_measured else start.kind.value
 
 
 def _mapping(value: object) -> Mapping:
@@ -171,8 +173,9 @@ StartField = Annotated[
     WithJsonSchema(
         {
             "anyOf": [
-                {"enum": ["rest", "first-sample"]},
+                {"enum": ["estimated", "rest", "first-sample"]},
                 {"type": "object", "properties": {"measured": {"type": "integer", "minimum": 1}}},
+                {"type": "object", "properties": {"estimated": {"type": "integer", "minimum": 1}}},
             ]
         }
     ),

@@ -17,7 +17,7 @@ from sysid.testing import first_order_record
 from sysid.traces import Role, TraceSet
 from sysid.validation import evaluate
 
-FROM_FIRST = Start(kind=StartKind.FIRST_SAMPLE)
+ESTIMATED = Start(kind=StartKind.ESTIMATED)
 
 
 @pytest.fixture(scope="module")
@@ -46,15 +46,15 @@ def test_an_unknown_word_is_an_attribute_error() -> None:
 def test_the_short_way_gives_what_the_long_one_gives(traces: TraceSet) -> None:
     orders = sysid.ARX(na=1, nb=(1,), nk=(1,))
     short = sysid.fit(traces, "u -> y", orders)
-    long = fit_arx(traces.traces, Mapping.parse("u -> y"), orders, start=FROM_FIRST)
+    long = fit_arx(traces.traces, Mapping.parse("u -> y"), orders, start=ESTIMATED)
     assert short.model.to_dict() == long.model.to_dict()
     network, training = sysid.NARX(input_delays=1, output_delays=1, neurons=2), sysid.Training(max_iterations=5)
     shorter = sysid.fit(traces, "u -> y", network, training)
-    longer = fit_narx(traces.traces, Mapping.parse("u -> y"), network, training, start=FROM_FIRST)
+    longer = fit_narx(traces.traces, Mapping.parse("u -> y"), network, training, start=ESTIMATED)
     assert shorter.model.to_dict() == longer.model.to_dict()
     compared = sysid.compare(traces, short, shorter, short)
     assert list(compared.evaluations) == ["ARX [1; 1; 1]", "NARX 1/1/2", "ARX [1; 1; 1] (3)"]
-    figures = evaluate(long.model, traces, FROM_FIRST).cases["record"].free_run
+    figures = evaluate(long.model, traces, ESTIMATED).cases["record"].free_run
     assert compared.evaluations["ARX [1; 1; 1]"].cases["record"].free_run == figures
     assert f"{figures.nrmse_fit:.2f}" in str(compared).splitlines()[1]
 

@@ -166,7 +166,12 @@ class _Problem(AbstractProblem):
     training: TransferFunctionTraining
     terms: Terms
 
-    def provider(self, delays: tuple[int, ...]) -> SeparableProvider:
+    def provider(
+        self,
+        delays: tuple[int, ...],
+        *,
+        unknown: int | None = None,  # noqa: ARG002 - spectra have no first samples
+    ) -> SeparableProvider:
         """The least-squares problem with these dead times; see the base class."""
         return SeparableProvider(
             poles=self.pole_parameters(self._span),

@@ -40,7 +40,8 @@ def fit_transfer_function(
     """Fit a transfer function to the free run.
 
     The state before each trace is the equilibrium at its first inputs for a start at rest, or with the first sample
-    held; for a measured start it is fitted beside the parameters, and the measured samples count.
+    held; for an estimated or a measured start it is fitted beside the parameters, and all samples count but those
+    whose input, a dead time ago, came before the record.
 
     Args:
         traces: Estimation traces.
@@ -105,12 +106,12 @@ class _Problem(AbstractProblem):
     training: TransferFunctionTraining
     terms: Terms
 
-    def provider(self, delays: tuple[int, ...]) -> SeparableProvider:
+    def provider(self, delays: tuple[int, ...], *, unknown: int | None = None) -> SeparableProvider:
         """The least-squares problem with these dead times; see the base class."""
         return SeparableProvider(
             poles=self.pole_parameters(max(len(e.output) for e in self.experiments)),
             n_zeros=self.orders.zeros,
-            records=tuple(self._record(experiment, delays) for experiment in self.experiments),
+            records=self._records(delays, max(delays) if unknown is None else unknown),
             constant=self.orders.intercept,
         )
 
@@ -127,9 +128,22 @@ class _Problem(AbstractProblem):
             seed=self.training.seed,
         )
 
-    def _record(self, experiment: Experiment, delays: tuple[int, ...]) -> TimeRecord:
-        """A record with its history put before it where that is longer than one sample at rest."""
-        measured = len(experiment.history.output) > 1
+    def _records(self, delays: tuple[int, ...], unknown: int) -> tuple[TimeRecord, ...]:
+        """Records whose first samples are left out where an input a dead time ago would come before a record."""
+        known = [self._record(experiment, delays, unknown) for experiment in self.experiments]
+        records = tuple(record for record in known if len(record.target))
+        if not records:
+            raise TraceError(
+                "no record is longer than the dead time",
+                expected=f"more than {unknown} samples",
+                got=f"{max(len(e.output) for e in self.experiments)} samples",
+                remedy="shorten the dead times, or use longer records",
+            )
+        return records
+
+    def _record(self, experiment: Experiment, delays: tuple[int, ...], unknown: int) -> TimeRecord:
+        """A record with its measured history put before it."""
+        measured = experiment.past is not None and experiment.past.any()
         inputs, output = experiment.inputs, experiment.output
         weights = np.ones(len(output)) if experiment.weights is None else experiment.weights
         past = experiment.history.inputs[0]
@@ -142,14 +156,16 @@ class _Problem(AbstractProblem):
             np.concatenate([np.full(min(k, len(scaled)), held[j]), scaled[: max(len(scaled) - k, 0), j]])
             for j, k in enumerate(delays)
         ]
+        rows = slice(unknown if experiment.free else 0, None)
         return TimeRecord(
-            inputs=np.asfortranarray(np.column_stack(columns)),
-            past=held,
-            target=self.scaling.scale_output(output),
-            root_weights=np.sqrt(weights),
+            inputs=np.asfortranarray(np.column_stack(columns)[rows]),
+            # From a state that is fitted any past can be reached, and zero is one that every system has.
+            past=np.zeros(len(held)) if experiment.free else held,
+            target=self.scaling.scale_output(output)[rows],
+            root_weights=np.sqrt(weights)[rows],
             domain=self.orders.domain,
             sample_time=self.terms.sample_time,
-            free_start=measured,
+            free_start=experiment.free,
         )
 
 

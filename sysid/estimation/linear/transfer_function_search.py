@@ -127,11 +127,13 @@ class AbstractProblem(ABC):
     terms: Terms
 
     @abstractmethod
-    def provider(self, delays: tuple[int, ...]) -> SeparableProvider:
+    def provider(self, delays: tuple[int, ...], *, unknown: int | None = None) -> SeparableProvider:
         """The least-squares problem with these dead times.
 
         Args:
             delays: In samples, one per input.
+            unknown: First samples of each record that do not count because an input came before it; by default the
+                longest dead time. Dead times are compared on the same samples.
 
         Returns:
             The problem.

@@ -30,7 +30,7 @@ from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import AbstractProvider
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import Loop, Status
-from sysid.models import NARXModel, NeuralStateSpaceModel, Start
+from sysid.models import NARXModel, NeuralStateSpaceModel, Start, beginning
 from sysid.traces import Trace
 
 RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
@@ -363,7 +363,8 @@ def score(race: Race, model: Network) -> float:
     errors = []
     for trace in race.selection:
         inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
-        n, history = race.start.n_measured, race.start.history(inputs, target, model.rest_output)
+        begun = beginning(model, inputs, target, race.start, trace.usable_samples)
+        n, history = begun.first, begun.history
         if race.training.loop is Loop.CLOSED:
             output = model.simulate(inputs[n:], history)
         else:

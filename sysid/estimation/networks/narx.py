@@ -79,7 +79,8 @@ def fit_narx(
     training, start = training or Training(), start or Start()
     committee.check(training, selection)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
-    experiments = experiments_of(traces, mapping, start, rest)
+    lags = network.lags(len(mapping.inputs))
+    experiments = tuple(e.from_measured(lags) for e in experiments_of(traces, mapping, start, rest))
     experiments = (*experiments, *_offset(experiments, mapping, training))
     task = _Task.of(_template(traces[0], mapping, network, experiments, rest), experiments, training)
     race = starts.Race(
@@ -115,7 +116,9 @@ def fit_narx(
         stride=training.stride,
     )
     if posterior is not None:
-        posterior = calibrate(posterior, chosen.model, experiments_of(selection, mapping, start, rest))
+        posterior = calibrate(
+            posterior, chosen.model, [Experiment.for_model(t, chosen.model, start) for t in selection]
+        )
     seconds = race.checkpoints.earlier_s + time.perf_counter() - began
     fit = raced_result(choice, list(tasks), training, status, seconds)
     return replace(fit, posterior=posterior)

@@ -39,9 +39,9 @@ class _Record:
 class NeuralProvider(AbstractProvider):
     """Residuals of a :class:`NeuralForm` in free run.
 
-    The parameters are the form's, followed by the initial states of those records whose history holds more than one
-    sample: such a record begins where its history does, its state there is estimated, and the history's samples count
-    like the others. Where the history is a single sample, the state is the form's for a system that has stood there.
+    The parameters are the form's, followed by the initial states of those records of which nothing is declared before
+    their first measured sample: such a record begins where its history does, its state there is estimated, and the
+    history's samples count like the others. Elsewhere the state is the form's for a system that has stood there.
 
     Args:
         template: Sizes, flags, scaling and bounds; its parameters are ignored.
@@ -69,7 +69,7 @@ class NeuralProvider(AbstractProvider):
 
     def _record(self, experiment: Experiment, at: int) -> _Record:
         history, scaling = experiment.history, self.template.scaling
-        n_past = 0 if len(history.output) == 1 else len(history.output)
+        n_past = len(history.output) if experiment.past is not None and experiment.past.any() else 0
         u = np.concatenate([history.inputs[:n_past], experiment.inputs])
         target = np.concatenate([history.output[:n_past], experiment.output])
         roots = None
@@ -85,7 +85,7 @@ class NeuralProvider(AbstractProvider):
             target=scaling.scale_output(target),
             root_weights=roots,
             oldest=oldest,
-            free=slice(at, at + self.template.sizes.states) if n_past else None,
+            free=slice(at, at + self.template.sizes.states) if experiment.free else None,
         )
 
     @property

@@ -44,9 +44,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import TraceError
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.kernels import recursion as kernel
-from sysid.models import History, Lags, Mapping, Recursion, Scaling, Start
+from sysid.models import (
+    AbstractModel,
+    Beginning,
+    History,
+    Lags,
+    Mapping,
+    Recursion,
+    Scaling,
+    Start,
+    StartKind,
+    beginning,
+)
 from sysid.traces import Trace
 
 BLOCK = 1024
@@ -87,7 +99,8 @@ class Experiment:
             rest_output: Output at rest.
 
         Returns:
-            The experiment, without the samples that became history.
+            The experiment, without the samples that became history. For an estimated start it is the whole record,
+            before which nothing is known.
 
         Raises:
             ChannelError: If the trace lacks a channel of the mapping.
@@ -95,7 +108,42 @@ class Experiment:
         """
         inputs, output = trace.columns(mapping.inputs), trace.columns([mapping.output])[:, 0]
         history = start.history(inputs, output, rest_output, trace.usable_samples)
+        if start.kind is StartKind.ESTIMATED:
+            return cls._of(trace, inputs, output, Beginning(history=history, first=0), np.zeros(1, dtype=np.bool_))
         n = start.n_measured
+        past = trace.usable_samples[:n] if n else None
+        return cls._of(trace, inputs, output, Beginning(history=history, first=n), past)
+
+    @classmethod
+    def for_model(cls, trace: Trace, model: AbstractModel, start: Start) -> Experiment:
+        """The record of one trace as the free run of a model goes over it, from where that begins.
+
+        Args:
+            trace: The trace.
+            model: The model, whose initial state is estimated where the start says so.
+            start: Where its history comes from.
+
+        Returns:
+            The experiment, without the samples before the first that is scored.
+
+        Raises:
+            ChannelError: If the trace lacks a channel of the model's mapping.
+            TraceError: If the trace is not longer than a measured start.
+        """
+        inputs, output = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
+        begun = beginning(model, inputs, output, start, trace.usable_samples)
+        return cls._of(trace, inputs, output, begun, trace.usable_samples[: begun.first] if begun.first else None)
+
+    @classmethod
+    def _of(
+        cls,
+        trace: Trace,
+        inputs: NDArray[np.float64],
+        output: NDArray[np.float64],
+        begun: Beginning,
+        past: NDArray[np.bool_] | None,
+    ) -> Experiment:
+        n = begun.first
         usable = trace.usable_samples[n:]
         weights = None if usable.all() else usable.astype(np.float64)
         if trace.weights is not None:
@@ -103,10 +151,47 @@ class Experiment:
         return cls(
             inputs=inputs[n:],
             output=output[n:],
-            history=history,
+            history=begun.history,
             weights=weights,
             usable=None if usable.all() else usable,
-            past=trace.usable_samples[:n] if n else None,
+            past=past,
+        )
+
+    @property
+    def free(self) -> bool:
+        """Whether the state before the record is estimated: nothing was declared of what came before it."""
+        return self.past is not None
+
+    def from_measured(self, lags: Lags) -> Experiment:
+        """The same record from where all lags of a row are in it, its first samples being the history.
+
+        Args:
+            lags: What a row looks at.
+
+        Returns:
+            The record; as it is where its history is declared or measured.
+
+        Raises:
+            TraceError: If the record is no longer than the lags.
+        """
+        n = max(lags.depth, 1)
+        if self.past is None or self.past.any():
+            return self
+        if len(self.output) <= n:
+            raise TraceError(
+                "the record is too short for its lags",
+                expected=f"more than {n} samples",
+                got=f"{len(self.output)} samples",
+                remedy="use fewer or shorter lags, or a longer record",
+            )
+        usable = np.ones(len(self.output), dtype=np.bool_) if self.usable is None else self.usable
+        return Experiment(
+            inputs=self.inputs[n:],
+            output=self.output[n:],
+            history=History(inputs=self.inputs[:n], output=self.output[:n]),
+            weights=None if self.weights is None else self.weights[n:],
+            usable=None if self.usable is None else self.usable[n:],
+            past=usable[:n],
         )
 
     def one_step(self, lags: Lags) -> Experiment:
@@ -277,6 +362,7 @@ class RecursionProvider(AbstractProvider):
         object.__setattr__(self, "n_samples", int(sum(counted)))
 
     def _record(self, experiment: Experiment) -> _Record:
+        experiment = experiment.from_measured(self.template.lags)
         if not self.closed:
             experiment = experiment.one_step(self.template.lags)
         elif self.horizon is not None:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_v
 from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import Training
-from sysid.models import ARX, NARX, NeuralStateSpace, Start, TransferFunction
+from sysid.models import ARX, NARX, NeuralStateSpace, Start, StartKind, TransferFunction
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
     STRICT,
@@ -148,7 +148,7 @@ class PipelineConfig(BaseModel):
     data: str
     selection: str | None = None
     mapping: MappingField
-    start: StartField = Start()
+    start: StartField = Start(kind=StartKind.ESTIMATED)
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
     fits: Annotated[tuple[FitConfig, ...], BeforeValidator(_as_list)] = Field(min_length=1)

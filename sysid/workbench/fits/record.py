@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from sysid.estimation import CascadeFit, FitResult, Posterior, Status
-from sysid.models import StartKind
 from sysid.reporting.results import SCHEMA_VERSION
 from sysid.traces import Role
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
@@ -103,6 +102,7 @@ def read_scores(folder: Path) -> Scores:
             free_run=_figures(fields["free_run"]),
             one_step=_figures(fields["one_step"]),
             run_time_s=fields["run_time_s"],
+            first=fields["begins_at"],
             intervals=CaseIntervals.from_dict(fields["coverage"], *(arrays[f"{name}/{signal}"] for signal in INTERVAL))
             if "coverage" in fields
             else None,
@@ -212,7 +212,7 @@ def results_document(
         }
         if data.selection
         else None,
-        "start": {"kind": start.kind.value, "n_measured": start.n_measured if start.kind is StartKind.MEASURED else 0},
+        "start": {"kind": start.kind.value, "n_measured": start.n_measured},
         "fits": [fit_record(ready, exports if ready.config.name == first else ()) for ready in fits],
         "best": asdict(choice) if choice else None,
         "linearity": linearity(fits),

@@ -224,7 +224,7 @@ def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
     evaluation = evaluate(fit.model, data.traces, config.start, posterior=fit.posterior)
     if config.annotate is not None:
         annotator = find_annotator(config.annotate.by, where="annotate, by")
-        evaluation = by_state(evaluation, data.traces, annotator, config.start)
+        evaluation = by_state(evaluation, data.traces, annotator)
     return Scores(
         evaluation=evaluation,
         selection_mse=float(np.mean(errors)) if errors else math.nan,

@@ -8,7 +8,7 @@ from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_v
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training
-from sysid.models import Start
+from sysid.models import Start, StartKind
 from sysid.reporting.sweep.record import FIGURES
 from sysid.workbench.fields import STRICT, MappingField, StartField, as_field_error
 from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig, ReportConfig
@@ -142,7 +142,7 @@ class SweepConfig(BaseModel):
     data: str
     selection: str | None = None
     mapping: MappingField
-    start: StartField = Start()
+    start: StartField = Start(kind=StartKind.ESTIMATED)
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
     structure: Annotated[

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from sysid.errors import SysidError
 from sysid.estimation import FitResult, Training, fit_narx
 from sysid.estimation.least_squares.checkpoint import Checkpoint
-from sysid.models import NARX, AbstractModel, Start
+from sysid.models import NARX, AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
@@ -200,8 +200,8 @@ def _scores(bench: Bench, model: AbstractModel) -> dict[str, Any]:
 
 def _case(model: AbstractModel, trace: Trace, start: Start, repeats: int) -> dict[str, float]:
     inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
-    history = start.history(inputs, target, model.rest_output)
-    n = start.n_measured
+    begun = beginning(model, inputs, target, start, trace.usable_samples)
+    history, n = begun.history, begun.first
     inputs, target, counted = inputs[n:], target[n:], trace.usable_samples[n:]
     simulated, predicted = model.simulate(inputs, history), model.predict(inputs, target, history)
     figures = {

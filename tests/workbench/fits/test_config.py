@@ -58,7 +58,7 @@ def test_what_is_left_out_has_a_default() -> None:
     config = parse_pipeline(
         "name: a\ndata: d\nmapping: u -> y\nfits: [{name: f, structure: {kind: ARX, na: 1, nb: [1], nk: [0]}}]"
     )
-    assert config.start.kind is StartKind.REST
+    assert config.start.kind is StartKind.ESTIMATED
     assert config.rest_output is None
     assert config.selection is None
     assert config.export is not None
