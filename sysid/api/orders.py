@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sysid.api.comparison import FROM_FIRST_SAMPLE
+from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit
 from sysid.errors import ConfigError
 from sysid.estimation.linear import order_search
@@ -168,7 +168,7 @@ def search_orders(
     max_na: int | None = None,
     max_nb: int | None = None,
     max_nk: int | None = None,
-    start: Start = FROM_FIRST_SAMPLE,
+    start: Start = ESTIMATED,
     workers: int = 2,
 ) -> OrderSearch:
     """Search the orders of an ARX model: the exact loss of every candidate, and the free run of the best of each size.
