@@ -16,7 +16,7 @@ from typing import Any
 __version__ = "0.1.0"
 
 WORDS = (
-    *("data", "load", "fit", "compare", "save", "search_orders", "Comparison", "Fit", "SystemFit"),
+    *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
     *("ARX", "NARX", "NeuralStateSpace", "TransferFunction", "Training", "Start", "Role"),
 )
 """What is imported when it is first used: ``sysid --help`` loads none of it."""

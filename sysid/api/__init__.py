@@ -21,11 +21,11 @@ from sysid.api.comparison import Comparison, compare
 from sysid.api.fits import Fit, SystemFit
 from sysid.api.fitting import fit, load
 from sysid.api.orders import OrderSearch, search_orders
-from sysid.api.saving import save
+from sysid.api.saving import read_bundle, save
 from sysid.estimation import Training
 from sysid.ingest.arrays import data
 from sysid.models import ARX, NARX, NeuralStateSpace, Start, TransferFunction
 from sysid.traces import Role
 
 __all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "OrderSearch", "Role", "Start", "SystemFit"]
-__all__ += ["Training", "TransferFunction", "compare", "data", "fit", "load", "save", "search_orders"]
+__all__ += ["Training", "TransferFunction", "compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]

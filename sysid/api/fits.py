@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.errors import ChannelError, TraceError
 from sysid.estimation import FitResult
-from sysid.ingest.arrays import columns_by_name
+from sysid.ingest.arrays import inputs_of
 from sysid.models import Cascade, History, Start
-from sysid.traces import Role, Trace, TraceSet
+from sysid.traces import Role, TraceSet
 from sysid.validation.residuals import ResidualAnalysis, analyse_residuals
 
 if TYPE_CHECKING:
@@ -226,39 +226,3 @@ class SystemFit:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"
-
-
-def inputs_of(values: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
-    """Inputs as a matrix in a mapping's order.
-
-    Args:
-        values: An array, a frame, a dict of columns, or a trace; for a model without input the number of samples.
-        names: The inputs.
-
-    Returns:
-        Shape ``(n_samples, n_inputs)``, float64.
-
-    Raises:
-        ChannelError: If one is missing.
-        ConfigError: If an array has another number of columns.
-    """
-    if isinstance(values, Trace):
-        return values.columns(names)
-    if not names and isinstance(values, int):
-        return np.zeros((values, 0))
-    named = columns_by_name(values)
-    if named is not None:
-        missing = [name for name in names if name not in named]
-        if missing:
-            raise ChannelError(missing, list(named), where="the inputs of a simulation")
-        return np.column_stack([np.asarray(named[name], dtype=np.float64) for name in names])
-    array = np.asarray(values.detach().cpu() if hasattr(values, "detach") else values, dtype=np.float64)
-    array = array[:, None] if array.ndim == 1 else array
-    if array.ndim != 2 or array.shape[1] != len(names):
-        raise ConfigError(
-            "the inputs do not match the model",
-            expected=f"shape (n_samples, {len(names)}), for {', '.join(names)}",
-            got=f"shape {np.shape(values)}",
-            remedy="give one column an input, in this order, or columns by name",
-        )
-    return array

@@ -44,3 +44,20 @@ def save(
         return export_bundle(fit.model, traces, Path(folder), outputs=fit.outputs, formats=formats, fits=dict(fits))
     begun = start or (fit.start if isinstance(fit, Fit) else Start())
     return export_bundle(fit, traces, Path(folder), start=begun, formats=formats)
+
+
+def read_bundle(folder: str | Path) -> Bundle:
+    """Read a bundle: what :func:`save` wrote, or ``sysid run``.
+
+    Args:
+        folder: The folder, or its zip.
+
+    Returns:
+        The bundle; ``bundle.simulate(u)`` runs it over an array or a frame.
+
+    Raises:
+        BundleError: If it is damaged or incomplete.
+    """
+    from sysid.export import read_bundle as read
+
+    return read(Path(folder))

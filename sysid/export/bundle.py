@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sysid.atomic import replacing
-from sysid.errors import ConfigError
+from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.result import FitResult
 from sysid.export.archive import write_archive
 from sysid.export.card import model_card
@@ -39,6 +39,7 @@ from sysid.export.parity import check_parity, parity_cases, random_cases
 from sysid.export.stability import WORST, check_free_run, state_stability
 from sysid.export.surrogate import Surrogate
 from sysid.export.verification import write_verification
+from sysid.ingest.arrays import inputs_of
 from sysid.models import AbstractModel, Cascade, Start
 from sysid.models.wiring import Member, Wiring
 from sysid.traces import TraceSet
@@ -94,6 +95,37 @@ class Bundle:
     def outputs(self) -> tuple[dict[str, Any], ...]:
         """The same of each output; before version 3 there was one."""
         return tuple(self.metadata.get("outputs") or [self.metadata["output"]])
+
+    def simulate(self, u: Any, *, initial: float | Dict[str, float] | None = None) -> Any:
+        """Free run of the model over inputs that are in memory.
+
+        Args:
+            u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the bundle's order, or a frame
+                or dict with columns by name, in the bundle's units.
+            initial: Output before the first sample, in its unit, or one for each output by name; the declared levels
+                where nothing is said.
+
+        Returns:
+            For a pandas frame a frame of the outputs with the same index; else an array of shape ``(n_samples,)``, or
+            ``(n_samples, n_outputs)`` where there are several.
+
+        Raises:
+            ChannelError: If an input is missing, or ``initial`` names no output.
+            ConfigError: If an array has another number of columns.
+        """
+        names = tuple(str(entry["name"]) for entry in self.outputs)
+        inputs = inputs_of(u, tuple(str(entry["name"]) for entry in self.inputs))
+        surrogate = Surrogate.of(self.model, {}, outputs=names)
+        given = dict(initial) if isinstance(initial, Dict) else {} if initial is None else dict.fromkeys(names, initial)
+        strangers = [name for name in given if name not in names]
+        if strangers:
+            raise ChannelError(strangers, names, where="initial")
+        levels = surrogate.chosen(surrogate.rest(inputs[0])[np.newaxis])[0]
+        begun = np.array([given.get(name, level) for name, level in zip(names, levels, strict=True)], dtype=np.float64)
+        found = surrogate.chosen(surrogate.compute(inputs, surrogate.rest(inputs[0], begun)))
+        if hasattr(u, "columns") and hasattr(u, "index"):
+            return type(u)(found, index=u.index, columns=list(names))
+        return found[:, 0] if len(names) == 1 else found
 
 
 def export_bundle(

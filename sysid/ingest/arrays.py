@@ -164,6 +164,42 @@ def columns_by_name(values: Any) -> dict[str, NDArray[Any]] | None:
     return {name: values[name] for name in fields} if fields else None
 
 
+def inputs_of(values: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
+    """Inputs as a matrix in a mapping's order.
+
+    Args:
+        values: An array, a frame, a dict of columns, or a trace; for a model without input the number of samples.
+        names: The inputs.
+
+    Returns:
+        Shape ``(n_samples, n_inputs)``, float64.
+
+    Raises:
+        ChannelError: If one is missing.
+        ConfigError: If an array has another number of columns.
+    """
+    if isinstance(values, Trace):
+        return values.columns(names)
+    if not names and isinstance(values, int):
+        return np.zeros((values, 0))
+    named = columns_by_name(values)
+    if named is not None:
+        missing = [name for name in names if name not in named]
+        if missing:
+            raise ChannelError(missing, list(named), where="the inputs of a simulation")
+        return np.column_stack([np.asarray(named[name], dtype=np.float64) for name in names])
+    array = np.asarray(_array(values), dtype=np.float64)
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or array.shape[1] != len(names):
+        raise ConfigError(
+            "the inputs do not match the model",
+            expected=f"shape (n_samples, {len(names)}), for {', '.join(names)}",
+            got=f"shape {np.shape(values)}",
+            remedy="give one column an input, in this order, or columns by name",
+        )
+    return array
+
+
 def _of_matrix(
     matrix: NDArray[Any], inputs: tuple[str, ...] | None, outputs: tuple[str, ...] | None, *, where: str
 ) -> dict[str, NDArray[Any]]:

@@ -13,7 +13,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 import sysid
-from sysid.api.fits import inputs_of
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.models import History
 
@@ -113,11 +112,22 @@ def test_several_outputs_are_one_system(system: sysid.SystemFit) -> None:
         system.simulate(U, initial={"x": 0.0})
 
 
+def test_a_bundle_runs_arrays_and_frames(fit: sysid.Fit, system: sysid.SystemFit, tmp_path: Path) -> None:
+    single = fit.save(tmp_path / "one", formats=("onnx",))
+    assert_allclose(single.simulate(U, initial=0.0), Y, atol=1e-12)
+    assert_allclose(sysid.read_bundle(tmp_path / "one").simulate(U), fit.simulate(U), atol=1e-12)
+    index = pd.timedelta_range("0s", periods=len(U), freq="100ms")
+    frame = single.simulate(pd.DataFrame({"u": U}, index=index), initial=0.0)
+    assert list(frame.columns) == ["y"] and frame.index.equals(index)
+    both = system.save(tmp_path / "two", formats=("onnx",))
+    assert_allclose(both.simulate(U, initial={"y": 0.0, "z": 1.0}), np.column_stack([Y, 2.0 * Y + 1.0]), atol=1e-10)
+    with pytest.raises(ConfigError, match="do not match the model"):
+        single.simulate(np.zeros((10, 2)))
+    with pytest.raises(ChannelError):
+        both.simulate(U, initial={"x": 0.0})
+
+
 def test_several_outputs_are_saved_as_one_file(system: sysid.SystemFit, tmp_path: Path) -> None:
     bundle = system.save(tmp_path / "bundle", formats=("onnx",))
     assert [output["name"] for output in bundle.outputs] == ["y", "z"]
     assert {file.name for file in bundle.files} == {"step.onnx", "sequence.onnx"}
-
-
-def test_inputs_stand_in_the_order_of_the_mapping() -> None:
-    assert_array_equal(inputs_of({"b": [2.0], "a": [1.0]}, ("a", "b")), [[1.0, 2.0]])
