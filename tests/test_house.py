@@ -75,8 +75,6 @@ def test_imports_point_one_way(file: Path) -> None:
     others = own - {room} - WORDS - {"__version__"}
     # A file at the top is for every room and may import none, but for those with a rule of their own.
     allowed = MAY_IMPORT.get(parts[0], set())
-    if parts[0] == "composite":
-        allowed = allowed | {"workbench"}  # until its files have been cut from the YAML they were made for
     assert others <= allowed, f"{parts[0]} may not import {', '.join(sorted(others - allowed))}"
 
 

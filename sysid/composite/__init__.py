@@ -1,1 +1,75 @@
-"""Several models as one system: fitted each alone, chosen together, trained through each other, proven as a whole."""
+"""Several models as one system: fitted each alone, chosen together, trained through each other, proven as a whole.
+
+Declare the members and how they are wired (:class:`Composite`), say how they are trained (:class:`TrainingPlan`), and
+call :func:`train`; or call its stages one by one: :func:`fit_member`, :func:`choose_together`, :func:`retrain`,
+:func:`train_round`, :func:`grow`. :func:`stress` puts the whole to a Monte Carlo test.
+
+Nothing here knows a run folder, a screen or a tracker: a :class:`Keeper` is given from outside.
+"""
+
+from sysid.composite.active_learning import Growth, Look, grow, sequence_errors
+from sysid.composite.candidates import Candidate, Candidates, fit_candidates
+from sysid.composite.composite import Composite, FixedMember, Member, Standing
+from sysid.composite.fixed_members import fixed_model, with_fixed
+from sysid.composite.keeper import Keeper, MakeAll, Task
+from sysid.composite.limit_check import LimitCheck, check_limits
+from sysid.composite.limits_held import Holding, holding
+from sysid.composite.members import assembled, dealt, own_traces, simulated_inputs, whole_score
+from sysid.composite.monte_carlo import Stress, stress
+from sysid.composite.plan import ActiveLearning, OneStep, Retraining, RoundPlan, TrainingPlan
+from sysid.composite.rehearsal import rehearse
+from sysid.composite.round import JointRound, TrainedRound, train_round
+from sysid.composite.stages import Choice, choose_together, fit_member, model_of, one_step_of, reading_more, retrain
+from sysid.composite.training import Retrained, TrainedComposite, TrainingData, train
+from sysid.composite.warm_start import started_from
+
+__all__ = [
+    "ActiveLearning",
+    "Candidate",
+    "Candidates",
+    "Choice",
+    "Composite",
+    "FixedMember",
+    "Growth",
+    "Holding",
+    "JointRound",
+    "Keeper",
+    "LimitCheck",
+    "Look",
+    "MakeAll",
+    "Member",
+    "OneStep",
+    "Retrained",
+    "Retraining",
+    "RoundPlan",
+    "Standing",
+    "Stress",
+    "Task",
+    "TrainedComposite",
+    "TrainedRound",
+    "TrainingData",
+    "TrainingPlan",
+    "assembled",
+    "check_limits",
+    "choose_together",
+    "dealt",
+    "fit_candidates",
+    "fit_member",
+    "fixed_model",
+    "grow",
+    "holding",
+    "model_of",
+    "one_step_of",
+    "own_traces",
+    "reading_more",
+    "rehearse",
+    "retrain",
+    "sequence_errors",
+    "simulated_inputs",
+    "started_from",
+    "stress",
+    "train",
+    "train_round",
+    "whole_score",
+    "with_fixed",
+]

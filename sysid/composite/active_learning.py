@@ -1,10 +1,10 @@
-"""Grown by finding where the whole is worst: train, look, add the worst sequences to the training, train again.
+"""Active learning: find where the whole is worst, add such sequences to the training data, train again.
 
-The sequences come from a pool that is scored nowhere else. Its cases with ``role: estimation`` are what is added from;
-those with ``role: selection`` are never trained on, and say after each round what the added data brought. They choose
-with the other selection traces, among the states of a round and between the stages, each round being one: their figures
-are a little too good, and what counts in the end is sequences that had no say in anything. The whole begins each round,
-which trains it end to end, where the round before has left it.
+The sequences come from a pool that is scored nowhere else, or from a callable that makes them. Others are never trained
+on, and say after each round what the added data brought. They choose with the other selection traces, among the states
+of a round and between the stages, each round being one: their figures are a little too good, and what counts in the end
+is sequences that had no say in anything. The whole begins each round, which trains it end to end, where the round
+before has left it.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.composite.plan import ActiveLearning
 from sysid.models import Cascade
 from sysid.traces import Trace
-from sysid.workbench.assembly.stage_config import GrowConfig
 
 GROWN = "grown"
 """How the stages of growth are called in the report, with the number of the round."""
@@ -98,7 +98,7 @@ class Growth:
         ended: Why no further round was begun.
     """
 
-    asked: GrowConfig
+    asked: ActiveLearning
     rounds: tuple[Round, ...]
     held_out: int
     unit: str
@@ -136,6 +136,10 @@ Train = Callable[[Cascade, Sequence[Trace], int], tuple[Cascade, float]]
 """Trains a whole, from where it stands, on these traces in a round: the whole after it, and the seconds it took."""
 
 
+Make = Callable[[int], Sequence[Trace]]
+"""Makes the sequences that a round of this number adds from: runs of the reference on new inputs."""
+
+
 def sequence_errors(whole: Cascade, sequences: Sequence[Trace], outputs: Sequence[str]) -> NDArray[np.float64]:
     """Error of the free run of each sequence.
 
@@ -158,13 +162,13 @@ def sequence_errors(whole: Cascade, sequences: Sequence[Trace], outputs: Sequenc
 
 
 def grow(
-    asked: GrowConfig,
+    asked: ActiveLearning,
     whole: Cascade,
     train: Train,
     *,
     begins: str,
     estimation: Sequence[Trace],
-    pool: Sequence[Trace],
+    pool: Sequence[Trace] | Make,
     held_out: Sequence[Trace],
     score: Callable[[Cascade], float],
     report: Callable[[Round], Any] = lambda _: None,
@@ -177,7 +181,7 @@ def grow(
         train: Trains it end to end.
         begins: The stage of the report that it stands at.
         estimation: Traces that it was trained on last; every round has them too.
-        pool: Sequences to add from.
+        pool: Sequences to add from; or what makes the sequences that a round adds from, given its number.
         held_out: Sequences that say what a round has brought.
         score: The error by which stages are chosen.
         report: Told after every round.
@@ -185,7 +189,9 @@ def grow(
     Returns:
         What each round brought.
     """
-    left, traces, rounds = list(pool), list(estimation), list[Round]()
+    make = pool if callable(pool) else None
+    left = [] if callable(pool) else list(pool)
+    traces, rounds = list(estimation), list[Round]()
 
     def done(stage: str, added: Sequence[Trace], seconds: float) -> None:
         rounds.append(
@@ -203,11 +209,13 @@ def grow(
         report(rounds[-1])
 
     done(begins, (), 0.0)
-    while (ended := _ended(asked, rounds, len(left))) is None:
+    while (ended := _ended(asked, rounds, pool_left=make is not None or bool(left))) is None:
         number = len(rounds)
+        if make is not None:
+            left = list(make(number))
         added = _picked(asked, whole, left, asked.additions[number - 1])
         left = [trace for trace in left if trace not in added]
-        # Behind the others, not between them: where places take the traces in turn, each keeps its place.
+        # Behind the others, not between them: where instances take the traces in turn, each keeps its own.
         traces += added
         whole, seconds = train(whole, tuple(traces), number)
         done(f"{GROWN}, round {number}", added, seconds)
@@ -216,7 +224,7 @@ def grow(
     return Growth(asked=asked, rounds=tuple(rounds), held_out=len(held_out), unit=unit, ended=ended)
 
 
-def _picked(asked: GrowConfig, whole: Cascade, left: Sequence[Trace], count: int) -> list[Trace]:
+def _picked(asked: ActiveLearning, whole: Cascade, left: Sequence[Trace], count: int) -> list[Trace]:
     """What the next round adds: the worst of what is left of the pool, or what comes next."""
     if asked.pick == "next":
         return list(left[:count])
@@ -224,7 +232,7 @@ def _picked(asked: GrowConfig, whole: Cascade, left: Sequence[Trace], count: int
     return [left[i] for i in np.argsort(-errors, kind="stable")[:count]]
 
 
-def _ended(asked: GrowConfig, rounds: Sequence[Round], left: int) -> str | None:
+def _ended(asked: ActiveLearning, rounds: Sequence[Round], *, pool_left: bool) -> str | None:
     """Why no further round is begun; ``None`` if one is."""
     best = 0
     for done in rounds[1:]:
@@ -235,4 +243,4 @@ def _ended(asked: GrowConfig, rounds: Sequence[Round], left: int) -> str | None:
         return f"it ended after {idle} rounds that brought no improvement"
     if len(rounds) > len(asked.additions):
         return "it ended with the last round that was asked for"
-    return None if left else "it ended with the pool"
+    return None if pool_left else "it ended with the pool"

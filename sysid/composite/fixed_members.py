@@ -1,6 +1,6 @@
-r"""Known members: what is known of a system is declared, and only the rest is fitted.
+r"""Fixed submodels: what is known of a system is declared, and only the rest is fitted.
 
-A known member is a weighted sum of channels, held between two bounds: a valve that opens fully within one psi of its
+A fixed submodel is a weighted sum of channels, held between two bounds: a valve that opens fully within one psi of its
 setting, a limit switch, a difference that a member reads better than its two terms. Networks that stand beside it are
 fitted with it as one more measured channel; in the whole it runs on what the others put out, and nothing trains it.
 
@@ -26,17 +26,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.composite.members import bounds_of, placed, placed_outputs
+from sysid.composite.composite import FixedMember
+from sysid.composite.members import bounds_of, placed
 from sysid.models import NARX, Cascade, NARXModel, Scaling
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.member_config import KnownConfig
 
 
-def known_model(known: KnownConfig, like: Trace, units: Dict[str, str] | None = None) -> NARXModel:
-    """A declared member in its first place, as a network without neurons: it runs and is exported like the others.
+def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = None) -> NARXModel:
+    """A fixed submodel in its first instance, as a network without neurons: it runs and is exported like the others.
 
     Args:
-        known: What is declared.
+        fixed: What is declared.
         like: A trace with its inputs, for their units and the sample time.
         units: Units of inputs that the trace need not have.
 
@@ -46,41 +46,41 @@ def known_model(known: KnownConfig, like: Trace, units: Dict[str, str] | None = 
     Raises:
         ChannelError: If the trace lacks an input.
     """
-    inputs = known.mapping.inputs
-    lags = [sorted(one) for one in known.weights]
-    weights = [one[lag] for one, own in zip(known.weights, lags, strict=True) for lag in own]
+    inputs = fixed.mapping.inputs
+    lags = [sorted(one) for one in fixed.weights]
+    weights = [one[lag] for one, own in zip(fixed.weights, lags, strict=True) for lag in own]
     return NARXModel(
         network=NARX(input_delays=lags, output_delays=1, neurons=0),
-        theta=np.array([known.constant, *weights, known.memory]),
+        theta=np.array([fixed.constant, *weights, fixed.memory]),
         scaling=Scaling.identity(len(inputs)),
-        mapping=known.mapping,
+        mapping=fixed.mapping,
         sample_time=like.sample_time,
         input_units=tuple((units or {}).get(name) or like.channel(name).unit for name in inputs),
-        output_unit=known.unit,
-        rest_output=known.rest,
+        output_unit=fixed.unit,
+        rest_output=fixed.rest,
         clamp=np.inf,  # its bounds are limits of the whole: a model at its own bound counts as lost
     )
 
 
-def with_known(known: Sequence[KnownConfig], traces: Sequence[Trace]) -> list[Trace]:
-    """Traces with what the known members say of their measured channels, as further channels.
+def with_fixed(fixed: Sequence[FixedMember], traces: Sequence[Trace]) -> list[Trace]:
+    """Traces with what fixed submodels say of their measured channels, as further channels.
 
     Args:
-        known: The known members; they may read each other, in a circle through the past too.
+        fixed: The submodels; they may read each other, in a circle through the past too.
         traces: Measured traces.
 
     Returns:
-        As many traces, the new channels in the order of the members, each in all its places.
+        As many traces, the new channels in the order of the submodels, each in all its instances.
 
     Raises:
-        ConfigError: If the known members cannot be wired.
+        ConfigError: If the submodels cannot be wired.
         ChannelError: If a trace lacks an input.
     """
-    bounds, units = bounds_of(known), {name: member.unit for member in known for name in placed_outputs(member)}
+    bounds, units = bounds_of(fixed), {name: one.unit for one in fixed for name in one.outputs}
 
     def one(trace: Trace) -> Trace:
-        first = [(member, known_model(member, trace, units)) for member in known]
-        declared = tuple(placed(member, model, place) for member, model in first for place in member.places)
+        first = [(member, fixed_model(member, trace, units)) for member in fixed]
+        declared = tuple(placed(member, model, there) for member, model in first for there in member.instances)
         run = Cascade(models=declared, limits=bounds).simulate_trace(trace)
         return replace(
             trace,
@@ -88,4 +88,4 @@ def with_known(known: Sequence[KnownConfig], traces: Sequence[Trace]) -> list[Tr
             values=np.column_stack([trace.values, *(run[name] for name in units)]),
         )
 
-    return [one(trace) for trace in traces] if known else list(traces)
+    return [one(trace) for trace in traces] if fixed else list(traces)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.composite.composite import Composite
 from sysid.composite.members import limits_of
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig
 
 ROUNDING = 1e-9
 """Share of the largest value of a channel below which it is as large as its limit."""
@@ -74,23 +74,23 @@ class LimitCheck:
         )
 
 
-def check_limits(config: AssemblyConfig, traces: Sequence[Trace]) -> LimitCheck:
+def check_limits(composite: Composite, traces: Sequence[Trace]) -> LimitCheck:
     """Hold measured traces against what is declared of their limits.
 
     Args:
-        config: The pipeline.
-        traces: Measured traces, with what the known members say; at least one.
+        composite: What is declared.
+        traces: Measured traces, with what the fixed submodels say; at least one.
 
     Returns:
         What came of it.
     """
-    return LimitCheck(limits=tuple(_limits_passed(config, traces)), traces=len(traces))
+    return LimitCheck(limits=tuple(_limits_passed(composite, traces)), traces=len(traces))
 
 
-def _limits_passed(config: AssemblyConfig, traces: Sequence[Trace]) -> list[Passed]:
+def _limits_passed(composite: Composite, traces: Sequence[Trace]) -> list[Passed]:
     """How far each limit that is a channel is passed; not in the first sample, before which nothing is known."""
     found = []
-    for output, limit in limits_of(config).items():
+    for output, limit in limits_of(composite).items():
         for sign, channel in ((-1.0, limit.low), (1.0, limit.high)):
             if not isinstance(channel, str) or not all({output, channel} <= set(t.channel_names) for t in traces):
                 continue

@@ -1,4 +1,4 @@
-"""Members: where each stands, on which traces it is fitted, and how it is put in its places."""
+"""Members put in their instances and wired, the traces that each is fitted on, and how well the whole does."""
 
 from __future__ import annotations
 
@@ -12,76 +12,49 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sysid.models import Cascade, Ends, Limit, Mapping, NARXModel
+from sysid.composite.composite import Composite, FixedMember, Standing
+from sysid.models import Cascade, Limit, Mapping, NARXModel
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.member_config import KnownConfig, MemberConfig, StandingConfig
 
 _T = TypeVar("_T")
 
 Members = dict[str, NARXModel]
-"""The members by the output of their first place, the known ones among them."""
+"""The members by the output of their first instance, the fixed ones among them."""
 
 
-def placed_name(member: StandingConfig, channel: str, place: str) -> str:
-    """Name of a member's channel in one of its places.
+def bounds_of(fixed: Sequence[FixedMember]) -> dict[str, Limit]:
+    """Between what fixed submodels are held.
+
+    Args:
+        fixed: The submodels.
+
+    Returns:
+        The limit of each of their outputs, in all their instances.
+    """
+    return {name: Limit(low=one.low, high=one.high) for one in fixed for name in one.outputs}
+
+
+def placed(member: Standing, model: NARXModel, instance: str) -> NARXModel:
+    """A member's model in one of its instances.
 
     Args:
         member: The member.
-        channel: The channel in the first place.
-        place: The place's suffix.
+        model: Its model, in the first instance's names.
+        instance: The instance's suffix.
 
     Returns:
-        The channel there.
-    """
-    return channel if channel in member.shared else f"{channel}{place}"
-
-
-def placed_outputs(member: StandingConfig) -> list[str]:
-    """What a member writes, place after place.
-
-    Args:
-        member: The member.
-
-    Returns:
-        As many channels as it has places.
-    """
-    return [placed_name(member, member.mapping.output, place) for place in member.places]
-
-
-def bounds_of(known: Sequence[KnownConfig]) -> dict[str, Limit]:
-    """Between what the known members are held.
-
-    Args:
-        known: The known members.
-
-    Returns:
-        The limit of each of their outputs, in all their places.
-    """
-    return {name: Limit(low=one.low, high=one.high) for one in known for name in placed_outputs(one)}
-
-
-def placed(member: StandingConfig, model: NARXModel, place: str) -> NARXModel:
-    """A member's model in one of its places.
-
-    Args:
-        member: The member.
-        model: Its model, in the first place's names.
-        place: The place's suffix.
-
-    Returns:
-        The same model over that place's channels.
+        The same model over that instance's channels.
     """
     # The model's, not the member's: it may read more than it was fitted with (reads).
-    inputs = tuple(placed_name(member, name, place) for name in model.mapping.inputs)
-    return replace(model, mapping=Mapping(inputs=inputs, output=placed_name(member, member.mapping.output, place)))
+    inputs = tuple(member.channel(name, instance) for name in model.mapping.inputs)
+    return replace(model, mapping=Mapping(inputs=inputs, output=member.channel(member.output, instance)))
 
 
-def assembled(config: AssemblyConfig, models: Members, *, without: str | None = None) -> Cascade:
-    """All members in all their places, wired.
+def assembled(composite: Composite, models: Members, *, without: str | None = None) -> Cascade:
+    """All members in all their instances, wired.
 
     Args:
-        config: The pipeline.
+        composite: What is declared.
         models: Their models.
         without: Output of a member that is left out: whoever reads it then reads what was measured.
 
@@ -91,16 +64,16 @@ def assembled(config: AssemblyConfig, models: Members, *, without: str | None = 
     Raises:
         ConfigError: If they cannot be wired.
     """
-    standing = (member for member in config.standing if member.mapping.output != without)
-    return wired(config, [placed(one, models[one.mapping.output], place) for one in standing for place in one.places])
+    standing = (member for member in composite.standing if member.output != without)
+    return wired(composite, [placed(one, models[one.output], there) for one in standing for there in one.instances])
 
 
-def wired(config: AssemblyConfig, models: Sequence[NARXModel]) -> Cascade:
-    """Models in their places as one, at rest and between limits as declared.
+def wired(composite: Composite, models: Sequence[NARXModel]) -> Cascade:
+    """Models in their instances as one, at rest and between limits as declared.
 
     Args:
-        config: The pipeline.
-        models: Over the channels of their places.
+        composite: What is declared.
+        models: Over the channels of their instances.
 
     Returns:
         The cascade.
@@ -110,29 +83,28 @@ def wired(config: AssemblyConfig, models: Sequence[NARXModel]) -> Cascade:
     """
     outputs = {model.mapping.output for model in models}
     read = {name for model in models for name in model.mapping.inputs}
-    rest = {name: level for name, level in config.rest.items() if name in outputs | read}
-    limits = {name: limit for name, limit in limits_of(config).items() if name in outputs}
-    return Cascade(models=tuple(models), rest=rest, limits=limits | bounds_of(config.known))
+    rest = {name: level for name, level in composite.rest.items() if name in outputs | read}
+    limits = {name: limit for name, limit in limits_of(composite).items() if name in outputs}
+    return Cascade(models=tuple(models), rest=rest, limits=limits | bounds_of(composite.fixed))
 
 
-def limits_of(config: AssemblyConfig) -> dict[str, Limit]:
-    """Between what the members are held: in each place as that is declared, or else as in the first.
+def limits_of(composite: Composite) -> dict[str, Limit]:
+    """Between what the members are held: in each instance as that is declared, or else as in the first.
 
     Args:
-        config: The pipeline.
+        composite: What is declared.
 
     Returns:
-        The limit of each output that has one; a limit that is a channel is the one at the same place.
+        The limit of each output that has one; a limit that is a channel is the one of the same instance.
     """
     found = {}
-    for member in config.members:
-        for place, name in zip(member.places, placed_outputs(member), strict=True):
-            asked = config.limits.get(name)
-            if asked is not None:
-                found[name] = Limit(low=asked.low, high=asked.high)
-            elif (first := config.limits.get(member.mapping.output)) is not None:
+    for member in composite.members:
+        for instance, name in zip(member.instances, member.outputs, strict=True):
+            if (asked := composite.limits.get(name)) is not None:
+                found[name] = asked
+            elif (first := composite.limits.get(member.output)) is not None:
                 low, high = (
-                    placed_name(member, one, place) if isinstance(one, str) else one for one in (first.low, first.high)
+                    member.channel(one, instance) if isinstance(one, str) else one for one in (first.low, first.high)
                 )
                 found[name] = Limit(low=low, high=high)
     return found
@@ -154,39 +126,40 @@ def dealt(sets: Sequence[Sequence[_T]]) -> list[_T]:
     return [trace for turn in zip_longest(*sets) for trace in turn if trace is not None]
 
 
-def own_traces(member: MemberConfig, traces: Sequence[Trace]) -> list[Trace]:
-    """What a member is fitted on: trace after trace, each in one of its places in turn.
+def own_traces(member: Standing, traces: Sequence[Trace]) -> list[Trace]:
+    """What a member is fitted on: trace after trace, each in one of its instances in turn.
 
     Args:
         member: The member.
         traces: Traces of the whole.
 
     Returns:
-        As many traces, with the member's channels under the names of its first place.
+        As many traces, with the member's channels under the names of its first instance.
     """
-    return [in_place(member, trace, member.places[i % len(member.places)]) for i, trace in enumerate(traces)]
+    count = len(member.instances)
+    return [at_instance(member, trace, member.instances[i % count]) for i, trace in enumerate(traces)]
 
 
-def in_place(member: MemberConfig, trace: Trace, place: str) -> Trace:
-    """A trace as a member sees it in one of its places.
+def at_instance(member: Standing, trace: Trace, instance: str) -> Trace:
+    """A trace as a member sees it in one of its instances.
 
     Args:
         member: The member.
         trace: A trace of the whole.
-        place: The place's suffix.
+        instance: The instance's suffix.
 
     Returns:
-        Its channels under the names of the first place.
+        Its channels under the names of the first instance.
     """
-    names = (*member.mapping.inputs, member.mapping.output)
-    return seen_from(place, trace, {name: placed_name(member, name, place) for name in names})
+    names = (*member.mapping.inputs, member.output)
+    return seen_from(instance, trace, {name: member.channel(name, instance) for name in names})
 
 
-def seen_from(place: str, trace: Trace, names: Dict[str, str]) -> Trace:
-    """A trace with the channels of one place under other names.
+def seen_from(instance: str, trace: Trace, names: Dict[str, str]) -> Trace:
+    """A trace with the channels of one instance under other names.
 
     Args:
-        place: The place's suffix, which the trace's name gets.
+        instance: The instance's suffix, which the trace's name gets.
         trace: A trace of the whole.
         names: Channel there by the name that it gets.
 
@@ -195,7 +168,7 @@ def seen_from(place: str, trace: Trace, names: Dict[str, str]) -> Trace:
     """
     return replace(
         trace,
-        name=f"{trace.name} {place}".strip(),
+        name=f"{trace.name} {instance}".strip(),
         channels=tuple(replace(trace.channel(old), name=new) for new, old in names.items()),
         values=trace.columns(list(names.values())),
     )
@@ -309,41 +282,3 @@ def whole_score(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str
         Geometric mean over traces and outputs of the mean squared error of the free run.
     """
     return score_of(free_runs(cascade, traces, outputs), traces, outputs)
-
-
-def written(config: AssemblyConfig, stages: Dict[str, Cascade]) -> dict[str, list[str]]:
-    """What the whole is made of, stage by stage: its networks, where they are others than in the stage before.
-
-    What is declared stands in the pipeline, and is the same in all stages: it is counted.
-
-    Args:
-        config: The pipeline.
-        stages: The whole after each stage.
-
-    Returns:
-        Of each stage its networks, each with what it reads and its structure, and how many other members there are.
-    """
-    found, before = {}, dict[str, str]()
-    for stage, whole in stages.items():
-        now = _members_written(config, whole)
-        if now.keys() != before.keys():
-            found[stage] = list(now.values())
-        else:
-            others = [said for name, said in now.items() if said != before[name]]
-            found[stage] = [*others, "the rest as before"] if others else ["all as before"]
-        before = now
-    return found
-
-
-def _members_written(config: AssemblyConfig, whole: Cascade) -> dict[str, str]:
-    """Each network by its output, and how many members are declared, or are what a mean of several starts is of."""
-    networks = {name for one in config.members for name in placed_outputs(one)}
-    declared = len({name for one in config.known for name in placed_outputs(one)} & set(whole.outputs))
-    found = {}
-    for model in whole.models:
-        name = Ends.of(model).outputs[0]
-        if name in networks:
-            found[name] = f"{model.mapping}: {model.structure.label}"
-    others = len(whole.models) - len(found) - declared
-    counts = {"that the pipeline declares": declared, "of the starts": others}
-    return found | {said: f"and {count} {said}" for said, count in counts.items() if count}

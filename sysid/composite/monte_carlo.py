@@ -1,4 +1,4 @@
-"""The whole on many random sequences, against the reference: does it diverge, and how large are its errors."""
+"""Monte Carlo test: the whole on many random sequences of the reference, does it diverge, how large are its errors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.models import Cascade
 from sysid.traces import Trace
-from sysid.workbench.annotation import Annotator
+from sysid.validation.annotator import Annotator
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
 WORST = 10

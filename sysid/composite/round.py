@@ -12,15 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from sysid.composite.members import free_runs, mean_squares, placed_outputs, seen_from
-from sysid.composite.shared_weights import Everywhere
-from sysid.composite.stages import Report
+from sysid.composite.composite import Composite
+from sysid.composite.keeper import Report
+from sysid.composite.members import free_runs, mean_squares, seen_from
+from sysid.composite.plan import RoundPlan
+from sysid.composite.shared_weights import SharedWeights
+from sysid.composite.stages import reading_more
 from sysid.estimation import CascadeFit, JointTraining, fit_cascade
 from sysid.estimation.networks.joint import NEGLIGIBLE
 from sysid.models import Cascade, Ends
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.stage_config import TogetherConfig
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,7 +36,7 @@ class JointRound:
         training: How.
         estimation: Traces to fit, over the part's channels.
         selection: Traces that choose among the states on the way, likewise.
-        everywhere: The places, where the members are trained in all of theirs.
+        shared: The instances, where the members keep one set of weights for all of theirs.
     """
 
     whole: Cascade
@@ -45,13 +46,13 @@ class JointRound:
     training: JointTraining
     estimation: tuple[Trace, ...]
     selection: tuple[Trace, ...]
-    everywhere: Everywhere | None
+    shared: SharedWeights | None
 
     @classmethod
     def of(
         cls,
-        config: AssemblyConfig,
-        asked: TogetherConfig,
+        composite: Composite,
+        asked: RoundPlan,
         whole: Cascade,
         *,
         estimation: Sequence[Trace],
@@ -60,7 +61,7 @@ class JointRound:
         """Get a round ready.
 
         Args:
-            config: The pipeline.
+            composite: What is declared.
             asked: The round.
             whole: Where it starts.
             estimation: Traces of the whole to fit.
@@ -70,27 +71,30 @@ class JointRound:
             The round.
 
         Raises:
-            ConfigError: If the round is to be trained everywhere and cannot.
+            ConfigError: If the round is to share weights and cannot.
         """
-        used, stand = estimation[: asked.traces], Everywhere.of(config, asked, whole) if asked.everywhere else None
+        used, stand = (
+            estimation[: asked.traces],
+            SharedWeights.of(composite, asked, whole) if asked.share_weights else None,
+        )
         if stand is not None:
-            part, trained = stand.part, [member.mapping.output for member in stand.members]
+            part, trained = stand.part, [member.output for member in stand.members]
             used, selection = stand.traces(used), stand.traces(selection)
         else:
             # What no target depends on would be run, and its sensitivities with it, for nothing.
             part = whole.upstream_of(asked.targets, given=asked.measured)
-            asked_for = [one for one in config.members if not asked.members or one.mapping.output in asked.members]
-            trained = [name for member in asked_for for name in placed_outputs(member) if name in part.outputs]
+            asked_for = [one for one in composite.members if not asked.members or one.output in asked.members]
+            trained = [name for member in asked_for for name in member.outputs if name in part.outputs]
         part = _in_own_order(part)
         return cls(
             whole=whole,
             part=part,
             trained=tuple(trained),
             targets=dict(asked.targets),
-            training=asked.training_options(config.seed),
+            training=asked.training,
             estimation=tuple(_of_part(part, trace) for trace in used),
             selection=tuple(_of_part(part, trace) for trace in selection),
-            everywhere=stand,
+            shared=stand,
         )
 
     @property
@@ -120,17 +124,16 @@ class JointRound:
         # As in the fit: a target that is met exactly, such as a switch that never moves, must not outweigh all others.
         return float(np.exp(np.mean(np.log(np.maximum(squares, NEGLIGIBLE)))))
 
-    def fit(self, report: Report) -> CascadeFit:
+    def fit(self, report: Report = lambda _: None) -> CascadeFit:
         """Train it.
 
         Args:
             report: Told after every iteration.
 
         Returns:
-            The fit of the whole. A member that stood in several places may now differ between them, unless it was
-            trained everywhere.
+            The fit of the part; :meth:`put` has it in its place.
         """
-        fit = fit_cascade(
+        return fit_cascade(
             self.part,
             self.estimation,
             targets=self.targets,
@@ -139,7 +142,6 @@ class JointRound:
             selection=self.selection,
             on_progress=report,
         )
-        return self.put(fit)
 
     def put(self, fit: CascadeFit) -> CascadeFit:
         """The fit of the whole as it stands: what this round made of its part, in its place.
@@ -148,14 +150,110 @@ class JointRound:
             fit: Of the part, or of a whole that had the same part.
 
         Returns:
-            The fit with the whole as its model.
+            The fit with the whole as its model. A member that stood in several instances may now differ between them,
+            unless it shares its weights.
         """
-        if self.everywhere is not None:
-            return replace(fit, model=self.everywhere.put(fit.model))
+        if self.shared is not None:
+            return replace(fit, model=self.shared.put(fit.model))
         whole = self.whole
         for model in self.part.models:
             whole = whole.with_member(fit.model.member(Ends.of(model).outputs[0]))
         return replace(fit, model=whole)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrainedRound:
+    """A round that was trained.
+
+    Args:
+        name: What it is called: ``2``, or ``2.1 of growth``.
+        trained: Outputs of the members that it trained, each in its first instance.
+        shared: Whether it trained them in all of their instances.
+        measured: Outputs that were as measured.
+        traces: How many traces it was fitted to.
+        before: Error on the selection traces where it started.
+        after: The same of the state that was chosen.
+        fit: What came of it.
+    """
+
+    name: str
+    trained: tuple[str, ...]
+    shared: bool
+    measured: tuple[str, ...]
+    traces: int
+    before: float
+    after: float
+    fit: CascadeFit
+
+    @classmethod
+    def of(cls, composite: Composite, asked: RoundPlan, ready: JointRound, fit: CascadeFit, name: str) -> TrainedRound:
+        """Say what a round did.
+
+        Args:
+            composite: What is declared.
+            asked: The round.
+            ready: What it trained, and on what.
+            fit: What came of it.
+            name: What it is called.
+
+        Returns:
+            The round.
+        """
+        return cls(
+            name=name,
+            trained=tuple(one.output for one in composite.members if not set(one.outputs).isdisjoint(ready.trained)),
+            shared=asked.share_weights,
+            measured=asked.measured,
+            traces=len(ready.estimation),
+            before=ready.error(ready.whole),
+            after=ready.error(fit.model),
+            fit=fit,
+        )
+
+    @property
+    def iterations(self) -> int:
+        """How far the state that was chosen had come; 0 is where the round started."""
+        return int(self.fit.history["iteration"][-1]) if len(self.fit.history["iteration"]) else 0
+
+    @property
+    def loss(self) -> float | None:
+        """Mean squared residual of that state; ``None`` where no step was worth taking, which leaves no curve."""
+        return float(self.fit.history["loss"][-1]) if len(self.fit.history["loss"]) else None
+
+    @property
+    def sentences(self) -> list[str]:
+        """All that its fit says: which states were looked at, which was chosen, and how it ended."""
+        return [f"Round {self.name}: {said}" for said in (*self.fit.notes, self.fit.status.value)]
+
+
+def train_round(
+    composite: Composite,
+    asked: RoundPlan,
+    whole: Cascade,
+    *,
+    estimation: Sequence[Trace],
+    selection: Sequence[Trace],
+    report: Report = lambda _: None,
+) -> CascadeFit:
+    """Train a whole end to end in one round.
+
+    Args:
+        composite: What is declared.
+        asked: The round.
+        whole: Where it starts.
+        estimation: Traces of the whole to fit.
+        selection: Traces of the whole that choose among the states on the way.
+        report: Told after every iteration.
+
+    Returns:
+        The fit, with the whole as its model.
+
+    Raises:
+        ConfigError: If the round cannot be trained so.
+    """
+    started = reading_more(whole, asked.reads)
+    ready = JointRound.of(composite, asked, started, estimation=estimation, selection=selection)
+    return ready.put(ready.fit(report))
 
 
 def _in_own_order(part: Cascade) -> Cascade:

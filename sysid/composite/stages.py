@@ -1,18 +1,18 @@
-"""The stages of an assembly's training: functions of members and traces that give members, and touch no folder.
+"""The stages before members are trained through each other: functions of members and traces that give members.
 
-Each stage begins from the members of the one before, and the whole is scored after each, so that one sees what it
-brought: members that are good alone, the choice by the error of the whole, retraining on what really comes from
-upstream, and training end to end.
+Each stage begins from the members of the one before: members that are good alone, the choice by the error of the
+whole, retraining on what really comes from upstream, and circles that close with weights of zero.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from sysid.composite.composite import Composite, Member
+from sysid.composite.keeper import Report
 from sysid.composite.members import (
     Members,
     assembled,
@@ -20,58 +20,44 @@ from sysid.composite.members import (
     simulated_inputs,
     whole_score,
 )
+from sysid.composite.plan import OneStep
 from sysid.errors import ConfigError
-from sysid.estimation import FitProgress, FitResult, fit_narx
+from sysid.estimation import FitResult, Training, fit_narx
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.warm_start import grown, widened
 from sysid.estimation.result import Loop, Status
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
-from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.member_config import MemberConfig
-from sysid.workbench.assembly.stage_config import OneStepConfig
-from sysid.workbench.fields import TrainingConfig
 
-Report = Callable[[FitProgress], None]
 SWEEPS = 3
 """How often the choice goes through all members at most; it mostly settles in the second."""
 
 
 def fit_member(
-    member: MemberConfig,
+    member: Member,
     traces: Sequence[Trace],
     selection: Sequence[Trace],
-    report: Report,
+    report: Report = lambda _: None,
     *,
-    seed: int,
     initial: FitResult | None = None,
-    max_iterations: int | None = None,
 ) -> FitResult:
-    """Fit one member alone.
+    """Fit one member alone, behind measured inputs.
 
     Args:
-        member: The member.
+        member: The member; its structure is fitted, not the alternatives.
         traces: Traces of the whole to fit.
         selection: Traces of the whole that choose between its starts.
         report: Told after every iteration.
-        seed: Of its first start.
         initial: A fit to start from instead.
-        max_iterations: Iterations, where they are not those of the member's training.
 
     Returns:
-        The fit, over the names of its first place.
+        The fit, over the names of its first instance.
     """
-    training = member.training_options(seed)
-    if max_iterations is not None:
-        training = replace(training, max_iterations=max_iterations, starts=1, prelude=0)
-    structure = member.structure
-    if not isinstance(structure, NARX):
-        raise TypeError(f"{member.mapping} is no NARX")  # refused when the YAML was read
     return fit_narx(
         own_traces(member, traces[: member.traces]),
         member.mapping,
-        structure,
-        training,
+        member.structure,
+        member.training,
         rest_output=member.rest,
         selection=own_traces(member, selection),
         initial=initial,
@@ -79,34 +65,22 @@ def fit_member(
     )
 
 
-def fit_one_step(
-    member: MemberConfig,
-    asked: OneStepConfig,
-    traces: Sequence[Trace],
-    selection: Sequence[Trace],
-    report: Report,
-    *,
-    seed: int,
-) -> FitResult:
-    """Fit one member alone, one step ahead.
+def one_step_of(member: Member, asked: OneStep) -> Member:
+    """A member that is trained one step ahead: with the same lags and neurons, on measured past output.
 
     Args:
         member: The member.
         asked: How.
-        traces: Traces of the whole to fit.
-        selection: Traces of the whole that choose between its starts, by their error one step ahead.
-        report: Told after every iteration.
-        seed: Of its first start.
 
     Returns:
-        The fit, over the names of its first place.
+        The member.
     """
-    options: dict[str, Any] = {"loop": Loop.OPEN, "max_iterations": asked.max_iterations, "starts": asked.starts}
-    given = member.training
-    if given is not None:
-        options |= {name: getattr(given, name) for name in ("workers", "stride") if name in given.model_fields_set}
-    training = TrainingConfig(**options)
-    return fit_member(member.model_copy(update={"training": training}), traces, selection, report, seed=seed)
+    own = member.training
+    training = Training(
+        loop=Loop.OPEN, max_iterations=asked.max_iterations, starts=asked.starts,
+        workers=own.workers, stride=own.stride, seed=own.seed,
+    )  # fmt: skip
+    return replace(member, training=training)
 
 
 def model_of(fit: FitResult) -> NARXModel:
@@ -132,28 +106,29 @@ class Choice:
 
 
 def choose_together(
-    config: AssemblyConfig,
+    composite: Composite,
     candidates: Mapping[str, Sequence[NARXModel]],
     alone: Mapping[str, int],
     selection: Sequence[Trace],
     *,
+    outputs: Sequence[str],
     report: Callable[[str], None] = lambda _: None,
 ) -> Choice:
     """Choose the members by the error of the whole, one member at a time until none changes.
 
     Args:
-        config: The pipeline.
-        candidates: Models by the member's output.
+        composite: What is declared.
+        candidates: Models by the member's output, those of the fixed submodels among them.
         alone: Where the search starts: the best of each by itself.
         selection: Traces that choose.
+        outputs: Outputs whose error chooses.
         report: Told what is being tried.
 
     Returns:
         The choice; never worse on the selection traces than the start.
     """
-    outputs = config.choose_on or config.outputs
     chosen, tried = dict(alone), 1
-    best = whole_score(_with(config, candidates, chosen), selection, outputs)
+    best = whole_score(_with(composite, candidates, chosen), selection, outputs)
     for _ in range(SWEEPS):
         before = dict(chosen)
         for name, models in candidates.items():
@@ -162,7 +137,7 @@ def choose_together(
                     continue
                 report(f"{name}, candidate {index + 1} of {len(models)}, best {best:.3g}")
                 tried += 1
-                score = whole_score(_with(config, candidates, {**chosen, name: index}), selection, outputs)
+                score = whole_score(_with(composite, candidates, {**chosen, name: index}), selection, outputs)
                 if score < best:
                     best, chosen = score, {**chosen, name: index}
         if chosen == before:
@@ -170,15 +145,15 @@ def choose_together(
     return Choice(members=chosen, score=best, tried=tried)
 
 
-def _with(config: AssemblyConfig, candidates: Mapping[str, Sequence[NARXModel]], chosen: Mapping[str, int]) -> Cascade:
-    return assembled(config, {name: models[chosen[name]] for name, models in candidates.items()})
+def _with(composite: Composite, candidates: Mapping[str, Sequence[NARXModel]], chosen: Mapping[str, int]) -> Cascade:
+    return assembled(composite, {name: models[chosen[name]] for name, models in candidates.items()})
 
 
 def retrain(
-    config: AssemblyConfig,
-    member: MemberConfig,
+    composite: Composite,
+    output: str,
     models: Members,
-    report: Report,
+    report: Report = lambda _: None,
     *,
     estimation: Sequence[Trace],
     selection: Sequence[Trace],
@@ -187,8 +162,8 @@ def retrain(
     """Train one member again, from where it stands, on the free run of all others.
 
     Args:
-        config: The pipeline.
-        member: The member.
+        composite: What is declared.
+        output: The member's.
         models: All members.
         report: Told after every iteration.
         estimation: Traces to fit.
@@ -198,17 +173,20 @@ def retrain(
     Returns:
         The fit.
     """
-    name = member.mapping.output
-    member = member.of_structure(models[name].network)  # of its candidates' structures the one that was chosen
-    others = assembled(config, models, without=name)
+    # Of its candidates' structures the one that was chosen.
+    member = composite.member(output).of_structure(models[output].network)
+    others = assembled(composite, models, without=output)
     start = FitResult(
-        model=models[name], status=Status.MAX_ITERATIONS, loop=member.training_options(0).loop, history={},
+        model=models[output], status=Status.MAX_ITERATIONS, loop=member.training.loop, history={},
         train_time_s=0.0, seed=0,
     )  # fmt: skip
     return fit_member(
-        member, simulated_inputs(others, estimation[: member.traces]), simulated_inputs(others, selection), report,
-        seed=config.seed, initial=start, max_iterations=max_iterations,
-    )  # fmt: skip
+        member.trained(max_iterations=max_iterations, starts=1, prelude=0),
+        simulated_inputs(others, estimation[: member.traces]),
+        simulated_inputs(others, selection),
+        report,
+        initial=start,
+    )
 
 
 def reading_more(cascade: Cascade, reads: Mapping[str, Mapping[str, tuple[int, ...]]]) -> Cascade:

@@ -5,7 +5,6 @@ from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.beginning import Beginning, beginning
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_batch import simulate_family
-from sysid.models.cascade_mean import mean_of
 from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.form import AbstractForm
@@ -62,7 +61,6 @@ __all__ = [
     "Wiring",
     "beginning",
     "cascade_from_dict",
-    "mean_of",
     "model_from_dict",
     "parameter_count",
     "simulate_family",

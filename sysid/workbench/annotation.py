@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -16,26 +15,12 @@ from pydantic import BaseModel, Field
 from sysid.errors import ConfigError
 from sysid.traces import Trace, TraceSet
 from sysid.validation import CaseResult, Evaluation
+from sysid.validation.annotator import Annotator
 from sysid.validation.metrics import figures
 from sysid.workbench.fields import STRICT
 from sysid.workbench.plugins import find_plugin
 
 GROUP = "sysid.annotators"
-
-
-class Annotator(Protocol):
-    """What an annotator answers."""
-
-    @property
-    def channel(self) -> str:
-        """Name of the channel that it adds."""
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Names of the states, by their number."""
-
-    def __call__(self, trace: Trace) -> Trace:
-        """The trace with the channel added."""
 
 
 class AnnotateConfig(BaseModel):

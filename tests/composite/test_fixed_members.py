@@ -1,8 +1,6 @@
-"""Known members: what is declared, as one more measured channel and as a part of the whole."""
+"""Fixed submodels: what is declared, as one more measured channel and as a part of the whole."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,20 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from sysid.composite.fixed_members import known_model, with_known
-from sysid.errors import ConfigError
+from sysid.composite.composite import FixedMember
+from sysid.composite.fixed_members import fixed_model, with_fixed
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.member_config import KnownConfig
-from sysid.workbench.assembly.runner import read_assembly, run_assembly
-from sysid.workbench.kinds import RunRequest
-from sysid.yaml_files import check, parse_yaml
+from tests.composite.composites import fixed
 
-FIELDS = "{mapping: a+b -> d, gains: {a: 2, b: -1}, constant: 0.5, low: -1, high: 3, rest: 0}"
-
-
-def known(text: str = FIELDS) -> KnownConfig:
-    return check(KnownConfig, parse_yaml(text, where="text"), where="text")
+DECLARED = fixed("a+b -> d", gains={"a": 2, "b": -1}, constant=0.5, low=-1, high=3)
 
 
 def trace(values: np.ndarray) -> Trace:
@@ -39,13 +30,13 @@ def trace(values: np.ndarray) -> Trace:
 )
 def test_it_is_the_sum_that_is_declared_held_between_its_bounds(rows, low, high, constant):
     values = np.array(rows)
-    declared = KnownConfig(
+    declared = FixedMember(
         mapping=Mapping.parse("a+b -> d"), gains={"b": -1.0, "a": 2.0}, constant=constant, low=low, high=high, rest=0.0
     )
     expected = np.clip(2.0 * values[:, 0] - values[:, 1] + constant, low, high)
-    (seen,) = with_known([declared], [trace(values)])
+    (seen,) = with_fixed([declared], [trace(values)])
     assert_allclose(seen["d"], expected, rtol=1e-12, atol=1e-12)
-    assert np.isinf(known_model(declared, trace(values)).clamp)
+    assert np.isinf(fixed_model(declared, trace(values)).clamp)
 
 
 @given(
@@ -57,7 +48,7 @@ def test_with_a_weight_above_one_on_its_last_value_it_is_a_relay_with_hysteresis
     """Its plain twin: past one threshold up, past the other down, between them as it was."""
     values = np.array(rows)
     weight = 1.0 + 2.0 * slope * width
-    declared = KnownConfig(
+    declared = FixedMember(
         mapping=Mapping.parse("a+b -> d"),
         gains={"a": slope, "b": -slope, "d": weight},
         constant=0.5 - 0.5 * weight,
@@ -65,7 +56,7 @@ def test_with_a_weight_above_one_on_its_last_value_it_is_a_relay_with_hysteresis
         high=1,
         rest=0,
     )
-    (seen,) = with_known([declared], [trace(values)])
+    (seen,) = with_fixed([declared], [trace(values)])
     state = 0.0
     for x, y in zip(values[:, 0] - values[:, 1], seen["d"], strict=True):
         if state in {0.0, 1.0}:
@@ -76,21 +67,18 @@ def test_with_a_weight_above_one_on_its_last_value_it_is_a_relay_with_hysteresis
 
 
 def test_with_a_weight_of_one_it_is_a_latch():
-    latch = known("{mapping: a+b -> d, gains: {a: 1, b: -1, d: 1}, low: 0, high: 1, rest: 0}")
+    latch = fixed("a+b -> d", gains={"a": 1, "b": -1, "d": 1})
     values = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
-    (seen,) = with_known([latch], [trace(values)])
+    (seen,) = with_fixed([latch], [trace(values)])
     assert_allclose(seen["d"], [0, 1, 1, 1, 0, 0])
 
 
 def test_with_weights_by_lag_it_says_for_how_much_of_the_next_sample_a_ramp_will_be_past_a_threshold():
     """A ramp of ``slope`` per sample; its plain twin counts the next sample's instants past the threshold."""
     slope, threshold = 0.4, 3.05
-    declared = known(
-        f"{{mapping: a+b -> d, gains: {{a: {{0: {2 / slope}, 1: {-1 / slope}}}, b: 0}}, "
-        f"constant: {0.5 - threshold / slope}, low: 0, high: 1, rest: 0}}"
-    )
+    declared = fixed("a+b -> d", gains={"a": {0: 2 / slope, 1: -1 / slope}, "b": 0}, constant=0.5 - threshold / slope)
     values = np.column_stack([slope * np.arange(12.0), np.zeros(12)])  # means over samples: the middle of each
-    (seen,) = with_known([declared], [trace(values)])
+    (seen,) = with_fixed([declared], [trace(values)])
     instants = slope * (np.arange(1, 13)[:, None] + (np.arange(1000) + 0.5) / 1000 - 0.5)
     assert_allclose(seen["d"][1:], np.mean(instants > threshold, axis=1)[1:], atol=2e-3)
 
@@ -98,19 +86,19 @@ def test_with_weights_by_lag_it_says_for_how_much_of_the_next_sample_a_ramp_will
 @given(st.lists(st.tuples(*[st.floats(-10.0, 10.0)] * 2), min_size=1, max_size=20), st.floats(-2.0, 2.0))
 def test_before_the_first_sample_everything_stood_as_in_it(rows, weight):
     values = np.array(rows)
-    declared = KnownConfig(
+    declared = FixedMember(
         mapping=Mapping.parse("a+b -> d"), gains={"a": {0: 1.0, 3: weight}, "b": {2: -1.0}}, low=-99, high=99, rest=0
     )
-    (seen,) = with_known([declared], [trace(values)])
+    (seen,) = with_fixed([declared], [trace(values)])
     past = np.vstack([np.repeat(values[:1], 3, axis=0), values])
     expected = past[3:, 0] + weight * past[:-3, 0] - past[1:-2, 1]
     assert_allclose(seen["d"], expected, rtol=1e-12, atol=1e-12)
 
 
 def test_a_later_one_may_read_an_earlier_one():
-    second = known("{mapping: d -> e, gains: {d: 1}, low: 0, high: 1, rest: 0}")
+    second = fixed("d -> e", gains={"d": 1})
     values = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 1.0]])
-    (seen,) = with_known([known(), second], [trace(values)])
+    (seen,) = with_fixed([DECLARED, second], [trace(values)])
     assert seen.channel_names == ("a", "b", "d", "e")
     assert_allclose(seen["d"], [0.5, 2.5, -1.0])
     assert_allclose(seen["e"], [0.5, 1.0, 0.0])
@@ -121,65 +109,11 @@ def test_a_later_one_may_read_an_earlier_one():
 def test_they_may_read_each_other_in_a_circle_through_the_past(rows):
     """A vent that opens once and, shut, stays shut until it is reset; beside it the same written plainly."""
     values = np.array(rows)
-    vent = known("{mapping: a+t -> v, gains: {a: 5, t: {1: -50}, v: 50}, low: 0, high: 1, rest: 0}")
-    tripped = known("{mapping: v+b -> t, gains: {v: 1, b: -1, t: 1}, low: 0, high: 1, rest: 0}")
-    (seen,) = with_known([vent, tripped], [trace(values)])
+    vent = fixed("a+t -> v", gains={"a": 5, "t": {1: -50}, "v": 50})
+    tripped = fixed("v+b -> t", gains={"v": 1, "b": -1, "t": 1})
+    (seen,) = with_fixed([vent, tripped], [trace(values)])
     v = t = 0.0
     for n, (a, b) in enumerate(values):
         v = min(max(5.0 * a - 50.0 * t + 50.0 * v, 0.0), 1.0)
         t = min(max(v - b + t, 0.0), 1.0)
         assert_allclose([seen["v"][n], seen["t"][n]], [v, t], atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"gains: {a: 2, b: -1}": "gains: {a: 2}"}, "gains of a\\+b -> d"),
-        ({"gains: {a: 2, b: -1}": "gains: {a: 2, b: {}}"}, "gains"),
-        ({"gains: {a: 2, b: -1}": "gains: {a: 2, b: {-1: 3}}"}, "gains"),
-        ({"gains: {a: 2, b: -1}": "gains: {a: 2, b: -1, d: {1: 1}}"}, "weights by lag for its own past"),
-        ({"low: -1": "low: 1"}, "bounds of d"),
-        ({"low: -1, high: 3": "low: 0, high: 0"}, "bounds of d"),
-    ],
-    ids=[
-        "an input without a gain",
-        "no lag",
-        "a lag of what is to come",
-        "lags of its own",
-        "rest below low",
-        "no room between the bounds",
-    ],
-)
-def test_what_cannot_be_meant_is_refused(change, said):
-    text = FIELDS
-    for old, new in change.items():
-        text = text.replace(old, new)
-    with pytest.raises(ConfigError, match=said):
-        known(text)
-
-
-def test_members_read_it_and_the_whole_runs_it(workspace: Path):
-    """Two tanks, the lower of which is told the difference that drives it."""
-    file = workspace / "pipelines" / "tanks.yaml"
-    text = file.read_text(encoding="utf-8").replace(
-        "  - mapping: upper -> lower\n    structure: {kind: NARX, input_delays: [0]",
-        "  - mapping: head -> lower\n    structure: {kind: NARX, input_delays: [1]",
-    )
-    declared = (
-        "known: [{mapping: upper+lower -> head, gains: {upper: 1, lower: -0.3}, low: 0, high: 9, rest: 0, unit: m}]\n"
-    )
-    file.write_text(text.replace("retrain:", f"{declared}retrain:"), encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
-    whole = read_assembly(workspace / "runs" / "tanks")
-    ran = whole.simulate(np.full((60, 1), 1.5))
-    assert_allclose(ran["head"], np.maximum(ran["upper"] - 0.3 * ran["lower"], 0.0), atol=1e-12)
-    assert ran.activity["head"].lost == 0
-
-
-def test_what_only_the_training_looked_at_is_no_part_of_the_surrogate(workspace: Path):
-    file = workspace / "pipelines" / "tanks.yaml"
-    declared = "known: [{mapping: upper -> near, gains: {upper: 1}, low: 1, high: 2, rest: 1, unit: cm}]\n"
-    text = file.read_text(encoding="utf-8").replace("retrain:", f"{declared}retrain:")
-    file.write_text(text.replace("targets: {upper: 0.1", "targets: {near: 0.05, upper: 0.1"), encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
-    assert set(read_assembly(workspace / "runs" / "tanks").outputs) == {"upper", "lower"}

@@ -10,31 +10,16 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from sysid.composite import round as joint_round
-from sysid.composite.round import JointRound
-from sysid.estimation import fit_cascade
+from sysid.composite.composite import Composite
+from sysid.composite.plan import RoundPlan
+from sysid.composite.round import JointRound, train_round
+from sysid.estimation import JointTraining, fit_cascade
 from sysid.models import Cascade
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.stage_config import TogetherConfig
+from tests.composite.composites import member
 from tests.models.cascades import command, network, service
 
-
-def member(mapping: str) -> dict[str, object]:
-    structure = {"kind": "NARX", "input_delays": "0:1", "output_delays": 1, "neurons": 3}
-    return {"mapping": mapping, "structure": structure, "rest": 0}
-
-
-CONFIG = AssemblyConfig.model_validate(
-    {
-        "kind": "assembly",
-        "name": "chain",
-        "data": "chain",
-        "training": "chain",
-        "outputs": ["BC"],
-        "members": [member("STP -> BP"), member("BP -> AR"), member("BP+AR -> BC")],
-        "together": {"targets": {"BC": 1.0}},
-    }
-)
+CHAIN = Composite(members=(member("STP -> BP"), member("BP -> AR"), member("BP+AR -> BC")))
 
 
 def record(seed: int = 0, n: int = 120) -> Trace:
@@ -54,8 +39,8 @@ def trained(monkeypatch: pytest.MonkeyPatch, **asked) -> tuple[Cascade, Cascade,
         return fit_cascade(cascade, *args, **kwargs)
 
     monkeypatch.setattr(joint_round, "fit_cascade", fit)
-    asked = TogetherConfig.model_validate({"training": {"max_iterations": 2, "looks": 1, "workers": 1}, **asked})
-    found = JointRound.of(CONFIG, asked, service(), estimation=[record()], selection=[]).fit(lambda _: None)
+    plan = RoundPlan(training=JointTraining(max_iterations=2, looks=1, workers=1), **asked)
+    found = train_round(CHAIN, plan, service(), estimation=[record()], selection=[])
     ((part, names),) = given
     return found.model, part, names
 
@@ -74,7 +59,7 @@ def test_what_no_target_depends_on_is_neither_run_nor_trained(monkeypatch: pytes
 
 
 def test_what_is_measured_is_an_input_and_comes_back_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, part, names = trained(monkeypatch, targets={"BC": 1.0}, measured=["BP"])
+    whole, part, names = trained(monkeypatch, targets={"BC": 1.0}, measured=("BP",))
     assert (set(part.inputs), set(part.outputs), names) == ({"BP"}, {"AR", "BC"}, ["AR", "BC"])
     assert changed(whole) == {"AR", "BC"}
     assert_array_equal(whole.member("BP").theta, service().member("BP").theta)
@@ -84,8 +69,8 @@ def test_what_it_depends_on_is_the_same_in_whichever_order_the_whole_has_its_mem
     members = (network("STP -> BP", seed=1), network("STP -> AR", seed=2), network("BP+AR -> BC", seed=3))
     terms = [
         JointRound.of(
-            CONFIG,
-            TogetherConfig.model_validate({"targets": {"BC": 1.0}}),
+            CHAIN,
+            RoundPlan(targets={"BC": 1.0}),
             Cascade(models=order),
             estimation=[record()],
             selection=[],
@@ -96,15 +81,15 @@ def test_what_it_depends_on_is_the_same_in_whichever_order_the_whole_has_its_mem
 
 
 def test_its_error_is_that_by_which_it_chooses_among_its_states() -> None:
-    asked = {"targets": {"AR": 0.5, "BC": 2.0}, "measured": ["BP"], "training": {"max_iterations": 2, "looks": 1}}
+    training = JointTraining(max_iterations=2, looks=1)
     ready = JointRound.of(
-        CONFIG,
-        TogetherConfig.model_validate(asked),
+        CHAIN,
+        RoundPlan(targets={"AR": 0.5, "BC": 2.0}, measured=("BP",), training=training),
         service(),
         estimation=[record()],
         selection=[record(), record(1)],
     )
-    fit = ready.fit(lambda _: None)
+    fit = ready.put(ready.fit())
     start, end = ready.error(ready.whole), ready.error(fit.model)
     assert end < start
     chosen, others = fit.notes
@@ -116,18 +101,18 @@ def test_a_target_that_is_met_exactly_does_not_outweigh_the_others() -> None:
     own = service().simulate(command(120, 1, 0))
     exact = replace(record(), values=np.where(np.array(record().channel_names) == "BC", record().values, own.values))
     ready = JointRound.of(
-        CONFIG,
-        TogetherConfig.model_validate({"targets": {"AR": 0.5, "BC": 2.0}, "training": {"max_iterations": 1}}),
+        CHAIN,
+        RoundPlan(targets={"AR": 0.5, "BC": 2.0}, training=JointTraining(max_iterations=1)),
         service(),
         estimation=[record()],
         selection=[exact],
     )
     start = ready.error(ready.whole)
     assert start == pytest.approx(np.sqrt(1e-6 * np.mean((own["BC"] - exact["BC"]) ** 2) / 2.0**2))
-    assert any(f"{start:.4g}" in said for said in ready.fit(lambda _: None).notes)
+    assert any(f"{start:.4g}" in said for said in ready.fit().notes)
 
 
 def test_members_that_are_named_are_the_ones_trained(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, _, names = trained(monkeypatch, targets={"BC": 1.0}, members=["AR"])
+    whole, _, names = trained(monkeypatch, targets={"BC": 1.0}, members=("AR",))
     assert names == ["AR"]
     assert changed(whole) == {"AR"}

@@ -1,4 +1,4 @@
-"""A round that trains everywhere: one set of weights for all places, each trace as one place sees it."""
+"""Weight sharing: one set of weights for all instances, each trace as one instance sees it."""
 
 from __future__ import annotations
 
@@ -8,52 +8,36 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from sysid.composite.fixed_members import known_model, with_known
+from sysid.composite.composite import Composite
+from sysid.composite.fixed_members import fixed_model, with_fixed
 from sysid.composite.members import assembled
+from sysid.composite.plan import RoundPlan
 from sysid.composite.round import JointRound
-from sysid.composite.shared_weights import Everywhere
+from sysid.composite.shared_weights import SharedWeights
 from sysid.composite.stages import reading_more
 from sysid.errors import ConfigError
+from sysid.estimation import JointTraining
 from sysid.models import Cascade, Mapping
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.yaml_files import check, parse_yaml
+from tests.composite.composites import fixed, member
 from tests.models.cascades import network
 
-LINE = """\
-kind: assembly
-name: line
-data: cases
-training: excitation
-outputs: [BP, AR]
-members:
-  - {mapping: STP -> BP, structure: {kind: NARX, input_delays: [0, 1, 3], output_delays: 2, neurons: 3}, rest: 90}
-  - {mapping: BP -> BP9, structure: {kind: NARX, input_delays: [0, 1, 3], output_delays: 2, neurons: 3}, rest: 90}
-  - mapping: BP+STP -> AR
-    structure: {kind: NARX, input_delays: [0, 1, 3], output_delays: 2, neurons: 3}
-    rest: 90
-    places: ["", "9"]
-    shared: [STP]
-  - mapping: BP+AR+RL -> BC
-    structure: {kind: NARX, input_delays: [0, 1, 3], output_delays: 2, neurons: 3}
-    rest: 0
-    places: ["", "9"]
-known:
-  - {mapping: BP+AR -> RL, gains: {BP: 1, AR: -1, RL: 3}, constant: -1, low: 0, high: 1, rest: 0, places: ["", "9"]}
-together:
-  members: [AR, BC]
-  everywhere: true
-  targets: {AR: 1, BC: 1}
-  training: {max_iterations: 2, looks: 1, workers: 1}
-"""
-
-
-def config(*changes: tuple[str, str]) -> AssemblyConfig:
-    text = LINE
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return check(AssemblyConfig, parse_yaml(text, where="text"), where="text")
+ROUND = RoundPlan(
+    members=("AR", "BC"),
+    share_weights=True,
+    targets={"AR": 1.0, "BC": 1.0},
+    training=JointTraining(max_iterations=2, looks=1, workers=1),
+)
+BOTH = ("", "9")
+LINE = Composite(
+    members=(
+        member("STP -> BP"),
+        member("BP -> BP9"),
+        member("BP+STP -> AR", instances=BOTH, shared=("STP",)),
+        member("BP+AR+RL -> BC", 0.0, instances=BOTH),
+    ),
+    fixed=(fixed("BP+AR -> RL", gains={"BP": 1, "AR": -1, "RL": 3}, constant=-1, instances=BOTH),),
+)
 
 
 def trace(seed: int) -> Trace:
@@ -61,7 +45,7 @@ def trace(seed: int) -> Trace:
     names = ("STP", "BP", "AR", "BC", "BP9", "AR9", "BC9")
     values = rng.uniform(60.0, 90.0, (120, len(names)))
     channels = tuple(Channel(name=name, unit="psi") for name in names)
-    (seen,) = with_known(config().known, [Trace(name=f"t{seed}", sample_time=0.1, channels=channels, values=values)])
+    (seen,) = with_fixed(LINE.fixed, [Trace(name=f"t{seed}", sample_time=0.1, channels=channels, values=values)])
     return seen
 
 
@@ -72,22 +56,20 @@ def whole() -> Cascade:
         "AR": network("BP+STP -> AR", seed=3),
         "BC": replace(network("BP+AR+RL -> BC", seed=4), rest_output=0.0),
     }
-    declared = {one.mapping.output: known_model(one, trace(0)) for one in config().known}
+    declared = {one.output: fixed_model(one, trace(0)) for one in LINE.fixed}
     units = {name: ("psi", "psi", "1")[: len(model.mapping.inputs)] for name, model in fitted.items()}
     fitted = {name: replace(model, input_units=units[name]) for name, model in fitted.items()}
-    return assembled(config(), {**fitted, **declared})
+    return assembled(LINE, {**fitted, **declared})
 
 
-def everywhere(*changes: tuple[str, str]) -> Everywhere:
-    asked = config(*changes)
-    assert asked.together is not None
-    return Everywhere.of(asked, asked.together, whole())
+def shared(**changes) -> SharedWeights:
+    return SharedWeights.of(LINE, replace(ROUND, **changes), whole())
 
 
 def test_a_declared_member_stands_in_all_its_places_too():
     seen = trace(0)
     assert seen.channel_names[-2:] == ("RL", "RL9")
-    swapped = with_known(config().known, [replace(seen, channels=_swapped(seen))])[0]
+    swapped = with_fixed(LINE.fixed, [replace(seen, channels=_swapped(seen))])[0]
     assert_array_equal(swapped.values[:, -2:], seen.values[:, [-1, -2]])
     assert whole().member("RL9").mapping.inputs == ("BP9", "AR9")
     assert (whole().limits["RL9"].low, whole().limits["RL9"].high) == (0, 1)
@@ -99,13 +81,13 @@ def _swapped(seen: Trace) -> tuple[Channel, ...]:
 
 
 def test_one_place_is_run_and_what_comes_from_elsewhere_is_its_input():
-    part = everywhere().part
+    part = shared().part
     assert (set(part.inputs), set(part.outputs)) == ({"BP", "STP"}, {"AR", "BC", "RL"})
 
 
 def test_each_trace_is_as_one_place_sees_it_with_what_the_whole_puts_out_there():
     given = [trace(0), trace(1), trace(2)]
-    for number, (seen, of, place) in enumerate(zip(everywhere().traces(given), given, ("", "9", ""), strict=True)):
+    for number, (seen, of, place) in enumerate(zip(shared().traces(given), given, ("", "9", ""), strict=True)):
         ran = whole().simulate_trace(of)
         assert_array_equal(seen["BP"], ran[f"BP{place}"])
         assert_array_equal(seen["STP"], of["STP"])
@@ -116,7 +98,7 @@ def test_each_trace_is_as_one_place_sees_it_with_what_the_whole_puts_out_there()
 
 def test_what_is_named_as_measured_is_as_measured_at_its_place():
     given = [trace(0), trace(1)]
-    stand = everywhere(("  everywhere: true", "  everywhere: true\n  measured: [BP, RL]"))
+    stand = shared(measured=("BP", "RL"))
     assert set(stand.part.outputs) == {"AR", "BC"}
     for seen, of, place in zip(stand.traces(given), given, ("", "9"), strict=True):
         for name in ("BP", "AR", "BC", "RL"):
@@ -124,11 +106,10 @@ def test_what_is_named_as_measured_is_as_measured_at_its_place():
 
 
 def test_after_the_round_every_place_has_the_same_new_weights():
-    asked, before = config(), whole()
-    assert asked.together is not None
+    before = whole()
     estimation, selection = [trace(s) for s in range(4)], [trace(5)]
-    ready = JointRound.of(asked, asked.together, before, estimation=estimation, selection=selection)
-    fit = ready.fit(lambda _: None)
+    ready = JointRound.of(LINE, ROUND, before, estimation=estimation, selection=selection)
+    fit = ready.put(ready.fit())
     for name in ("AR", "BC"):
         assert not np.array_equal(fit.model.member(name).theta, before.member(name).theta)
         assert_array_equal(fit.model.member(f"{name}9").theta, fit.model.member(name).theta)
@@ -142,9 +123,7 @@ def test_after_the_round_every_place_has_the_same_new_weights():
 
 def test_what_a_member_has_come_to_read_it_reads_at_its_own_place():
     """A circle closed in an earlier round, at the first place alone, stands in all of them after the next."""
-    asked, wider = config(), reading_more(whole(), {"AR": {"BC": (1,)}})
-    assert asked.together is not None
-    stand = Everywhere.of(asked, asked.together, wider)
+    stand = SharedWeights.of(LINE, ROUND, reading_more(whole(), {"AR": {"BC": (1,)}}))
     found = stand.put(stand.part)
     assert found.member("AR").mapping.inputs == ("BP", "STP", "BC")
     assert found.member("AR9").mapping.inputs == ("BP9", "STP", "BC9")
@@ -153,11 +132,11 @@ def test_what_a_member_has_come_to_read_it_reads_at_its_own_place():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        pytest.param(("members: [AR, BC]", "members: [BP]"), "cannot be trained everywhere", id="one place"),
-        pytest.param(("targets: {AR: 1", "targets: {BP9: 1"), "AR at 2, BP9 elsewhere", id="a target elsewhere"),
-        pytest.param(("  members: [AR, BC]\n", ""), "names no members", id="no members"),
+        pytest.param({"members": ("BP",)}, "cannot share their weights", id="one instance"),
+        pytest.param({"targets": {"BP9": 1.0}}, "AR at 2, BP9 elsewhere", id="a target elsewhere"),
+        pytest.param({"members": None}, "names no members", id="no members"),
     ],
 )
-def test_what_does_not_stand_in_several_places_is_refused(change, said):
+def test_what_does_not_stand_in_several_instances_is_refused(change, said):
     with pytest.raises(ConfigError, match=said):
-        everywhere(change)
+        shared(**change)

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sysid.composite.stages import reading_more
+from sysid.composite.members import assembled, whole_score
+from sysid.composite.stages import choose_together, reading_more
 from sysid.errors import ConfigError
 from sysid.models import Cascade, NARXModel
+from sysid.traces import Trace
+from tests.composite.composites import models, pipe, trace
 from tests.models.cascades import network
 
 
@@ -67,3 +70,15 @@ def test_what_it_reads_anew_and_what_it_reads_further_back_may_come_together():
 def test_lags_that_it_reads_already_are_named(reads, said):
     with pytest.raises(ConfigError, match=f"(?sm)reads some of these lags already.*{said}"):
         reading_more(whole(), reads)
+
+
+def test_the_whole_chooses_the_candidate_that_it_does_best_with():
+    good, whole = models(), assembled(pipe(), models())
+    run = whole.simulate_trace(trace())
+    names = trace().channel_names
+    values = np.column_stack([run[name] for name in names])
+    truth = Trace(name="truth", sample_time=0.1, channels=trace().channels, values=values)
+    candidates = {name: [network("STP -> BP", seed=9), good[name]] if name == "BP" else [good[name]] for name in good}
+    choice = choose_together(pipe(), candidates, dict.fromkeys(good, 0), [truth], outputs=("BP", "AR"))
+    assert choice.members == {"BP": 1, "BP9": 0, "AR": 0}
+    assert choice.score == whole_score(whole, [truth], ("BP", "AR"))

@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from sysid.composite import Composite, TrainingPlan
+from sysid.models import Limit
 from sysid.workbench.assembly.extending import extending_schema
 from sysid.workbench.assembly.member_config import KnownConfig, MemberConfig, StandingConfig
 from sysid.workbench.assembly.proof_config import LineConfig, PublishedConfig, StressConfig
@@ -67,9 +69,6 @@ class AssemblyConfig(BaseModel):
             stands beside the stages.
         lessons: What was published on the lessons that the stages put to the test.
         seed: Seed of everything random.
-        starts: How often all of it is trained, each time from other seeds; the best on the selection traces is taken.
-        committee: Of how many starts the surrogate may be the mean: the best one, and others as long as the mean does
-            better on the selection traces.
         export: What leaves the workbench; ``null`` for nothing.
     """
 
@@ -101,9 +100,29 @@ class AssemblyConfig(BaseModel):
     published_whole: str | None = None
     lessons: LessonsConfig = LessonsConfig()
     seed: int = Field(default=0, ge=0)
-    starts: int = Field(default=1, ge=1)
-    committee: int = Field(default=1, ge=1)
     export: ExportConfig | None = ExportConfig(formats=("onnx", "c"))
+
+    @property
+    def composite(self) -> Composite:
+        """What stands in the whole, as it is trained."""
+        return Composite(
+            members=tuple(one.member(self.seed) for one in self.members),
+            fixed=tuple(one.fixed() for one in self.known),
+            rest=self.rest,
+            limits={name: Limit(low=one.low, high=one.high) for name, one in self.limits.items()},
+        )
+
+    @property
+    def plan(self) -> TrainingPlan:
+        """The stages of its training."""
+        growing = [one.plan(self.seed) for one in self.growing]
+        return TrainingPlan(
+            outputs=self.choose_on or self.outputs,
+            one_step=None if self.one_step is None else self.one_step.options(),
+            retrain=None if self.retrain is None else self.retrain.options(),
+            rounds=tuple(one.plan(self.seed) for one in self.joint),
+            active_learning=None if self.grow is None else self.grow.options(growing),
+        )
 
     @property
     def standing(self) -> tuple[StandingConfig, ...]:
@@ -128,24 +147,6 @@ class AssemblyConfig(BaseModel):
         return tuple(dict.fromkeys((*self.outputs, *self.choose_on, *stressed, *line)))
 
     @model_validator(mode="after")
-    def _check_starts(self) -> AssemblyConfig:
-        if self.committee > self.starts:
-            raise FieldError(
-                f"a committee of {self.committee} of {self.starts} starts",
-                expected="at most as many as there are starts",
-                got=f"starts: {self.starts}, committee: {self.committee}",
-                remedy="ask for more starts, or for a smaller committee",
-            )
-        if self.committee > 1 and self.line is not None:
-            raise FieldError(
-                "the places of a line are taken out of one whole, and a committee is several",
-                expected="line, or committee",
-                got=f"line, and committee: {self.committee}",
-                remedy="leave committee out: the best start is taken",
-            )
-        return self
-
-    @model_validator(mode="after")
     def _check_published(self) -> AssemblyConfig:
         if self.published_whole is not None and self.published_models is None:
             raise FieldError(
@@ -166,7 +167,6 @@ class AssemblyConfig(BaseModel):
             "alternatives": any(member.alternatives for member in self.members),
             "one_step": self.one_step is not None,
             "retrain": self.retrain is not None,
-            "starts": self.starts > 1,
         }
         if asked := [name for name, yes in fitted.items() if yes]:
             raise FieldError(

@@ -2,39 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from sysid.code_digest import code_digest
+from sysid.composite.keeper import Fit, Task
 from sysid.content import content_folders
-from sysid.estimation import FitProgress, FitResult
+from sysid.estimation import CascadeFit, FitProgress, FitResult
 from sysid.traces import TraceSet
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import Joined
 from sysid.workbench.fits.record import is_final, read_fit, write_fit
 from sysid.workbench.fits.steps import STORED_BY
 from sysid.workbench.runner import events
-from sysid.workbench.runner.store import RunFolder, digest, strict
-
-SEEDS_OF_A_START = 10_000
-"""How far the seeds of one start are from the next one's: its candidates' are a thousand apart."""
-
-
-def training_code(work: Callable[..., Any] | str, models: Iterable[object]) -> str:
-    """Digest of the code that a training runs; what the YAML asks for is not code, and is among the terms of its key.
-
-    Args:
-        work: Does it, or its address.
-        models: That it is given, which are of any class.
-
-    Returns:
-        64 hexadecimal digits.
-    """
-    function = work.func if isinstance(work, partial) else work
-    return code_digest(function, *{type(model) for model in models}, STORED_BY, without=("sysid.workbench",))
+from sysid.workbench.runner.naming import slug
+from sysid.workbench.runner.store import RunFolder, digest, read_json, strict, write_json
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,7 +34,6 @@ class Context:
         fresh: Whether everything is done again, whatever is stored.
         watchers: Told of every event.
         digests: SHA-256 of every data set that was read, by name.
-        start: Which of the pipeline's starts this is, from 1 on.
     """
 
     config: AssemblyConfig
@@ -61,27 +44,6 @@ class Context:
     fresh: bool
     watchers: Sequence[events.Watcher]
     digests: dict[str, str] = field(default_factory=dict)
-    start: int = 1
-
-    def of_start(self, number: int) -> Context:
-        """The same run with the seeds of one of its starts.
-
-        Args:
-            number: From 1 on; the first has the pipeline's own seed.
-
-        Returns:
-            The context.
-        """
-        seed = self.config.seed + SEEDS_OF_A_START * (number - 1)
-        return replace(self, config=self.config.model_copy(update={"seed": seed}), start=number)
-
-    def named(self, name: str) -> str:
-        """What a step of this start is called on disk."""
-        return name if self.start == 1 else f"start-{self.start}-{name}"
-
-    def titled(self, step: str) -> str:
-        """What a step of this start is called on the screen."""
-        return step if self.config.starts == 1 else f"Start {self.start} of {self.config.starts}: {step}"
 
     def tell(self, event: events.Event) -> None:
         """Tell the watchers.
@@ -116,40 +78,47 @@ class Context:
         self.digests[loaded.name] = loaded.digest
         return loaded
 
-    def fit(
-        self,
-        name: str,
-        title: str,
-        terms: Mapping[str, Any],
-        work: Callable[[Callable[[FitProgress], None]], FitResult],
-        models: Iterable[object] = (),
-    ) -> tuple[FitResult, str]:
-        """A fit that is stored under what it depends on.
+    def keep(self, task: Task[Fit]) -> Fit:
+        """The result of a task of the training, stored under what it depends on.
 
         Args:
-            name: Of its folder.
-            title: Of the step.
-            terms: What it depends on, beside the code.
-            work: Does it; given whom to tell after every iteration.
-            models: That the work is given.
+            task: The task.
 
         Returns:
-            The fit, and the digest of what it depends on.
+            What it comes to.
         """
-        key = digest(strict({"code": training_code(work, models), "terms": dict(terms)}))
-        name, title = self.named(name), self.titled(title)
-        folder = self.store.fit(name)
-        self.tell(events.StepStarted(step=title))
-        stored = not self.fresh and self.store.is_done(f"fit-{name}", key)
-        if stored:
-            fit = read_fit(folder)
-        else:
-            fit = work(self.reporter(title))
-            files = write_fit(folder, fit)
+        # What the YAML asks for is not code, and is among the terms.
+        code = code_digest(*task.runs, STORED_BY, without=("sysid.workbench",))
+        key = digest(strict({"code": code, "terms": dict(task.terms)}))
+        name, form = slug(task.name), _FORMS[task.kind]
+        stamp, place = form.stamp.format(name=name), self.store.path / form.place.format(name=name)
+        self.tell(events.StepStarted(step=task.title))
+        before = None
+        if not self.fresh and self.store.is_done(stamp, key):
+            before = form.read(place)
+        fit = task.make(self.reporter(task.title)) if before is None else task.put(before)
+        if before is None or before.model.to_dict() != fit.model.to_dict():
+            files = form.write(place, fit)
             if is_final(fit):
-                self.store.mark_done(f"fit-{name}", key, files)
-        self.tell(events.StepDone(step=title, stored=stored, detail=f"{fit.train_time_s:.1f} s, {fit.status.value}"))
-        return fit, key
+                self.store.mark_done(stamp, key, files)
+        detail = f"{fit.train_time_s:.1f} s, {fit.status.value}"
+        self.tell(events.StepDone(step=task.title, stored=before is not None, detail=detail))
+        return fit
+
+    def say(self, title: str, detail: str = "", *, done: bool = False) -> None:
+        """Tell of work of the training whose result is not stored.
+
+        Args:
+            title: The work.
+            detail: How it goes.
+            done: Whether it has ended.
+        """
+        if done:
+            self.tell(events.StepDone(step=title, stored=False, detail=detail))
+        elif detail:
+            self.tell(events.StepProgress(step=title, fraction=None, detail=detail))
+        else:
+            self.tell(events.StepStarted(step=title))
 
     def reporter(self, step: str) -> Callable[[FitProgress], None]:
         """Whom a training tells after every iteration.
@@ -166,3 +135,28 @@ class Context:
             self.tell(events.StepProgress(step=step, fraction=entry.fraction, detail=f"{detail}, mse {entry.mse:.3g}"))
 
         return report
+
+
+@dataclass(frozen=True)
+class _Form:
+    """How a kind of result is stored: what its stamp is called, where it lies, how it is written and read."""
+
+    stamp: str
+    place: str
+    write: Callable[[Path, Any], list[Path]]
+    read: Callable[[Path], Any]
+
+
+def _write_round(file: Path, fit: CascadeFit) -> list[Path]:
+    write_json(file, fit.to_dict())
+    return [file]
+
+
+def _read_round(file: Path) -> CascadeFit:
+    return CascadeFit.from_dict(read_json(file))
+
+
+_FORMS: dict[type, _Form] = {
+    FitResult: _Form("fit-{name}", "fits/{name}", write_fit, read_fit),
+    CascadeFit: _Form("{name}", "{name}.json", _write_round, _read_round),
+}

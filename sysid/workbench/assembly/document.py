@@ -12,6 +12,7 @@ from sysid.composite.active_learning import Growth, Look
 from sysid.composite.limit_check import LimitCheck
 from sysid.composite.limits_held import Holding, holding_table
 from sysid.composite.monte_carlo import Stress
+from sysid.composite.round import TrainedRound
 from sysid.models import Cascade
 from sysid.reporting.comparing.published import PublishedTable, read_published
 from sysid.reporting.figures.thinning import thin
@@ -21,7 +22,7 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.lessons import Lesson, lessons_point, lessons_table
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.member_scores import MemberScores, member_tables
-from sysid.workbench.assembly.rounds import RoundDone, rounds_table
+from sysid.workbench.assembly.rounds import rounds_table
 from sysid.workbench.assembly.views import (
     export_table,
     growth_charts,
@@ -78,7 +79,7 @@ class Outcome:
     selection: Mapping[str, float]
     chosen: str
     notes: Sequence[str]
-    rounds: Sequence[RoundDone]
+    rounds: Sequence[TrainedRound]
     timing: Mapping[str, float]
     cases: Sequence[Trace]
     limits: LimitCheck

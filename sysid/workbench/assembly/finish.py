@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sysid.composite.active_learning import Look, sequence_errors
+from sysid.composite.active_learning import Growth, Look, sequence_errors
 from sysid.composite.limits_held import holding
-from sysid.composite.members import whole_score, written
 from sysid.composite.monte_carlo import Stress, stress
+from sysid.composite.training import TrainedComposite
 from sysid.models import Cascade
 from sysid.reporting.judging.results import (
     JudgementResults,
@@ -29,7 +29,7 @@ from sysid.workbench.assembly.lessons import lessons_of
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.member_scores import score_candidates
-from sysid.workbench.assembly.starts import Trained
+from sysid.workbench.assembly.written import written
 from sysid.workbench.runner import events
 from sysid.workbench.runner.environment import environment
 from sysid.workbench.runner.store import digest, strict, write_json
@@ -48,10 +48,12 @@ class Finish:
     Args:
         context: The run.
         trained: What it has trained.
+        notes: Sentences on how that came about.
     """
 
     context: Context
-    trained: Trained
+    trained: TrainedComposite
+    notes: tuple[str, ...]
 
     def results(self, cases: TraceSet, material: Material) -> JudgementResults:
         """Score every stage, choose one, and prove and export it.
@@ -79,7 +81,8 @@ class Finish:
                 others={name: found for name, found in self.context.digests.items() if name != cases.name},
             ),
             subjects=[
-                SubjectRecord(name=stage, parts=parts) for stage, parts in written(config, self.trained.stages).items()
+                SubjectRecord(name=stage, parts=parts)
+                for stage, parts in written(config.composite, self.trained.stages).items()
             ],
             judgement=parse_judgement(strict(said), where="assembly"),
         )
@@ -89,16 +92,14 @@ class Finish:
     def _outcome(self, cases: TraceSet, material: Material) -> Outcome:
         """Every stage scored, one chosen by the selection traces, proven and exported."""
         config = self.context.config
-        outputs = config.choose_on or config.outputs
-        scores, timing, chosen_by = {}, {}, {}
+        scores, timing = {}, {}
         for stage, cascade in self.trained.stages.items():
             # What only the training looked at is no part of the surrogate, nor of its run time.
             evaluation = evaluate_cascade(cascade.upstream_of(config.wanted), cases, outputs=config.outputs)
             scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
             timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
-            chosen_by[stage] = whole_score(cascade, material.choosing, outputs)
-        chosen = min(chosen_by, key=lambda stage: chosen_by[stage])
-        whole = self.trained.stages[chosen].upstream_of(config.wanted)
+        chosen, chosen_by = self.trained.chosen, self.trained.selection
+        whole = self.trained.model.upstream_of(config.wanted)
         write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
         stressed, worst, sequences = self._stressed(whole)
         line = self._line(whole)
@@ -106,13 +107,17 @@ class Finish:
         candidates = self.trained.candidates
         members = [] if candidates is None else score_candidates(candidates, tuple(cases))
         return Outcome(
-            whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.trained.notes,
+            whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.notes,
             rounds=self.trained.rounds, timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst,
-            line=line, growth=self.trained.growth, unseen=self._unseen(sequences), exported=exported,
-            limits=material.limits,
+            line=line, growth=self._growth, unseen=self._unseen(sequences), exported=exported,
+            limits=self.trained.limits,
             holding=holding(whole, config.outputs, tuple(cases), sequences), members=members,
             lessons=lessons_of(scores, members, cases, config.lessons),
         )  # fmt: skip
+
+    @property
+    def _growth(self) -> tuple[Growth, ...]:
+        return () if self.trained.growth is None else (self.trained.growth,)
 
     def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...], tuple[Trace, ...]]:
         """What came of the random sequences, those that the whole did worst on, and all of them."""
@@ -130,7 +135,7 @@ class Finish:
     def _unseen(self, sequences: Sequence[Trace]) -> dict[str, Look]:
         """Every stage of growth on the random sequences, which had no say in anything."""
         asked, stages = self.context.config.stress, self.trained.stages
-        rounds = [one.stage for grown in self.trained.growth for one in grown.rounds if one.stage in stages]
+        rounds = [] if self.trained.growth is None else [one.stage for one in self.trained.growth.rounds]
         if asked is None or not rounds:
             return {}
         wholes = {stage: stages[stage].upstream_of([asked.output]) for stage in rounds}
@@ -166,7 +171,7 @@ class Finish:
             "training": {
                 "fitted": [self._data(name) for name in material.fitted],
                 "chosen": [self._data(name) for name in material.chosen],
-                "notes": list(self.trained.notes),
+                "notes": list(self.notes),
             },
         }
         bundle = export_bundle(

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from sysid.composite.members import geometric_mean
+from sysid.composite.training import ALONE, CHOSEN, ONE_STEP, RETRAINED, TOGETHER
 from sysid.reporting.numbers import number, times
 from sysid.traces import Role, TraceSet
-from sysid.workbench.assembly.course import ALONE, CHOSEN, ONE_STEP, RETRAINED, TOGETHER
 from sysid.workbench.assembly.member_scores import MemberScores
 from sysid.workbench.assembly.stage_config import LessonsConfig
 

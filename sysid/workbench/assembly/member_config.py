@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, Field, model_validator
 
+from sysid.composite import FixedMember, Member
 from sysid.errors import ConfigError
 from sysid.estimation import Training
-from sysid.models import NARX, AbstractStructure
+from sysid.models import NARX
 from sysid.workbench.fields import STRICT, MappingField, StructureField, TrainingConfig, as_field_error
-from sysid.workbench.runner.naming import slug
 from sysid.yaml_files import FieldError
 
 
@@ -29,6 +29,10 @@ class StandingConfig(BaseModel):
     mapping: MappingField
     places: Annotated[tuple[str, ...], Field(min_length=1)] = ("",)
     shared: tuple[str, ...] = ()
+
+    def standing(self) -> dict[str, Any]:
+        """Where it stands, in the words of :class:`sysid.composite.Standing`."""
+        return {"mapping": self.mapping, "instances": self.places, "shared": self.shared}
 
 
 class SweepSource(BaseModel):
@@ -66,26 +70,12 @@ class MemberConfig(StandingConfig):
     sweep: SweepSource | None = None
     traces: int | None = Field(default=None, ge=1)
 
-    @property
-    def slug(self) -> str:
-        """Name of its folder."""
-        return slug(str(self.mapping))
-
     @model_validator(mode="after")
     def _check(self) -> MemberConfig:
-        for structure in (self.structure, *self.alternatives):
-            if not isinstance(structure, NARX):
-                raise FieldError(
-                    f"{self.mapping} is {structure.kind}",
-                    expected="NARX; 0 neurons make it linear",
-                    got=structure.kind,
-                    remedy="write structure: {kind: NARX, ...}",
-                )
-            try:
-                structure.lags(len(self.mapping.inputs))
-                self.training_options(seed=0)
-            except ConfigError as error:
-                raise as_field_error(error) from error
+        try:
+            self.member(seed=0)
+        except ConfigError as error:
+            raise as_field_error(error) from error
         if self.candidates == 0 and self.sweep is None:
             raise FieldError(
                 f"{self.mapping} has no candidates",
@@ -95,34 +85,28 @@ class MemberConfig(StandingConfig):
             )
         return self
 
-    @property
-    def variants(self) -> tuple[MemberConfig, ...]:
-        """The member with each of its structures alone."""
-        structures = (self.structure, *self.alternatives)
-        return tuple(self.of_structure(structure) for structure in structures)
-
-    def of_structure(self, structure: AbstractStructure) -> MemberConfig:
-        """The member with one structure and no other.
+    def member(self, seed: int) -> Member:
+        """The member, as it is trained.
 
         Args:
-            structure: The structure.
+            seed: Of its first candidate, where its training names none.
 
         Returns:
             The member.
-        """
-        return self.model_copy(update={"structure": structure, "alternatives": (), "sweep": None})
 
-    def training_options(self, seed: int) -> Training:
-        """The options of the training, with a seed where none is named.
-
-        Args:
-            seed: The seed.
-
-        Returns:
-            The options.
+        Raises:
+            ConfigError: If it cannot be trained.
         """
         given = {} if self.training is None else {n: getattr(self.training, n) for n in self.training.model_fields_set}
-        return Training(**{"seed": seed, **given})
+        return Member(
+            **self.standing(),
+            structure=cast("NARX", self.structure),  # the member refuses any other kind
+            alternatives=cast("tuple[NARX, ...]", self.alternatives),
+            training=Training(**{"seed": seed, **given}),
+            rest=self.rest,
+            candidates=self.candidates,
+            traces=self.traces,
+        )
 
 
 class KnownConfig(StandingConfig):
@@ -148,38 +132,22 @@ class KnownConfig(StandingConfig):
 
     @model_validator(mode="after")
     def _check(self) -> KnownConfig:
-        if set(self.gains) - {self.mapping.output} != set(self.mapping.inputs):
-            raise FieldError(
-                f"the gains of {self.mapping} are not those of its inputs",
-                expected=f"one for each of {', '.join(self.mapping.inputs)}, with or without {self.mapping.output}",
-                got=", ".join(self.gains) or "none",
-                remedy="correct the gains or the mapping",
-            )
-        own = self.gains.get(self.mapping.output, 0.0)
-        if isinstance(own, dict):
-            raise FieldError(
-                f"{self.mapping.output} has weights by lag for its own past",
-                expected="one number, the weight of its last value",
-                got=", ".join(f"{lag}: {weight:g}" for lag, weight in own.items()),
-                remedy="write the weight of its last value",
-            )
-        if not self.low <= self.rest <= self.high or self.low == self.high:
-            raise FieldError(
-                f"the bounds of {self.mapping.output} do not hold its rest",
-                expected="low at most rest, rest at most high, low below high",
-                got=f"low {self.low:g}, rest {self.rest:g}, high {self.high:g}",
-                remedy="correct the bounds",
-            )
+        try:
+            self.fixed()
+        except ConfigError as error:
+            raise as_field_error(error) from error
         return self
 
-    @property
-    def weights(self) -> tuple[dict[int, float], ...]:
-        """For each input its weights by lag."""
-        given = (self.gains[name] for name in self.mapping.inputs)
-        return tuple(one if isinstance(one, dict) else {0: one} for one in given)
+    def fixed(self) -> FixedMember:
+        """The fixed submodel.
 
-    @property
-    def memory(self) -> float:
-        """The weight of its own last value."""
-        own = self.gains.get(self.mapping.output, 0.0)
-        return 0.0 if isinstance(own, dict) else own
+        Returns:
+            It.
+
+        Raises:
+            ConfigError: If its gains or bounds cannot be.
+        """
+        return FixedMember(
+            **self.standing(),
+            gains=self.gains, constant=self.constant, low=self.low, high=self.high, rest=self.rest, unit=self.unit,
+        )  # fmt: skip

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.composite.members import in_place
+from sysid.composite.candidates import Candidate, Candidates
+from sysid.composite.members import at_instance
 from sysid.models import NARXModel
 from sysid.reporting.comparing.published import PublishedTable
 from sysid.traces import Trace
-from sysid.workbench.assembly.candidates import Candidate, Candidates
 
 REPEATS = 5
 """Free runs that are timed."""
@@ -49,7 +49,7 @@ class CandidateScores:
     def name(self) -> str:
         """Structure and seed, and what became of it."""
         said = [word for word, yes in (("best alone", self.best), ("chosen", self.chosen)) if yes]
-        name = f"{self.candidate.member.structure.label}, seed {self.candidate.seed}"
+        name = f"{self.candidate.member.structure.label}, seed {self.candidate.member.training.seed}"
         return f"{name} ({', '.join(said)})" if said else name
 
 
@@ -94,7 +94,7 @@ def score_candidates(found: Candidates, cases: Sequence[Trace]) -> list[MemberSc
         needed = {*member.mapping.inputs, member.mapping.output}
         if (len(fits) == 1 and fits[0].one_step is None) or not all(needed <= {*one.channel_names} for one in cases):
             continue
-        own = [in_place(member, trace, member.places[0]) for trace in cases]
+        own = [at_instance(member, trace, member.instances[0]) for trace in cases]
         by_case = {case.name: trace for case, trace in zip(cases, own, strict=True)}
         scored.append(
             MemberScores(
@@ -185,7 +185,7 @@ def _one_step_table(scored: MemberScores, rows: Rows) -> dict[str, Any] | None:
             ("in free run", one.closed, "free_run"),
         ):
             if errors is not None:
-                said.append([f"{asked.label}, seed {one.candidate.seed}: {how}", *errors.values()])
+                said.append([f"{asked.label}, seed {one.candidate.member.training.seed}: {how}", *errors.values()])
                 said += asked.errors(run, "open", []) if last else []
     if not said:
         return None

@@ -5,17 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from sysid.composite import train
 from sysid.errors import ConfigError
 from sysid.models import Cascade, cascade_from_dict
 from sysid.reporting.comparing.published import read_published
 from sysid.reporting.judging.results import JudgementResults
+from sysid.workbench.assembly.begun import read_whole
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.assembly.finish import ASSEMBLY, LINE, Finish
 from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.material import Material
-from sysid.workbench.assembly.starts import train
+from sysid.workbench.assembly.swept import swept
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.runner.environment import environment
 from sysid.workbench.runner.naming import nearby
@@ -67,8 +69,14 @@ def _run(context: Context) -> tuple[JudgementResults, Path]:
     write_json(context.store.path / "environment.json", environment())
     if context.config.published_models is not None:
         read_published(context.config.published_models)  # a wrong name is said now, not when all is trained
-    cases, material = context.load(context.config.data), Material.of(context)
-    finish = Finish(context=context, trained=train(context, material))
+    config, notes = context.config, list[str]()
+    cases, material, begin = context.load(config.data), Material.of(context), None
+    if config.begin is not None:
+        begin, said = read_whole(context.beside / config.begin)
+        notes.append(said)
+    given = {member.mapping.output: swept(context, member) for member in config.members}
+    trained = train(config.composite, config.plan, material.data, begin=begin, given=given, keeper=context)
+    finish = Finish(context=context, trained=trained, notes=(*notes, *trained.notes))
     results = finish.results(cases, material)
     page = finish.report()
     finish.track(results, page)

@@ -7,8 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
+from sysid.composite import ActiveLearning, OneStep, Retraining, RoundPlan
+from sysid.errors import ConfigError
 from sysid.estimation import JointTraining
-from sysid.workbench.fields import STRICT, JointConfig, LagsField
+from sysid.workbench.fields import STRICT, JointConfig, LagsField, as_field_error
 from sysid.yaml_files import FieldError
 
 
@@ -24,6 +26,10 @@ class OneStepConfig(BaseModel):
 
     max_iterations: int = Field(default=200, ge=1)
     starts: int = Field(default=2, ge=1)
+
+    def options(self) -> OneStep:
+        """The options, as the training has them."""
+        return OneStep(max_iterations=self.max_iterations, starts=self.starts)
 
 
 class LessonsConfig(BaseModel):
@@ -58,6 +64,10 @@ class RetrainConfig(BaseModel):
     members: tuple[str, ...] = Field(min_length=1)
     max_iterations: int = Field(default=60, ge=1)
     rounds: int = Field(default=1, ge=1)
+
+    def options(self) -> Retraining:
+        """The options, as the training has them."""
+        return Retraining(members=self.members, max_iterations=self.max_iterations, rounds=self.rounds)
 
 
 Reads = dict[str, dict[str, LagsField]]
@@ -175,17 +185,29 @@ class TogetherConfig(BaseModel):
             found.append(found[-1].model_copy(update={**given, "training": training}))
         return tuple(found[1:])
 
-    def training_options(self, seed: int) -> JointTraining:
-        """The options of the training, with a seed where none is named.
+    def plan(self, seed: int) -> RoundPlan:
+        """The first round, as it is trained.
 
         Args:
-            seed: The seed.
+            seed: Of its training, where that names none.
 
         Returns:
-            The options.
+            The round.
+
+        Raises:
+            ConfigError: If it cannot be trained so.
         """
         given = {name: getattr(self.training, name) for name in self.training.model_fields_set}
-        return JointTraining(**{"seed": seed, **given})
+        return RoundPlan(
+            targets=self.targets,
+            members=self.members,
+            measured=self.measured,
+            share_weights=self.everywhere,
+            reads=self.reads,
+            training=JointTraining(**{"seed": seed, **given}),
+            traces=self.traces,
+            also=self.also,
+        )
 
 
 def check_rounds(rounds: Sequence[TogetherConfig]) -> None:
@@ -195,23 +217,13 @@ def check_rounds(rounds: Sequence[TogetherConfig]) -> None:
         rounds: The rounds, with all that they use.
 
     Raises:
-        FieldError: If one trains everywhere and names no members, or trains or judges what is to be as measured.
+        FieldError: If one shares weights and names no members, or trains or judges what is to be as measured.
     """
-    for one in rounds:
-        if one.everywhere and not one.members:
-            raise FieldError(
-                "a round that trains everywhere names no members",
-                expected="members that stand in the same places",
-                got="all of them",
-                remedy="name them under members",
-            )
-        if both := set(one.measured) & {*(one.members or ()), *one.targets}:
-            raise FieldError(
-                f"{', '.join(sorted(both))} is to be as measured, and trained or judged",
-                expected="outputs under measured that the same round has neither under members nor under targets",
-                got=f"measured {', '.join(one.measured)}",
-                remedy="take it out of measured, or out of the others",
-            )
+    try:
+        for one in rounds:
+            one.plan(seed=0)
+    except ConfigError as error:
+        raise as_field_error(error) from error
 
 
 def names_in(rounds: Sequence[TogetherConfig]) -> dict[str, tuple[str, ...]]:
@@ -284,3 +296,22 @@ class GrowConfig(BaseModel):
         if isinstance(self.add, tuple):
             return self.add
         return (self.add,) * (5 if self.rounds is None else self.rounds)
+
+    def options(self, rounds: Sequence[RoundPlan]) -> ActiveLearning:
+        """The options, as the training has them.
+
+        Args:
+            rounds: Of training end to end, which each round goes through.
+
+        Returns:
+            The options.
+        """
+        return ActiveLearning(
+            outputs=self.outputs,
+            within=self.within,
+            additions=self.additions,
+            until=self.until,
+            patience=self.patience,
+            pick=self.pick,
+            rounds=tuple(rounds),
+        )

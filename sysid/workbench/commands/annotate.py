@@ -13,7 +13,8 @@ from sysid.errors import ConfigError
 from sysid.ingest import load_dataset, write_trace
 from sysid.traces import TraceSet
 from sysid.units import Reference
-from sysid.workbench.annotation import Annotator, annotated_set, find_annotator
+from sysid.validation.annotator import Annotator
+from sysid.workbench.annotation import annotated_set, find_annotator
 from sysid.workbench.runner.listeners import console
 from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.store import write_bytes

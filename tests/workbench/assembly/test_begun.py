@@ -89,7 +89,6 @@ def test_a_round_may_have_closed_a_circle_before(workspace: Path) -> None:
     [
         ("neurons: 3}\n    rest: 0\ntogether", "neurons: 4}\n    rest: 0\ntogether", "has no such"),
         ("neurons: 3}", "neurons: 3, gated: true}", "has no such upper"),
-        ("seed: 3", "seed: 3\nstarts: 2", "begun from another one has starts"),
         ("together:", "retrain: {members: [lower]}\ntogether:", "begun from another one has retrain"),
     ],
 )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sysid.composite.training import ALONE, CHOSEN, ONE_STEP, RETRAINED, TOGETHER
 from sysid.traces import Channel, Role, Trace, TraceSet
-from sysid.workbench.assembly.course import ALONE, CHOSEN, ONE_STEP, RETRAINED, TOGETHER
 from sysid.workbench.assembly.lessons import Comparison, Lesson, lessons_of, lessons_point, lessons_table
 from sysid.workbench.assembly.stage_config import LessonsConfig
 

@@ -14,13 +14,14 @@ from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.assembly.line import line_of, places_of, score_line
 from sysid.workbench.assembly.proof_config import LineConfig
 from sysid.workbench.assembly.views import line_chart, line_metrics, line_point, line_table
-from tests.composite.test_members import TWO_PLACES, config, models, trace
+from tests.composite.composites import models, pipe, trace
+from tests.workbench.assembly.test_config import TWO_PLACES, config
 
 ASKED = LineConfig(channel="BP", knots={"BP": 1, "BP9": 9}, outputs=("AR",), data="places")
 
 
 def whole():
-    return assembled(config(), models())
+    return assembled(pipe(), models())
 
 
 def places(n: int = 120) -> TraceSet:

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid.composite.round import TrainedRound
 from sysid.estimation import CascadeFit, Status
 from sysid.reporting.judging.results import read_judgement_results
-from sysid.workbench.assembly.rounds import RoundDone, rounds_table
+from sysid.workbench.assembly.rounds import rounds_table
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.kinds import RunRequest
 from tests.models.cascades import service
@@ -57,7 +58,7 @@ def test_a_row_says_what_a_round_trained_and_what_it_brought(workspace: Path) ->
     assert not set(said) & set(found.judgement.sentences), "they stand in the table, and are no sentences of the page"
 
 
-def done(**changes: object) -> RoundDone:
+def done(**changes: object) -> TrainedRound:
     fit = CascadeFit(
         model=service(),
         status=Status.STOPPED_EARLY,
@@ -65,8 +66,8 @@ def done(**changes: object) -> RoundDone:
         history={"iteration": np.array([0.0, 1.0, 2.0]), "loss": np.array([4.0, 2.0, 1.0])},
         train_time_s=3.0,
     )
-    own = {"name": "1", "start": None, "trained": ("BC",), "everywhere": False, "measured": (), "traces": 5}
-    return RoundDone(**{"before": 2.0, "after": 0.5, "fit": fit, **own, **changes})
+    own = {"name": "1", "trained": ("BC",), "shared": False, "measured": (), "traces": 5}
+    return TrainedRound(**{"before": 2.0, "after": 0.5, "fit": fit, **own, **changes})
 
 
 def test_a_round_that_brought_nothing_has_no_curve_and_no_residual() -> None:
@@ -78,15 +79,12 @@ def test_a_round_that_brought_nothing_has_no_curve_and_no_residual() -> None:
 @pytest.mark.parametrize(
     ("changes", "column", "said"),
     [
-        ({"name": "3", "start": 2}, 0, "3 of start 2"),
         ({"name": "2.1 of growth"}, 0, "2.1 of growth"),
-        ({"trained": ("AR", "BC"), "everywhere": True}, 1, "AR, BC, everywhere"),
+        ({"trained": ("AR", "BC"), "shared": True}, 1, "AR, BC, everywhere"),
         ({"measured": ("BP", "AR", "ER")}, 2, "BP, AR, ER"),
         ({"measured": ("BP", "AR", "ER", "VO")}, 2, "4 outputs"),
     ],
 )
-def test_a_cell_says_which_start_it_was_names_a_few_outputs_and_counts_many(
-    changes: dict[str, object], column: int, said: str
-) -> None:
+def test_a_cell_names_a_few_outputs_and_counts_many(changes: dict[str, object], column: int, said: str) -> None:
     (row,) = rounds_table([done(**changes)])["rows"]
     assert row[column] == said

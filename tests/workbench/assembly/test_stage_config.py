@@ -23,7 +23,7 @@ def test_a_round_keeps_what_it_does_not_name():
     first, second, third = together(again=[{"traces": 5}, {"max_iterations": 4, "soft_margin": 1.0}]).rounds
     assert (first.traces, second.traces, third.traces) == (2, 5, 5)
     assert second.targets == first.targets
-    options = [one.training_options(seed=7) for one in (first, second, third)]
+    options = [one.plan(seed=7).training for one in (first, second, third)]
     assert [(one.max_iterations, one.soft_margin) for one in options] == [(9, 2.0), (9, 2.0), (4, 1.0)]
     assert {(one.stride, one.seed) for one in options} == {(3, 7)}
 
@@ -58,12 +58,12 @@ def test_a_round_that_inherits_a_measured_channel_does_not_judge_it():
 
 
 def test_without_a_soft_margin_squares_count():
-    assert together(training={"max_iterations": 9}).training_options(seed=0).soft_margin == np.inf
+    assert together(training={"max_iterations": 9}).plan(seed=0).training.soft_margin == np.inf
 
 
 def test_a_round_may_count_jumps_and_exploded_sensitivities_otherwise():
     rounds = together(again=[{"moves": 10}, {"leverage": 100}]).rounds
-    options = [one.training_options(seed=0) for one in rounds]
+    options = [one.plan(seed=0).training for one in rounds]
     assert [(one.moves, one.leverage) for one in options] == [(np.inf, np.inf), (10.0, np.inf), (10.0, 100.0)]
 
 

@@ -1,0 +1,237 @@
+"""Candidates for each member: fitted alone, the best of each by itself, and those that the whole does best with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from sysid.composite.composite import Composite, Member
+from sysid.composite.fixed_members import fixed_model
+from sysid.composite.keeper import Keeper, MakeAll, Task
+from sysid.composite.members import Members, geometric_mean, own_traces
+from sysid.composite.plan import TrainingPlan
+from sysid.composite.stages import Choice, choose_together, fit_member, model_of, one_step_of
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult
+from sysid.models import NARXModel
+from sysid.traces import Trace
+
+SEEDS_OF_A_CANDIDATE = 1000
+"""How far the seeds of one candidate are from the next one's of the same structure."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """One fit of a member.
+
+    Args:
+        member: The member, with the structure and the seed of this fit.
+        model: As it was fitted in free run, or as its training says.
+        one_step: Of the same structure, fitted one step ahead; ``None`` where that was not asked for.
+        error: Geometric mean over the selection traces of the mean squared error of the model's free run, alone and
+            behind measured inputs.
+    """
+
+    member: Member
+    model: NARXModel
+    one_step: NARXModel | None
+    error: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidates:
+    """All of a run.
+
+    Args:
+        fits: Candidates by the member's output.
+        fixed: The fixed submodels.
+        alone: Position of the candidate that is best by itself, by the member's output.
+        choice: What the whole does best with; ``None`` where there was nothing to choose.
+    """
+
+    fits: dict[str, tuple[Candidate, ...]]
+    fixed: Members
+    alone: dict[str, int]
+    choice: Choice | None
+
+    @property
+    def chosen(self) -> dict[str, int]:
+        """Position of the candidate that goes on, by the member's output."""
+        return self.alone if self.choice is None else self.choice.members
+
+    def models(self, positions: dict[str, int]) -> Members:
+        """The members with some of their candidates.
+
+        Args:
+            positions: Which, by the member's output.
+
+        Returns:
+            Their models, and the fixed ones.
+        """
+        return {name: fits[positions[name]].model for name, fits in self.fits.items()} | self.fixed
+
+    @property
+    def one_step(self) -> Members | None:
+        """The members that are best alone as they were fitted one step ahead; ``None`` without such fits."""
+        best = {name: fits[self.alone[name]].one_step for name, fits in self.fits.items()}
+        models = {name: model for name, model in best.items() if model is not None}
+        return {**models, **self.fixed} if len(models) == len(best) else None
+
+    @property
+    def sentence(self) -> str:
+        """What the choice came to; empty where there was nothing to choose."""
+        if self.choice is None:
+            return ""
+        changed = [name for name in self.fits if self.chosen[name] != self.alone[name]]
+        tried = f"Of {self.choice.tried} wholes tried,"
+        if changed:
+            return f"{tried} the best has another {', '.join(changed)} than the best alone."
+        return f"{tried} none beats the one of the members that are best alone."
+
+
+Given = Mapping[str, Sequence[FitResult]]
+"""By the member's output, fits that are candidates as they are."""
+
+
+def fit_candidates(
+    composite: Composite,
+    plan: TrainingPlan,
+    estimation: Sequence[Trace],
+    selection: Sequence[Trace],
+    *,
+    given: Given | None = None,
+    keeper: Keeper | None = None,
+) -> Candidates:
+    """Fit every candidate, each kept before the next, and let the whole choose.
+
+    Args:
+        composite: What is declared.
+        plan: Which outputs choose, and whether fits one step ahead stand beside.
+        estimation: Traces to fit.
+        selection: Traces that choose.
+        given: Candidates that are there already, behind the others.
+        keeper: Where fits are kept; nowhere by default.
+
+    Returns:
+        The candidates.
+
+    Raises:
+        ConfigError: If a member has no candidate, or a given one is no network of its mapping.
+    """
+    keeper = keeper or MakeAll()
+    asked = {one.output: _asked(one, (given or {}).get(one.output, ())) for one in composite.members}
+    fits = {
+        output: tuple(
+            _fitted(one, index, estimation, selection, plan=plan, keeper=keeper) for index, one in enumerate(wanted)
+        )
+        for output, wanted in asked.items()
+    }
+    fixed = {one.output: fixed_model(one, estimation[0]) for one in composite.fixed}
+    alone = {name: int(np.argmin([one.error for one in own])) for name, own in fits.items()}
+    found = Candidates(fits=fits, fixed=fixed, alone=alone, choice=None)
+    if max(map(len, fits.values())) == 1:
+        return found
+    return replace(found, choice=_choice(composite, plan, found, selection, keeper))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Asked:
+    """A candidate that is to be had: fitted, or given as it is."""
+
+    member: Member
+    given: FitResult | None = None
+
+
+def _asked(member: Member, given: Sequence[FitResult]) -> list[_Asked]:
+    """Every candidate of a member: of each structure from each seed, and the given ones."""
+    seeds = [member.training.seed + SEEDS_OF_A_CANDIDATE * number for number in range(member.candidates)]
+    own = [_Asked(member=variant.trained(seed=seed)) for variant in member.variants for seed in seeds]
+    for fit in given:
+        if not isinstance(fit.model, NARXModel) or fit.model.mapping != member.mapping:
+            raise ConfigError(
+                f"a candidate that is given is no network {member.mapping}",
+                where="given",
+                expected=f"fits of {member.mapping} with a NARX",
+                got=str(fit.model.mapping),
+                remedy="leave it out",
+            )
+        own.append(_Asked(member=member.of_structure(fit.model.network).trained(seed=fit.seed or 0), given=fit))
+    if not own:
+        raise ConfigError(
+            f"{member.mapping} has no candidates",
+            where="candidates",
+            expected="candidates from 1 on, or fits that are given",
+            got="none",
+            remedy="leave candidates out, for one",
+        )
+    return own
+
+
+def _fitted(
+    asked: _Asked,
+    index: int,
+    estimation: Sequence[Trace],
+    selection: Sequence[Trace],
+    *,
+    plan: TrainingPlan,
+    keeper: Keeper,
+) -> Candidate:
+    """One candidate."""
+    member, fit = asked.member, asked.given
+    title = f"{member.mapping}, candidate {index + 1}, {member.structure.label}"
+    if fit is None:
+        fit = keeper.keep(_task(member, f"{member.mapping} {index}", f"Fitting {title}", estimation, selection))
+    one_step = None
+    if plan.one_step is not None:
+        ahead = one_step_of(member, plan.one_step)
+        name, said = f"{member.mapping} {index} one step", f"Fitting {title}, one step ahead"
+        one_step = model_of(keeper.keep(_task(ahead, name, said, estimation, selection)))
+    model = model_of(fit)
+    return Candidate(member=member, model=model, one_step=one_step, error=_alone(member, model, selection))
+
+
+def _task(
+    member: Member, name: str, title: str, estimation: Sequence[Trace], selection: Sequence[Trace]
+) -> Task[FitResult]:
+    """A fit of a member alone."""
+    # Not all of the traces: what is declared beside a member leaves its fit as it was.
+    own = (*own_traces(member, estimation[: member.traces]), *own_traces(member, selection))
+    return Task(
+        name=name,
+        title=title,
+        terms={"member": member.terms, "data": [trace.digest for trace in own]},
+        runs=(fit_member,),
+        make=partial(fit_member, member, estimation, selection),
+        kind=FitResult,
+    )
+
+
+def _alone(member: Member, model: NARXModel, selection: Sequence[Trace]) -> float:
+    """A model's error by itself, behind measured inputs."""
+    errors = [
+        float(np.mean((model.simulate(t.columns(model.mapping.inputs)) - t[model.mapping.output]) ** 2))
+        for t in own_traces(member, selection)
+    ]
+    return geometric_mean(errors)
+
+
+def _choice(
+    composite: Composite, plan: TrainingPlan, found: Candidates, selection: Sequence[Trace], keeper: Keeper
+) -> Choice:
+    """Which candidates the whole does best with."""
+    title = "Choosing the members by the error of the whole"
+    keeper.say(title)
+    models = {name: [one.model for one in own] for name, own in found.fits.items()}
+    choice = choose_together(
+        composite,
+        {**models, **{name: [model] for name, model in found.fixed.items()}},
+        {**found.alone, **dict.fromkeys(found.fixed, 0)},
+        selection,
+        outputs=plan.outputs,
+        report=lambda text: keeper.say(title, text),
+    )
+    keeper.say(title, f"{choice.tried} wholes, best {choice.score:.3g}", done=True)
+    return choice

@@ -1,0 +1,78 @@
+"""Where the results of a long training are kept: a seam, so that the training knows no folder, screen or tracker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+from sysid.estimation import CascadeFit, FitProgress, FitResult
+
+Report = Callable[[FitProgress], None]
+"""Told after every iteration of a training."""
+
+Fit = TypeVar("Fit", FitResult, CascadeFit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task(Generic[Fit]):
+    """One fit that is to be had, made or found.
+
+    Args:
+        name: What it is stored as, different for every task of a training.
+        title: What it is for people.
+        terms: JSON values of all that its result depends on, beside the code.
+        runs: Functions and classes whose code it runs, or their addresses (``module:name``).
+        make: Does it; given whom to tell after every iteration.
+        kind: What comes of it, for who reads it back.
+        put: What a stored result comes to here: the same part of a whole may stand in another whole now.
+    """
+
+    name: str
+    title: str
+    terms: Mapping[str, Any]
+    runs: tuple[Callable[..., Any] | str, ...]
+    make: Callable[[Report], Fit]
+    kind: type[Fit]
+    put: Callable[[Fit], Fit] = lambda fit: fit
+
+
+class Keeper(Protocol):
+    """Gives the result of each task, stored or made now, and hears what is done beside."""
+
+    def keep(self, task: Task[Fit]) -> Fit:
+        """The result of a task.
+
+        Args:
+            task: The task.
+
+        Returns:
+            What its ``make`` gives, or gave when the terms were the same.
+        """
+
+    def say(self, title: str, detail: str = "", *, done: bool = False) -> None:
+        """Hear of work whose result is not kept.
+
+        Args:
+            title: The work.
+            detail: How it goes.
+            done: Whether it has ended.
+        """
+
+
+class MakeAll:
+    """A keeper that keeps nothing: every task is made.
+
+    Args:
+        on_progress: Told after every iteration of every training.
+    """
+
+    def __init__(self, on_progress: Report = lambda _: None) -> None:
+        self.on_progress = on_progress
+
+    def keep(self, task: Task[Fit]) -> Fit:
+        """Make it."""
+        return task.make(self.on_progress)
+
+    def say(self, title: str, detail: str = "", *, done: bool = False) -> None:
+        """Say nothing."""

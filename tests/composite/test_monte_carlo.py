@@ -1,0 +1,47 @@
+"""Monte Carlo test: what is lost is counted, the worst is named, and each state has its own errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid.composite.members import assembled
+from sysid.composite.monte_carlo import stress
+from sysid.traces import Channel, Trace
+from tests.composite.composites import models, pipe, trace
+
+
+def test_it_counts_what_is_lost_and_names_the_worst():
+    whole = assembled(pipe(), models())
+    sequences = [trace(seed=s) for s in range(12)]
+    found = stress(whole, sequences, "AR", limit=1e6)
+    errors = [np.sqrt(np.mean((whole.simulate_trace(t)["AR"] - t["AR"]) ** 2)) for t in sequences]
+    assert found.sequences == 12
+    assert found.within == 1.0
+    assert found.quantiles[1.0] == pytest.approx(max(errors))
+    assert found.worst[0][1] == pytest.approx(max(errors))
+    assert len(found.worst) == 10
+
+
+class Halves:
+    """An annotator: the first half of a trace is one state, the second another; a third never occurs."""
+
+    channel, labels = "state", ("early", "never", "late")
+
+    def __call__(self, trace: Trace) -> Trace:
+        numbers = np.repeat([0.0, 2.0], len(trace) // 2)
+        channels = (*trace.channels, Channel(name="state", unit="1"))
+        return replace(trace, channels=channels, values=np.column_stack([trace.values, numbers]))
+
+
+def test_it_says_what_the_errors_of_each_state_are():
+    whole = assembled(pipe(), models())
+    sequences = [trace(seed=s) for s in range(5)]
+    found = stress(whole, sequences, "AR", 1.0, annotator=Halves())
+    halves = [((whole.simulate_trace(t)["AR"] - t["AR"]) ** 2).reshape(2, -1).mean(axis=1) ** 0.5 for t in sequences]
+    for label, errors in zip(("early", "late"), np.transpose(halves), strict=True):
+        assert found.by_state[label][0.5] == pytest.approx(np.median(errors))
+        assert found.by_state[label][1.0] == pytest.approx(errors.max())
+    assert "never" not in found.by_state
