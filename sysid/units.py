@@ -9,6 +9,7 @@ Conversion happens once, at the door (ingest); inside everything is a plain floa
 from __future__ import annotations
 
 import enum
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -43,8 +44,120 @@ def _registry() -> pint.UnitRegistry[float]:
     return pint.UnitRegistry(cache_folder=None)
 
 
+# What people write and pint does not know, or takes for something else: "amps" are attometres per second to it,
+# "Nm" is a unit of yarn, "U/min" are enzyme units per minute.
+_WRITTEN = {
+    word: unit
+    for unit, words in {
+        "V": "volt|volts|vdc|vac",
+        "A": "amp|amps|ampere|amperes|adc|aac",
+        "W": "watt|watts",
+        "N": "newton|newtons",
+        "Pa": "pascal|pascals",
+        "ohm": "ohm|ohms",
+        "Hz": "hertz|hz|cps",
+        "K": "kelvin|kelvins|degk|°k",
+        "degC": "celsius|centigrade|degc|deg_c|deg c|deg. c|degrees c|degree c|°c|º c|ºc|° c|℃",
+        "degF": "fahrenheit|degf|deg_f|deg f|deg. f|degrees f|degree f|°f|ºf|° f|℉",
+        "m": "meter|meters|metre|metres",
+        "deg": "°|º|degs|degrees|degree",
+        "rad": "radian|radians|rads",
+        "s": "sec|secs|second|seconds|sek|sek.|sec.|sekunden",
+        "ms": "msec|msecs|millisecond|milliseconds",
+        "us": "usec|µsec|microsecond|microseconds",
+        "min": "minute|minutes|mins",
+        "hour": "hours|hrs|hr",
+        "1": "-|–|--|none|dimensionless|unitless|n/a|na|ratio|bool",
+        "percent": "%|pct|%rh|% rh|%r.h.|prozent",
+        "rpm": "rpm|u/min|rev/min|r/min|revs/min|revolutions/min|tr/min",
+        "N*m": "nm|n-m|n·m|n m|n.m|newton-meter|newtonmeter|newton meters",
+        "lbf*ft": "lb-ft|ft-lb|ft-lbs|lbf-ft|ft-lbf|lbft|ft lb",
+        "km/hour": "kph|kmh|km/hr",
+        "liter": "liter|liters|litre|litres|ltr",
+        "liter/min": "lpm|ltr/min|liters/min|litres/min",
+        "gallon/min": "gpm|gal/min",
+        "psi": "psi|lb/in2|lbf/in2",
+        **{unit: unit.casefold() for unit in ("bar", "mbar", "kPa", "hPa", "kHz", "mmHg", "inHg", "mmH2O", "inH2O")},
+        **{unit: unit.casefold() for unit in ("kWh", "kW", "kN")},
+    }.items()
+    for word in words.split("|")
+}
+_EXACT = {"nm": "nm", "MPA": "MPa", "kn": "knot", "mS": "mS", "MS": "MS"}
+"""Texts whose capitals matter: a nanometre is no newton metre."""
+
+# pint evaluates the exponents of a unit: 9**9**9**9 in a header would keep it busy for ever.
+_TOWER = re.compile(r"(?:\*\*|\^)[^*/^]*(?:\*\*|\^)|\d{5,}")
+_LONGEST_UNIT = 40
+# Normal and standard volumes (at 0 degC or 15 degC, by convention) are no unit of volume.
+_NORMAL_VOLUME = re.compile(r"[NS](?:m\s*(?:\^|\*\*)?\s*[3³]|[lL](?![A-Za-z])|cm)")
+_POWER = re.compile(r"\b([kcdmµu]?m|s|min|h|hr|in|ft|kg|K|V|A|N|mol)(-?[1-6])\b")
+_WORD = re.compile(r"[A-Za-z°µΩ%]+")
+
+
+@cache
+def plain_unit(unit: str) -> str | None:
+    """A unit as people write it, in the words that pint knows.
+
+    Args:
+        unit: For example ``"Amps"``, ``"m3/h"``, ``"Deg C"``, ``"kPa"``.
+
+    Returns:
+        For example ``"A"``, ``"m^3/h"``, ``"degC"``, ``"kPa"``; ``None`` if it is no unit that is known.
+
+    Example:
+        >>> plain_unit("Newtons"), plain_unit("m3/h"), plain_unit("Nm3/h")
+        ('N', 'm^3/h', None)
+    """
+    text = unit.strip()
+    if text in _USUAL:
+        return text
+    if not text or len(text) > _LONGEST_UNIT or _TOWER.search(text) or _NORMAL_VOLUME.match(text):
+        return None
+    written = _EXACT.get(text) or _WRITTEN.get(text.casefold())
+    if written is not None:
+        return written
+    words = _WORD.sub(lambda word: _EXACT.get(word[0]) or _WRITTEN.get(word[0].casefold(), word[0]), text)
+    return next((t for t in (text, _POWER.sub(r"\1^\2", text), _POWER.sub(r"\1^\2", words)) if _is_pint(t)), None)
+
+
+def _is_pint(text: str) -> bool:
+    try:
+        _registry().parse_units(text)
+    except Exception:  # noqa: BLE001 - pint raises many unrelated classes (tokenizer errors among them)
+        return False
+    return True
+
+
+_USUAL = frozenset(
+    {
+        "1",
+        "s",
+        "ms",
+        "us",
+        "ns",
+        "min",
+        "h",
+        "V",
+        "mV",
+        "kV",
+        "A",
+        "mA",
+        "Pa",
+        "hPa",
+        "kPa",
+        "MPa",
+        "bar",
+        "mbar",
+        "psi",
+    }
+    | {"m", "mm", "cm", "km", "um", "kg", "g", "N", "kN", "W", "kW", "J", "kJ", "Hz", "kHz", "K", "degC", "rad", "deg"}
+    | {"rpm", "percent", "m/s", "mm/s", "m/s^2", "km/h", "rad/s", "deg/s", "ohm", "l/min", "L/min"}
+)
+"""Units that need not be looked up: pint takes 0.3 s to import and build."""
+
+
 def check_unit(unit: str) -> str:
-    """Return ``unit`` if pint knows it.
+    """Return ``unit`` if pint knows it, or knows what people mean by it.
 
     Args:
         unit: For example ``"psi"``, ``"kPa"``, ``"V"``, ``"1"``.
@@ -64,15 +177,13 @@ def check_unit(unit: str) -> str:
             got=unit,
             remedy=f"write unit: {plain} and reference: {reference}",
         )
-    try:
-        _registry().parse_units(unit if unit != "1" else "dimensionless")
-    except Exception as error:  # pint raises many unrelated classes (tokenizer errors among them)
+    if plain_unit(unit) is None:
         raise UnitError(
             f"unknown unit {unit!r}",
-            expected="a unit known to pint, such as psi, kPa, bar, V, degC, m/s or 1",
+            expected="a unit known to pint, such as psi, kPa, bar, V, degC, m/s, m3/h or 1",
             got=unit,
-            remedy="correct the unit in the header or in the data set's dataset.yaml",
-        ) from error
+            remedy="correct the unit in the header or in the data set's dataset.yaml; 1 takes the numbers as they are",
+        )
     return unit
 
 
@@ -107,8 +218,7 @@ def convert(
         6.01325
     """
     to_reference = reference if to_reference is None else to_reference
-    source = _registry().parse_units(check_unit(unit) if unit != "1" else "dimensionless")
-    target = _registry().parse_units(check_unit(to_unit) if to_unit != "1" else "dimensionless")
+    source, target = _parsed(check_unit(unit)), _parsed(check_unit(to_unit))
     if not source.is_compatible_with(target):
         raise UnitError(
             f"cannot convert {unit} to {to_unit}",
@@ -128,3 +238,8 @@ def convert(
         return converted
     atmosphere = float(_registry().Quantity(STANDARD_ATMOSPHERE_PA, "Pa").to(target).magnitude)
     return converted + atmosphere if to_reference is Reference.ABSOLUTE else converted - atmosphere
+
+
+def _parsed(unit: str) -> pint.Unit:
+    plain = plain_unit(unit) or unit
+    return _registry().parse_units("dimensionless" if plain == "1" else plain)

@@ -16,7 +16,7 @@ from sysid.ingest import repairs as repair
 from sysid.ingest.grid import Gridded, fill, grid_places, place, resample
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions
 from sysid.ingest.repairs import Record
-from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.table import RawColumn, RawTable, time_unit
 from sysid.ingest.timing import Timing, survey
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
@@ -186,13 +186,21 @@ def stamps_in_seconds(table: RawTable, files: FileOptions) -> NDArray[np.float64
             got="none",
             remedy=f"write files: {{time: '{column.name} [s]'}}",
         )
-    return _converted(column.values, unit, "s", where=f"{table.source}, column {column.name}")
+    return _converted(column.values, time_unit(unit), "s", where=f"{table.source}, column {column.name}")
 
 
 def _in_unit(
     column: RawColumn, channel: Channel, given: ColumnOptions, files: FileOptions, source: Path
 ) -> tuple[NDArray[np.float64], str | None]:
     where = f"{source}, channel {channel.name} (column {column.name})"
+    if column.counted_from:
+        raise TraceError(
+            "integers are too large for float64",
+            where=where,
+            expected="integers of at most 53 bits",
+            got=f"values from {column.counted_from}",
+            remedy="subtract the first value before the export, or leave the channel out",
+        )
     declared = given.unit or _for_channel(files.units, channel.name)
     unit = declared or column.unit
     if unit is None:

@@ -8,14 +8,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sysid.errors import ReaderError, UnitError, UserError
+from sysid.errors import UnitError
 from sysid.ingest.assemble import stamps_in_seconds
+from sysid.ingest.attempts import Attempt, read_somehow
+from sysid.ingest.blanks import blanks_mean
+from sysid.ingest.clocks import clock_of
 from sysid.ingest.headers import is_unit, split_reference
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.readers.records import role_of
-from sysid.ingest.reading import read_table
-from sysid.ingest.table import RawColumn, RawTable, RecordChoice
+from sysid.ingest.table import RawColumn, RawTable, is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert
 
@@ -40,6 +43,7 @@ class ColumnFinding:
         reference: For pressures, what they are measured from.
         reference_guessed: Whether the reference is not from the file.
         description: As found in the file.
+        said: The unit that the file says, where it is none that is known.
         minimum: Smallest finite value, in its unit; NaN if there is none.
         maximum: Largest finite value, in its unit; NaN if there is none.
         missing: How many values are empty, NaN or infinite.
@@ -58,6 +62,7 @@ class ColumnFinding:
     missing: int
     problem: str = ""
     aside: str = ""
+    said: str = ""
 
     @property
     def constant(self) -> bool:
@@ -74,13 +79,14 @@ class FileFinding:
         reader: Name of the reader.
         columns: What is in each column but time.
         time: The time column and its unit; its ``step`` if the file has no time stamps.
-        time_guessed: Whether column or unit of time is not from the file.
+        time_told: What is guessed of time, for people; empty if the file says it.
         timing: The survey of the time stamps as they stand; ``None`` without time stamps.
         sample_time: Seconds between samples as proposed.
         samples: How many rows the file has.
         unstamped: How many of them have no time stamp.
         needed: The repairs that the file needs, with the gentlest choice of each.
         files: The reader options that the file was read with, where they are not recognised by itself.
+        guessed: The reader options among them that are guesses.
         table: The file as it was read.
         notes: What the reader recognised.
         cases: The records that the file holds, where they are several; their channels are then those of all.
@@ -90,7 +96,7 @@ class FileFinding:
     reader: str
     columns: tuple[ColumnFinding, ...]
     time: TimeOptions
-    time_guessed: bool
+    time_told: str
     timing: Timing | None
     sample_time: float
     samples: int
@@ -98,8 +104,14 @@ class FileFinding:
     needed: RepairOptions
     files: FileOptions
     table: RawTable = field(repr=False)
+    guessed: frozenset[str] = frozenset()
     notes: tuple[str, ...] = field(default=())
     cases: tuple[CaseFinding, ...] = field(default=())
+
+    @property
+    def time_guessed(self) -> bool:
+        """Whether column or unit of time is not from the file."""
+        return bool(self.time_told)
 
     @property
     def channels(self) -> tuple[ColumnFinding, ...]:
@@ -126,6 +138,8 @@ class FileFinding:
                 continue
             found += [f"{column.name}: {_count(column.missing, 'missing value')}"] if column.missing else []
             found += [f"{column.name}: never changes"] if column.constant and not column.aside else []
+            unknown = f"{column.name}: the file says {column.said}, which is no unit that is known"
+            found += [unknown] if column.said else []
         return tuple(found)
 
 
@@ -163,10 +177,10 @@ def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileF
         MissingExtraError: If its format needs a package that is not installed.
         UnitError: If its time column has a unit that is not one of time.
     """
-    table, files, repairs = _read_somehow(Path(path), files or FileOptions())
-    files = _written_down(files, table)
-    found = _finding(table, files, repairs)
-    return _of_records(found, table.records, files, repairs) if table.records else found
+    attempt = read_somehow(Path(path), files or FileOptions())
+    attempt = replace(attempt, files=_written_down(attempt.files, attempt.table))
+    found = _finding(attempt.table, attempt)
+    return _of_records(found, attempt) if attempt.table.records else found
 
 
 def _written_down(files: FileOptions, table: RawTable) -> FileOptions:
@@ -175,10 +189,11 @@ def _written_down(files: FileOptions, table: RawTable) -> FileOptions:
     return files.model_copy(update=guessed)
 
 
-def _finding(table: RawTable, files: FileOptions, repairs: RepairOptions) -> FileFinding:
-    time, guessed = _time(table, files)
+def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
+    files, repairs = attempt.files, attempt.repairs
+    time, told = _time(table, files)
     timing, unstamped, step = None, 0, time.step or 1.0
-    needs: dict[str, str | None] = {}
+    needs: dict[str, object] = {}
     if time.step is None:
         stamps = stamps_in_seconds(table, files.model_copy(update={"time": time}))
         known = stamps[np.isfinite(stamps)]
@@ -193,7 +208,7 @@ def _finding(table: RawTable, files: FileOptions, repairs: RepairOptions) -> Fil
         "ragged": repairs.ragged,
         "stamps": "drop" if unstamped else None,
         **needs,
-        "nan": "mask" if any(column.missing for column in channels) else None,
+        "nan": _nan([table.find(column.name) for column in channels if column.missing]),
         "constant": "accept" if any(column.constant for column in channels) else None,
     }
     return FileFinding(
@@ -201,7 +216,7 @@ def _finding(table: RawTable, files: FileOptions, repairs: RepairOptions) -> Fil
         reader=table.reader,
         columns=columns,
         time=time,
-        time_guessed=guessed,
+        time_told=told,
         timing=timing,
         sample_time=step,
         samples=len(table),
@@ -209,6 +224,7 @@ def _finding(table: RawTable, files: FileOptions, repairs: RepairOptions) -> Fil
         needed=RepairOptions.model_validate(needed),
         files=files,
         table=table,
+        guessed=attempt.guessed,
         notes=table.notes,
     )
 
@@ -219,12 +235,10 @@ def _other(column: RawColumn, usual: int) -> str:
     return f"{len(column.values)} samples, where the record has {usual}"
 
 
-def _of_records(
-    whole: FileFinding, records: Sequence[RecordChoice], files: FileOptions, repairs: RepairOptions
-) -> FileFinding:
+def _of_records(whole: FileFinding, attempt: Attempt) -> FileFinding:
     """The records of a file that go into one data set, and what all of them need."""
     cases = []
-    for record in records:
+    for record in attempt.table.records:
         role = role_of(record.name)
         cases.append(
             CaseFinding(
@@ -232,7 +246,7 @@ def _of_records(
                 role=role or "estimation",
                 role_guessed=role is None,
                 options=record.options,
-                finding=_finding(record.table, files, repairs),
+                finding=_finding(record.table, attempt),
             )
         )
     kinds: dict[object, list[CaseFinding]] = {}
@@ -285,58 +299,40 @@ def _merged(columns: Sequence[ColumnFinding]) -> ColumnFinding:
     )
 
 
-def _read_somehow(path: Path, files: FileOptions) -> tuple[RawTable, FileOptions, RepairOptions]:
-    """Read a file, trying in turn what a person would try if it cannot be read as it is."""
-    given = files.model_dump(exclude_unset=True)
-    further: list[dict[str, object]] = [{"thousands": ".", "decimal": "."}, {"time": {"unit": "datetime"}}]
-    tries = [(files, RepairOptions()), (files, RepairOptions(ragged="drop"))]
-    tries += [(FileOptions(**{**more, **given}), repairs) for more in further for _, repairs in tries[:2]]
-    best: tuple[RawTable, FileOptions, RepairOptions] | None = None
-    error: ReaderError | None = None
-    for options, repairs in tries:
-        try:
-            table = read_table(path, files=options, repairs=repairs)
-        except ReaderError as problem:
-            error = error or problem
-            continue
-        except UserError:
-            # An option of CSV means nothing for another format.
-            if options is files:
-                raise
-            continue
-        if best is None or _unusable(table) < _unusable(best[0]):
-            best = table, options, repairs
-        if _unusable(best[0]) == 0:
-            break
-    if best is None:
-        raise error or ReaderError("the file cannot be read", where=path)
-    return best
+def _nan(columns: Sequence[RawColumn]) -> str | dict[str, str] | None:
+    """What is done about missing values: one for all channels that have some, or one each."""
+    repairs: dict[str, str] = {column.name: blanks_mean(column.values) for column in columns}
+    return repairs if len(set(repairs.values())) > 1 else next(iter(repairs.values()), None)
 
 
-def _unusable(table: RawTable) -> int:
-    return sum(column.problem is not None for column in table.columns)
-
-
-def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, bool]:
-    """The time column, and whether it or its unit had to be guessed."""
-    if files.time.step is not None:
-        return files.time, False
-    if files.time.unit == "datetime":
-        return TimeOptions(column=table.time, unit="datetime", format=files.time.format), False
-    name = files.time.column or table.time or (_rising(table.columns) if table.step is None else None)
+def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
+    """The time column, and what of it or its unit had to be guessed."""
+    asked = files.time
+    if asked.step is not None:
+        return asked, ""
+    if table.settings.get("calendar") and table.time is not None:
+        return TimeOptions(column=table.time, unit="datetime", format=asked.format, zone=asked.zone), ""
+    name = asked.column or table.time or (_rising(table.columns) if table.step is None else None)
     if name is None and table.step is not None:
-        return TimeOptions(step=table.step), False
+        return TimeOptions(step=table.step), ""
     if name is None:
-        return TimeOptions(step=_step_in_a_column(table.columns) or 1.0), True
+        step = _step_in_a_column(table.columns)
+        return TimeOptions(step=step or 1.0), f"guessed: no time stamps, {step or 1.0:g} s between them"
     column = table.find(name)
-    unit = files.time.unit or column.unit or _unit_in_name(name)
+    by_rising = "" if name in {asked.column, table.time} else f"{name} is taken for time, as it rises"
+    clock = clock_of(column.values, column.name, origin=column.counted_from) if asked.unit is None else None
+    said = None if clock is not None and "clock" in table.settings else column.unit
+    unit = asked.unit or (said if said is not None and is_time_unit(said) else None) or _unit_in_name(name)
     if unit is not None:
-        return TimeOptions(column=column.name, unit=unit), name != (files.time.column or table.time)
-    steps = np.diff(column.values)
+        return TimeOptions(column=column.name, unit=unit), by_rising and f"guessed: {by_rising}"
+    if clock is not None:
+        return TimeOptions(column=column.name, unit=clock.unit), f"guessed: {name} counts {clock.told}, by its size"
+    steps = np.diff(column.values[:100_000])
     step = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
     # Few records are sampled slower than every 5 s, and few clocks count finer than they sample.
     guess = "s" if step < 5.0 else "ms" if step < 5e3 else "us"
-    return TimeOptions(column=column.name, unit=guess), True
+    why = f"the file says {said}, which is no unit of time" if said else "the file does not say its unit"
+    return TimeOptions(column=column.name, unit=guess), f"guessed: {by_rising or name} in {guess}; {why}"
 
 
 def _step_in_a_column(columns: Sequence[RawColumn]) -> float | None:
@@ -360,7 +356,7 @@ def _rising(columns: Sequence[RawColumn]) -> str | None:
     return None
 
 
-def _needs(known: np.ndarray, timing: Timing) -> tuple[float, dict[str, str | None]]:
+def _needs(known: NDArray[np.float64], timing: Timing) -> tuple[float, dict[str, object]]:
     """Sample time, and the repairs of time that the stamps need."""
     clean = survey(np.sort(known))
     if not clean.step > 0.0:
@@ -381,6 +377,8 @@ def _column(column: RawColumn) -> ColumnFinding:
     problem = "" if column.problem is None else column.problem.what
     if not problem and len(finite) < min(2, len(column.values)):
         problem = f"one value only, {finite[0]:g}" if len(finite) else "no values at all"
+    if column.counted_from and not problem:
+        problem = f"whole numbers of about {column.counted_from}, more than float64 can hold"
     in_file = column.unit if column.unit is not None and is_unit(column.unit) else None
     unit_text = in_file or _unit_in_name(column.name) or "1"
     unit, in_name = split_reference(unit_text)
@@ -398,6 +396,7 @@ def _column(column: RawColumn) -> ColumnFinding:
         missing=len(column.values) - len(finite),
         problem=problem,
         aside=column.aside,
+        said="" if in_file is not None or column.unit is None else column.unit,
     )
 
 
@@ -410,7 +409,7 @@ def _unit_in_name(name: str) -> str | None:
     return last if last != name and last in _UNITS_IN_NAMES else None
 
 
-def _guess_reference(values: np.ndarray, unit: str) -> Reference:
+def _guess_reference(values: NDArray[np.float64], unit: str) -> Reference:
     try:
         pascals = convert(values, unit, "Pa")
     except UnitError:

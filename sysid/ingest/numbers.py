@@ -7,15 +7,25 @@ refused, not read as 15: groups of thousands have three digits.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-MISSING = ("", "nan")
-"""Texts that stand for a missing value in every file, whatever their case."""
+MISSING = ("", "nan", "-nan", "+nan", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind", "1.#ind")
+"""Texts that stand for a missing value in every file, whatever their case: how C, MATLAB and Fortran write NaN."""
+
+USUAL_MISSING = frozenset(
+    {"na", "n/a", "#n/a", "n.a.", "null", "none", "nil", "nodata", "no data", "-", "--", "---", "----", "?", "???", "*"}
+    | {"err", "error", "bad", "bad input", "i/o timeout", "invalid", "overrange", "ovf", "ol", "open circuit", "fault"}
+    | {"#value!", "#num!", "#div/0!", "#ref!", "#name?", "#null!", "****", "*****", "missing", "inval"}
+)
+"""Texts that mostly stand for a missing value: proposed as ``missing``, and never taken so by themselves."""
+
+MOST_WORDS = 64
+"""Different texts that are no numbers, above which a column is one of remarks."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,11 +37,13 @@ class NumberFormat:
         thousands: What separates groups of three digits, or ``None``. If it equals ``decimal``, the
             last one in a number is the decimal one: some loggers write 1003 ms as ``1.003.000``.
         missing: Further texts that stand for a missing value.
+        states: Words that stand for numbers.
     """
 
     decimal: str = "."
     thousands: str | None = None
     missing: tuple[str, ...] = ()
+    states: Mapping[str, float] = field(default_factory=dict)
 
     def parse(self, cell: str) -> float | None:
         """One cell.
@@ -51,15 +63,17 @@ class NumberFormat:
         text = cell.strip()
         if text.lower() in MISSING or text in self.missing:
             return float("nan")
+        if text in self.states:
+            return self.states[text]
         if not _pattern(self.decimal, self.thousands).fullmatch(text):
             return None
         if self.thousands == self.decimal:
             head, _, tail = text.rpartition(self.decimal)
             text = f"{head.replace(self.decimal, '')}.{tail}" if head or tail != text else text
-            return float(text)
+            return _float(text)
         if self.thousands:
             text = text.replace(self.thousands, "")
-        return float(text.replace(self.decimal, "."))
+        return _float(text.replace(self.decimal, "."))
 
     def column(self, cells: Sequence[str]) -> NDArray[np.float64] | int:
         """A whole column.
@@ -70,21 +84,36 @@ class NumberFormat:
         Returns:
             Shape ``(len(cells),)``, or the index of the first cell that is not a number.
         """
+        values, strange = self.column_with_words(cells)
+        return next(iter(strange.values())) if strange else values
+
+    def column_with_words(self, cells: Sequence[str]) -> tuple[NDArray[np.float64], dict[str, int]]:
+        """A whole column, whatever is in it.
+
+        Args:
+            cells: Texts.
+
+        Returns:
+            Shape ``(len(cells),)``, NaN where a cell is not a number; and the texts of such cells (the first
+            ``MOST_WORDS`` different ones), each with the index of the first cell that holds it.
+        """
         fast = self._fast(cells)
         if fast is not None:
-            return fast
-        values = np.empty(len(cells))
+            return fast, {}
+        values = np.full(len(cells), np.nan)
+        strange: dict[str, int] = {}
         for index, cell in enumerate(cells):
             value = self.parse(cell)
-            if value is None:
-                return index
-            values[index] = value
-        return values
+            if value is not None:
+                values[index] = value
+            elif len(strange) < MOST_WORDS:
+                strange.setdefault(cell.strip(), index)
+        return values, strange
 
     def _fast(self, cells: Sequence[str]) -> NDArray[np.float64] | None:
         # float() knows more than the pattern does (1_0, 1.5 with a decimal comma, other scripts'
         # digits); a column without such characters can go through it at once.
-        if self.thousands is not None:
+        if self.thousands is not None or not cells:
             return None
         joined = "\n".join(cells)
         foreign = ("_", "." if self.decimal == "," else ",", "n", "N")
@@ -96,10 +125,17 @@ class NumberFormat:
             return None
 
 
+def _float(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float(text.lower().replace("d", "e"))  # 1.0D+03, as Fortran writes it
+
+
 @cache
 def _pattern(decimal: str, thousands: str | None) -> re.Pattern[str]:
     point = re.escape(decimal)
-    exponent = r"(?:[eE][+-]?[0-9]+)?"
+    exponent = r"(?:[eEdD][+-]?[0-9]+)?"
     infinite = r"[+-]?inf(?:inity)?"
     if thousands is None:
         body = rf"(?:[0-9]+(?:{point}[0-9]*)?|{point}[0-9]+)"

@@ -37,13 +37,15 @@ class TimeOptions(Options):
     Args:
         column: Its name in the file; ``None`` is the column that is recognised as time.
         unit: ``s``, ``ms``, ``min``, ``ds`` ..., or ``datetime`` for calendar time.
-        format: For ``datetime``: as for ``datetime.strptime``; ``None`` is ISO 8601.
+        format: For ``datetime``: as for ``datetime.strptime``; ``None`` recognises what is usual.
+        zone: For calendar time: the zone of the clock (``Europe/Berlin``), whose hours come twice or never.
         step: For a file without time stamps: seconds between its rows.
     """
 
     column: str | None = None
     unit: str | None = None
     format: str | None = None
+    zone: str | None = None
     step: Annotated[float, Field(gt=0)] | None = None
 
     @model_validator(mode="after")
@@ -62,7 +64,28 @@ class TimeOptions(Options):
                 got=f"unit: {self.unit}",
                 remedy="write unit: datetime, or remove format",
             )
+        if self.zone is not None and (self.step is not None or self.unit not in {None, "datetime"}):
+            raise FieldError(
+                "time.zone is for calendar time",
+                expected="unit: datetime beside it, or no unit",
+                got=f"unit: {self.unit}",
+                remedy="write unit: datetime, or remove zone",
+            )
         return self
+
+
+class LongOptions(Options):
+    """Where a long table (time, signal, value) has its names and values.
+
+    Args:
+        names: The column that says which signal a row is of.
+        values: The column of the values.
+        units: The column of the units, if there is one.
+    """
+
+    names: str
+    values: str
+    units: str | None = None
 
 
 def _column_short(value: Any) -> Any:
@@ -85,6 +108,26 @@ Rows = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)] | None]
 """First and last row, counted from 1."""
 
 
+def _state_words(value: Any) -> Any:
+    """YAML takes a bare ON or no for a truth value; as the name of a state each stands for all that YAML so reads."""
+    if not isinstance(value, dict):
+        return value
+    words: dict[Any, Any] = {}
+    for key, number in value.items():
+        if isinstance(number, dict):
+            words[str(key)] = _state_words(number)
+        elif isinstance(key, bool):
+            words |= dict.fromkeys(
+                (w for word in _TRUTH_WORDS[key] for w in (word, word.upper(), word.title())), number
+            )
+        else:
+            words[str(key)] = number
+    return words
+
+
+_TRUTH_WORDS = {True: ("on", "yes", "true", "y"), False: ("off", "no", "false", "n")}
+
+
 class FileOptions(Options):
     """How the files of a data set are read. What is not given is recognised from the file.
 
@@ -94,7 +137,7 @@ class FileOptions(Options):
         columns: Column of each channel, where its name in the file is another.
         units: Unit of each column that has none in the file: one for all, or by channel.
         references: ``gauge`` or ``absolute``: one for all pressures, or by channel.
-        separator: CSV: ``,``, ``;`` or a tab.
+        separator: CSV: ``,``, ``;``, ``|``, a tab, or a blank, which stands for a run of blanks.
         decimal: CSV: ``.`` or ``,``.
         thousands: CSV: what separates groups of three digits. Equal to ``decimal``, the last one in a
             number is the decimal one (``1.003.000`` is 1003).
@@ -105,6 +148,9 @@ class FileOptions(Options):
         units_line: CSV: whether a line of units follows the header.
         names: CSV: names of all columns, instead of the header's.
         missing: CSV: texts that stand for a missing value, besides empty cells and ``nan``.
+        states: Numbers that words stand for: ``{OFF: 0, ON: 1}`` for all columns, ``{valve: {shut: 0, open: 1}}`` for
+            one. TRUE and FALSE are 1 and 0 by themselves.
+        long: For a long table (time, signal, value): its columns of names and of values.
         group: HDF5, MDF, TDMS, MATLAB, NPZ, JSON, LVM: the group, structure or segment that holds the columns.
         sheet: Excel: name of the sheet.
         rows: First and last row of the record, counted from 1, both included; ``null`` is the end.
@@ -117,7 +163,7 @@ class FileOptions(Options):
     columns: dict[str, ColumnOption] = {}
     units: str | dict[str, str] = {}
     references: Reference | dict[str, Reference] = {}
-    separator: Literal[",", ";", "\t"] | None = None
+    separator: Literal[",", ";", "\t", "|", " "] | None = None
     decimal: Literal[".", ","] | None = None
     thousands: Literal[".", ",", "'", " "] | None = None
     comment: Annotated[str, Field(min_length=1)] = "#"
@@ -127,6 +173,8 @@ class FileOptions(Options):
     units_line: bool | None = None
     names: tuple[str, ...] | None = None
     missing: tuple[str, ...] = ()
+    states: Annotated[dict[str, float | dict[str, float]], BeforeValidator(_state_words)] = {}
+    long: LongOptions | None = None
     group: str | None = None
     sheet: str | None = None
     rows: Rows | None = None
@@ -165,6 +213,9 @@ class GridOptions(Options):
     fewest_samples: Annotated[int, Field(ge=2)] = 10
 
 
+NanRepair = Literal["interpolate", "hold", "mask"]
+
+
 class RepairOptions(Options):
     """The repairs that are asked for; each one that is made is recorded in the trace's provenance.
 
@@ -174,7 +225,8 @@ class RepairOptions(Options):
         backward: ``sort`` the samples by time, or ``drop`` those that step back.
         duplicates: ``drop`` all but the first sample of a time stamp, or ``average`` them.
         gaps: Fill by ``linear`` or ``hold``; ``mask`` fills and marks the samples as not usable.
-        nan: ``interpolate`` missing values, or ``mask`` their samples as not usable.
+        nan: ``interpolate`` missing values, ``hold`` the value before (a blank means: as before), or ``mask`` their
+            samples as not usable; one for all, or by channel.
         jitter: ``resample`` uneven time stamps by ``grid.method``.
         constant: ``accept`` channels that never change.
     """
@@ -184,6 +236,6 @@ class RepairOptions(Options):
     backward: Literal["sort", "drop"] | None = None
     duplicates: Literal["drop", "average"] | None = None
     gaps: Literal["linear", "hold", "mask"] | None = None
-    nan: Literal["interpolate", "mask"] | None = None
+    nan: NanRepair | dict[str, NanRepair] | None = None
     jitter: Literal["resample"] | None = None
     constant: Literal["accept"] | None = None

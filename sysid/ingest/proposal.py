@@ -11,7 +11,7 @@ from sysid.ingest.options import GridOptions
 from sysid.units import Reference
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_/.^-]*(?: [A-Za-z0-9_/.^-]+)*")
-_WORDS = {"true", "false", "null"}
+_WORDS = {"true", "false", "null", "on", "off", "yes", "no", "y", "n"}
 
 
 def propose_dataset(finding: FileFinding) -> str:
@@ -64,6 +64,7 @@ def _channel(column: ColumnFinding) -> str:
         what for what, is_guess in (("unit", column.unit_guessed), ("reference", column.reference_guessed)) if is_guess
     ]
     told = f"guessed: {' and '.join(guessed)}; " if guessed else ""
+    told += f"the file says {_comment(column.said)}; " if column.said else ""
     return f"{_mapping(pairs)}  # {told}{column.minimum:g} to {column.maximum:g}"
 
 
@@ -88,11 +89,18 @@ def _files(finding: FileFinding) -> list[str]:
     if time.step is not None:
         shown = f"{{step: {time.step!r}}}"
     else:
-        pairs = {"column": time.column, "unit": time.unit, "format": time.format}
+        pairs = {"column": time.column, "unit": time.unit, "format": time.format, "zone": time.zone}
         shown = _mapping({key: value for key, value in pairs.items() if value is not None})
-    lines = [] if own else [f"    time: {shown}" + ("  # guessed" if finding.time_guessed else "")]
-    options = finding.files.model_dump(exclude_unset=True, exclude={"time", "columns", "units", "references"})
-    lines += [f"    {key}: {_value(value)}" for key, value in options.items()]
+    told = finding.time_told or ("guessed: zone" if "zone" in finding.guessed else "")
+    told = told if not told or "guess" in told else f"guessed: {told}"
+    lines = [] if own else [f"    time: {shown}" + (f"  # {_comment(told)}" if told else "")]
+    options = finding.files.model_dump(
+        exclude_unset=True, exclude_none=True, exclude={"time", "columns", "units", "references"}
+    )
+    lines += [
+        f"    {key}: {_value(value)}" + ("  # guessed" if key in finding.guessed else "")
+        for key, value in options.items()
+    ]
     guessed = [column for column in finding.channels if column.unit_guessed]
     lines += [f"    units: {_mapping({column.name: column.unit for column in guessed})}"] if guessed else []
     unsaid = [column for column in finding.channels if column.reference_guessed]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import TraceError
+from sysid.errors import ConfigError, TraceError
 from sysid.ingest.options import RepairOptions
 from sysid.ingest.table import RawTable
 
@@ -165,8 +165,9 @@ def missing_values(record: Record, repairs: RepairOptions) -> Record:
 
     Args:
         record: Samples whose stamps rise.
-        repairs: ``nan: interpolate`` puts them on the line between their neighbours in time;
-            ``nan: mask`` does so too (or holds, at the ends) and marks the samples as not usable.
+        repairs: ``nan: interpolate`` puts them on the line between their neighbours in time; ``nan: hold`` takes the
+            value before; ``nan: mask`` interpolates (or holds, at the ends) and marks the samples as not usable.
+            Before a first value there is none to hold: those samples take the first and are marked.
 
     Returns:
         Samples with finite values.
@@ -174,29 +175,51 @@ def missing_values(record: Record, repairs: RepairOptions) -> Record:
     Raises:
         TraceError: If there are such values and no repair was asked for, if a channel has no other,
             or if one to be interpolated has a neighbour on one side only.
+        ConfigError: If a repair is asked for a channel that is not there.
     """
     bad = ~np.isfinite(record.values)
+    _check_names(record, repairs)
     if not bad.any():
         return record
-    values = record.values.copy()
+    values, marked = record.values.copy(), record.marked.copy()
     for column, name in enumerate(record.names):
         missing = bad[:, column]
-        if missing.any():
-            _check_missing(record, missing, name, repairs)
-            values[missing, column] = np.interp(
-                record.stamps[missing], record.stamps[~missing], values[~missing, column]
-            )
-            first = int(np.flatnonzero(missing)[0])
-            done = "interpolated" if repairs.nan == "interpolate" else "filled and masked"
-            record = record.noted(
-                f"{name}: {int(missing.sum())} missing values {done}, first at {record.at(first)}, "
-                f"longest run {_longest_run(missing)}"
-            )
-    marked = record.marked | bad.any(axis=1) if repairs.nan == "mask" else record.marked
+        if not missing.any():
+            continue
+        repair = repairs.nan.get(name) if isinstance(repairs.nan, dict) else repairs.nan
+        _check_missing(record, missing, name, repair)
+        known = np.flatnonzero(~missing)
+        if repair == "hold":
+            before = np.searchsorted(known, np.flatnonzero(missing), side="right") - 1
+            values[missing, column] = values[known[np.maximum(before, 0)], column]
+            marked[: known[0]] = True
+        else:
+            values[missing, column] = np.interp(record.stamps[missing], record.stamps[known], values[known, column])
+        if repair == "mask":
+            marked |= missing
+        first = int(np.flatnonzero(missing)[0])
+        done = {"interpolate": "interpolated", "hold": "as before", "mask": "filled and masked"}[repair or "mask"]
+        early = f", {known[0]} before the first value masked" if repair == "hold" and known[0] else ""
+        record = record.noted(
+            f"{name}: {int(missing.sum())} missing values {done}{early}, first at {record.at(first)}, "
+            f"longest run {_longest_run(missing)}"
+        )
     return replace(record, values=values, marked=marked)
 
 
-def _check_missing(record: Record, missing: NDArray[np.bool_], name: str, repairs: RepairOptions) -> None:
+def _check_names(record: Record, repairs: RepairOptions) -> None:
+    strangers = sorted(set(repairs.nan) - set(record.names)) if isinstance(repairs.nan, dict) else []
+    if strangers:
+        raise ConfigError(
+            f"repairs.nan names {strangers[0]}, which is not a channel",
+            where=f"the description of {record.table.source}",
+            expected=f"one of {', '.join(record.names)}",
+            got=strangers[0],
+            remedy="write the names of channels on the left",
+        )
+
+
+def _check_missing(record: Record, missing: NDArray[np.bool_], name: str, repair: str | None) -> None:
     first = int(np.flatnonzero(missing)[0])
     got = record.values[first, record.names.index(name)]
     if missing.all():
@@ -207,15 +230,15 @@ def _check_missing(record: Record, missing: NDArray[np.bool_], name: str, repair
             got="only empty cells or NaN",
             remedy="choose another column, or leave the channel out",
         )
-    if repairs.nan is None:
+    if repair is None:
         raise TraceError(
             f"{int(missing.sum())} values are missing",
             where=record.where(first, name),
             expected="a finite number in each sample",
             got=got,
-            remedy="ask for repairs: {nan: interpolate} or {nan: mask}",
+            remedy="ask for repairs: {nan: interpolate}, {nan: hold} (a blank means: as before) or {nan: mask}",
         )
-    if repairs.nan == "interpolate" and (missing[0] or missing[-1]):
+    if repair == "interpolate" and (missing[0] or missing[-1]):
         at = 0 if missing[0] else len(missing) - 1
         raise TraceError(
             "a value at the end of a record cannot be interpolated",

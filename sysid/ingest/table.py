@@ -12,16 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ReaderError
+from sysid.errors import ChannelError, ReaderError, UnitError
 from sysid.ingest.headers import parse_header, split_reference
-from sysid.units import Reference
+from sysid.ingest.words import Words
+from sysid.units import Reference, convert, plain_unit
 
 _TIME_NAMES = {
     "t", "time", "zeit", "tijd", "temps", "tiempo", "tempo", "tid", "timestamp", "timestamps", "time stamp",
-    "elapsed time", "elapsed", "seconds", "tout",
+    "elapsed time", "elapsed", "seconds", "tout", "date", "datum", "datetime", "date time", "date/time", "date & time",
+    "uhrzeit", "zeitstempel", "tijdstip", "clock", "hora", "heure", "fecha", "epoch", "unix time", "unixtime", "utc",
+    "local time", "localtime", "time of day", "timeofday",
 }  # fmt: skip
 _EXACT_INTEGERS = 2**53
-_TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour"}
+_TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,6 +40,9 @@ class RawColumn:
         problem: Why the column cannot be used; raised only when it is asked for, so that a column of
             remarks beside the measurements does no harm. Its values are NaN then.
         aside: Why it is not proposed as a channel, though it can be one.
+        words: The texts of a column of words.
+        strange: Texts in a column of numbers that are none.
+        counted_from: What the values are counted from: a clock that counts further than float64 can.
     """
 
     name: str
@@ -45,6 +51,9 @@ class RawColumn:
     reference: Reference | None = None
     description: str = ""
     problem: ReaderError | None = None
+    words: Words | None = None
+    strange: tuple[str, ...] = ()
+    counted_from: int = 0
     aside: str = ""
 
 
@@ -90,7 +99,7 @@ class RawTable:
     step: float | None = None
     others: tuple[RawColumn, ...] = ()
     records: tuple[RecordChoice, ...] = ()
-    lines: NDArray[np.int64] | None = None
+    lines: NDArray[np.integer[Any]] | None = None
     notes: tuple[str, ...] = ()
     metadata: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, object] = field(default_factory=dict)
@@ -243,8 +252,39 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
             stem = next((plain[: -len(u) - 1] for u in _TIME_UNITS if plain.endswith((f"_{u}", f".{u}"))), plain)
             if plain in _TIME_NAMES or stem in _TIME_NAMES:
                 return column.name
-    timed = [column.name for column in columns if column.unit in _TIME_UNITS]
+    timed = [column.name for column in columns if column.unit is not None and time_unit(column.unit) in _TIME_UNITS]
     return timed[0] if timed else None
+
+
+def is_time_unit(unit: str) -> bool:
+    """Whether a unit is one of time.
+
+    Args:
+        unit: As found in a file.
+
+    Returns:
+        True if it is.
+    """
+    if time_unit(unit) in _TIME_UNITS:
+        return True
+    try:
+        convert(np.zeros(1), unit, "s")
+    except UnitError:
+        return False
+    return True
+
+
+def time_unit(unit: str) -> str:
+    """A unit of time as pint writes it: in capitals, as loggers have it, it is another one to pint.
+
+    Args:
+        unit: For example ``"S"``, ``"MS"``, ``"ms"``.
+
+    Returns:
+        For example ``"s"``, ``"ms"``, ``"ms"``.
+    """
+    plain = plain_unit(unit.casefold()) or unit
+    return plain if plain in _TIME_UNITS else unit
 
 
 def array_column(

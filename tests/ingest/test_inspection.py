@@ -119,7 +119,7 @@ def test_a_sample_time_in_a_column_of_its_own_is_taken_and_is_no_channel(write: 
 
 def test_a_column_of_remarks_is_left_out_and_told(write: Write) -> None:
     path = write("run.csv", "t [s],state,u [V]\n" + rows(20, lambda i: f"{i},OK,{i}"))
-    assert inspect_file(path).problems == ("state: a cell is not a number",)
+    assert inspect_file(path).problems == ("state: the column holds words",)
     assert proposed(path).channels[0].name == "u"
 
 

@@ -1,195 +1,262 @@
-"""What a CSV file does not say about itself: encoding, separator, decimal mark, header lines."""
+"""What a text file does not say about itself: separator, decimal mark, where the numbers begin, and their header.
+
+The numbers are found first: the rows that go on, of one width and one kind in each column. The header is the last
+line before them, a line of units aside; what stands above it is a preamble.
+"""
 
 from __future__ import annotations
 
-import csv
-import io
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sysid.errors import ReaderError
-from sysid.ingest.headers import is_unit
 from sysid.ingest.numbers import NumberFormat
 from sysid.ingest.options import FileOptions
+from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, is_units, kind_of, split_rows, trimmed
 
-_SAMPLE_ROWS = 400
-_BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
+SEPARATORS = ("\t", ";", ",", "|", BLANKS)
+"""What may stand between cells; the earlier one wins where two fit."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """A row of cells and the line it stands on (the last one, if a cell holds line breaks)."""
-
-    line: int
-    cells: list[str]
+MOST_COLUMNS = 4096
+_SEP_LINE = re.compile(r'"?sep=(?P<mark>.)"?\s*', re.IGNORECASE)
+_COMMA = re.compile(r"[+-]?[0-9]*(?:[.' ][0-9]{3})*,[0-9]+(?:[eEdD][+-]?[0-9]+)?")
+_POINT = re.compile(r"[+-]?[0-9]*(?:[,' ][0-9]{3})*\.[0-9]+(?:[eEdD][+-]?[0-9]+)?")
+_MARKS = "#%!;/*'\" \t"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """How a CSV file is laid out.
+    """How a text file is laid out.
 
     Args:
-        separator: What stands between cells.
+        separator: What stands between cells; a blank is a run of blanks.
         numbers: How numbers are written.
-        header: Whether the first row holds names.
-        units_line: Whether the row after it holds units.
+        names: Texts of the header, one a column; empty where there is none.
+        units: Texts of the line of units, or ``None``.
+        kinds: What each column holds, as far as its first rows tell.
+        skip: How many lines stand before the first row of numbers.
+        header: Line of the header, or ``None``.
+        preamble: Rows before the header.
+        comments: Comments before the numbers, without their mark.
+        notes: What was recognised and should be told.
     """
 
     separator: str
     numbers: NumberFormat
-    header: bool
-    units_line: bool
+    names: tuple[str, ...]
+    units: tuple[str, ...] | None
+    kinds: tuple[Kind, ...]
+    skip: int
+    header: int | None
+    preamble: tuple[Row, ...]
+    comments: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
-def read_text(path: Path, encoding: str | None) -> tuple[str, str]:
-    """A text file decoded.
+@dataclass(frozen=True, kw_only=True)
+class _Split:
+    """The first rows of a file by one separator, and the longest run of rows of numbers among them."""
 
-    Args:
-        path: The file.
-        encoding: Its encoding, or ``None`` to recognise it: a byte-order mark, else UTF-8, else
-            Windows-1252.
+    separator: str
+    rows: list[Row]
+    kinds: tuple[Kind, ...] = ()
+    score: float = 0.0
 
-    Returns:
-        The text and the encoding.
+    @property
+    def width(self) -> int:
+        return len(self.kinds)
 
-    Raises:
-        ReaderError: If it is not text in that encoding.
-    """
-    raw = path.read_bytes()
-    marked = next((name for bom, name in _BOMS if raw.startswith(bom)), None)
-    tries = [encoding] if encoding is not None else [marked] if marked else ["utf-8", "cp1252"]
-    problem: Exception | None = None
-    for name in tries:
-        try:
-            text = raw.decode(name)
-        except (UnicodeDecodeError, LookupError) as error:
-            problem = error
-            continue
-        if "\x00" in text:
-            problem = ValueError("it holds zero bytes")
-            break
-        # An encoding that was asked for may leave the mark in the text.
-        return text.removeprefix("\ufeff"), name
-    raise ReaderError(
-        "the file is not text",
-        where=path,
-        expected=f"text in {' or '.join(tries)}",
-        got=problem,
-        remedy="check that it is a CSV file, or name its encoding (encoding: cp1252)",
-    )
+    def fits(self, row: Row) -> bool:
+        """Whether a row goes on as the run does."""
+        cells = trimmed(row.cells, self.width)
+        found = [kind_of(cell) for cell in cells]
+        return len(found) == self.width and _merged(self.kinds, found) is not None and any(k in DATA for k in found)
 
 
-def split_rows(text: str, separator: str, *, options: FileOptions, path: Path) -> tuple[list[Row], list[str]]:
-    """Cells of every row that is neither blank nor a comment.
+@dataclass(kw_only=True)
+class _Header:
+    names: Sequence[str] = ()
+    units: Sequence[str] | None = None
+    line: int | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def recognise(lines: Sequence[str], options: FileOptions, path: Path, *, whole: bool) -> Layout:
+    """The layout of a text file; what the options say is not guessed.
 
     Args:
-        text: The whole file.
-        separator: What stands between cells.
-        options: ``skip_lines`` and ``comment``.
-        path: The file, for errors.
-
-    Returns:
-        The rows, and the comments without their mark.
-
-    Raises:
-        ReaderError: If quotes do not close or a cell is absurdly long.
-    """
-    lines = io.StringIO(text, newline="")
-    for _ in range(options.skip_lines):
-        lines.readline()
-    comments: list[str] = []
-
-    def without_comments() -> io.StringIO:
-        # A comment becomes a blank line, so that the line numbers in messages stay those of the file.
-        kept = []
-        for line in lines:
-            if line.startswith(options.comment):
-                comments.append(line[len(options.comment) :].strip())
-                kept.append("\n")
-            else:
-                kept.append(line)
-        return io.StringIO("".join(kept), newline="")
-
-    parser = csv.reader(without_comments(), delimiter=separator, strict=True)
-    rows = []
-    try:
-        for cells in parser:
-            if any(cell.strip() for cell in cells):
-                rows.append(Row(line=parser.line_num + options.skip_lines, cells=cells))  # noqa: PERF401 - line_num moves with the loop
-    except csv.Error as error:
-        raise ReaderError(
-            "the file cannot be split into cells",
-            where=f"{path}, line {parser.line_num + options.skip_lines}",
-            expected="cells between separators, quotes in pairs",
-            got=error,
-            remedy="correct the line, or name the separator",
-        ) from error
-    return rows, comments
-
-
-def recognise(text: str, options: FileOptions, path: Path) -> Layout:
-    """The layout of a CSV file; what the options say is not guessed.
-
-    Args:
-        text: The whole file.
+        lines: Its first lines, without their ends.
         options: What is known already.
         path: The file, for errors.
+        whole: Whether these are all its lines.
 
     Returns:
         The layout.
 
     Raises:
-        ReaderError: If the decimal mark cannot be told.
+        ReaderError: If there are no numbers, the decimal mark cannot be told, or there are too many columns.
     """
-    head = "".join(_head_lines(text, options))
-    separator = options.separator or _separator(head, options, path)
-    rows, _ = split_rows(head, separator, options=options.model_copy(update={"skip_lines": 0}), path=path)
-    decimal = options.decimal or _decimal(rows, separator, path, options)
-    numbers = NumberFormat(decimal=decimal, thousands=options.thousands, missing=options.missing)
-    header = options.header if options.header is not None else bool(rows) and not _numeric(rows[0], numbers)
-    second = rows[1] if header and len(rows) > 1 else None
-    units_line = options.units_line if options.units_line is not None else second is not None and _is_units(second)
-    return Layout(separator=separator, numbers=numbers, header=header, units_line=units_line)
+    lines, told = _without_marks(lines, options)
+    comments = [
+        (i + 1, t[len(options.comment) :].strip()) for i, t in enumerate(lines) if t.startswith(options.comment)
+    ]
+    split = _best(lines, options.separator or told, options, path, whole=whole)
+    _check_width(split, path)
+    first = _first(split, options)
+    numbers = NumberFormat(
+        decimal=options.decimal or _decimal(split.rows[first:], path, options),
+        thousands=options.thousands,
+        missing=options.missing,
+    )
+    top = split.rows[first].first_line - 1
+    above = [(line, text) for line, text in comments if line <= top]
+    header = _header(split, first, above, options)
+    preamble = [row for row in split.rows[:first] if header.line is None or row.line < header.line]
+    if preamble:
+        shown = split.separator.join(preamble[0].cells).strip()[:60]
+        header.notes.append(f"{_lines(len(preamble))} before the header left out, the first: {shown!r}")
+    return Layout(
+        separator=split.separator,
+        numbers=numbers,
+        names=tuple(header.names),
+        units=None if header.units is None else tuple(header.units),
+        kinds=split.kinds,
+        skip=top,
+        header=header.line,
+        preamble=tuple(preamble),
+        comments=tuple(text for _, text in above),
+        notes=tuple(header.notes),
+    )
 
 
-def _head_lines(text: str, options: FileOptions) -> list[str]:
-    lines = io.StringIO(text, newline="")
-    for _ in range(options.skip_lines):
-        lines.readline()
-    kept: list[str] = []
-    for line in lines:
-        if not line.startswith(options.comment) and line.strip():
-            kept.append(line)
-        if len(kept) == _SAMPLE_ROWS:
+def _lines(count: int) -> str:
+    return "1 line" if count == 1 else f"{count} lines"
+
+
+def _without_marks(lines: Sequence[str], options: FileOptions) -> tuple[list[str], str | None]:
+    """The lines with those to be skipped made blank, and the separator that a first line ``sep=;`` names."""
+    kept = ["" if i < options.skip_lines else text for i, text in enumerate(lines)]
+    for index, text in enumerate(kept):
+        match = _SEP_LINE.fullmatch(text)
+        if match:
+            kept[index] = ""
+            return kept, match["mark"] if match["mark"] in SEPARATORS else None
+        if text.strip():
             break
-    return kept
+    return kept, None
 
 
-def _separator(head: str, options: FileOptions, path: Path) -> str:
-    # A tab or a semicolon that stands equally often in every row is one; a comma may be decimal.
-    plain = options.model_copy(update={"skip_lines": 0})
-    best, best_share = ",", 0.0
-    for candidate in ("\t", ";", ","):
+def _best(lines: list[str], given: str | None, options: FileOptions, path: Path, *, whole: bool) -> _Split:
+    best: _Split | None = None
+    problem: ReaderError | None = None
+    for separator in (given,) if given else SEPARATORS:
         try:
-            rows, _ = split_rows(head, candidate, options=plain, path=path)
-        except ReaderError:
+            ended = (f"{text}\n" for text in lines)
+            rows = split_rows(ended, separator, line=1, comment=options.comment, path=path, whole=whole)
+            found = _runs(separator, list(rows), options)
+        except ReaderError as error:
+            problem = problem or error
             continue
-        widths = [len(row.cells) for row in rows]
-        usual = max(set(widths), key=widths.count, default=1)
-        share = widths.count(usual) / len(widths) if usual > 1 else 0.0
-        if share > best_share + 0.2:  # the earlier candidate wins unless a later one fits clearly better
-            best, best_share = candidate, share
+        if best is None or found.score > best.score + 1e-9:
+            best = found
+    if best is None or (best.width < 2 and problem is not None):
+        raise problem or ReaderError("the file cannot be split into cells", where=path)
+    if not best.kinds:
+        shown = next((text.strip() for text in reversed(lines) if text.strip()), "")
+        raise ReaderError(
+            "the file holds no samples",
+            where=path,
+            expected="a header line and rows of numbers",
+            got=f"no row of numbers; the last line looked at is {shown[:80]!r}" if shown else "no line but blank ones",
+            remedy="check that the recording was saved, and the options separator, decimal, comment and skip_lines",
+        )
     return best
 
 
-def _decimal(rows: list[Row], separator: str, path: Path, options: FileOptions) -> str:
-    if separator == "," or options.thousands == ",":
+def _runs(separator: str, rows: list[Row], options: FileOptions) -> _Split:
+    """The longest run of rows of one width and one kind in each column; the more numbers in a row, the better."""
+    best: tuple[Kind, ...] = ()
+    run: tuple[Kind, ...] = ()
+    best_score = 0.0
+    length = 0
+    for row in rows:
+        kinds = tuple(kind_of(cell, options.missing) for cell in row.cells)
+        merged = _merged(run, kinds)
+        length, run = (1, kinds) if merged is None else (length + 1, merged)
+        score = length * _numeric(run) ** 2
+        if score > best_score:
+            best, best_score = run, score
+    split = _Split(separator=separator, rows=rows, kinds=best)
+    if not best:
+        return split
+    fitting = sum(map(split.fits, rows)) * _numeric(best) ** 2 * (1.0 if len(best) > 1 else 0.5)
+    alike = sum(len(trimmed(row.cells, len(best))) == len(best) > 1 for row in rows)
+    return replace(split, score=(fitting + 0.25 * alike) / len(rows))
+
+
+def _numeric(kinds: Sequence[Kind]) -> float:
+    """The share of numbers in what a row holds."""
+    return sum(kind in DATA for kind in kinds) / max(sum(kind is not Kind.NOTHING for kind in kinds), 1)
+
+
+def _merged(run: Sequence[Kind], kinds: Sequence[Kind]) -> tuple[Kind, ...] | None:
+    """What two rows hold together, or ``None`` if they do not go on from each other."""
+    if len(run) != len(kinds):
+        return None
+    merged = []
+    for known, new in zip(run, kinds, strict=True):
+        if known is new or new is Kind.NOTHING:
+            merged.append(known)
+        elif known is Kind.NOTHING:
+            merged.append(new)
+        elif {known, new} == {Kind.NUMBER, Kind.WHOLE}:
+            merged.append(Kind.WHOLE)
+        else:
+            return None
+    return tuple(merged)
+
+
+def _check_width(split: _Split, path: Path) -> None:
+    if split.width <= MOST_COLUMNS:
+        return
+    raise ReaderError(
+        f"the file has {split.width:,} columns",
+        where=f"{path}, line {split.rows[-1].line}",
+        expected=f"at most {MOST_COLUMNS:,}: a column per signal, a line per sample",
+        got=f"{split.width:,}",
+        remedy=f"cut out those that are needed: cut -d '{split.separator}' -f 1-{MOST_COLUMNS} '{path}' > cut.csv",
+    )
+
+
+def _first(split: _Split, options: FileOptions) -> int:
+    """Index of the first row of numbers."""
+    if options.header is False:
+        return next(i for i, row in enumerate(split.rows) if len(trimmed(row.cells, split.width)) == split.width)
+    fitting = [i for i, row in enumerate(split.rows) if split.fits(row)]
+    first = fitting[0]
+    if options.header and first == 0 and len(split.rows) > 1:
+        return 1
+    while first > 1 and _is_spoilt(split, first - 1):
+        first -= 1
+    return first
+
+
+def _is_spoilt(split: _Split, index: int) -> bool:
+    """Whether a row that does not fit is one of numbers with a bad cell, below a row of words."""
+    rows = [trimmed(row.cells, split.width) for row in split.rows[index - 1 : index + 1]]
+    if any(len(cells) != split.width for cells in rows):
+        return False
+    above, here = (sum(kind_of(cell) in DATA for cell in cells) for cells in rows)
+    return above == 0 and 2 * here >= sum(kind in DATA for kind in split.kinds)
+
+
+def _decimal(rows: Sequence[Row], path: Path, options: FileOptions) -> str:
+    if options.thousands == ",":
         return "."
-    with_comma = re.compile(r"[+-]?[0-9]*(?:[.'][0-9]{3})*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-    with_point = re.compile(r"[+-]?[0-9]*(?:[,'][0-9]{3})*\.[0-9]+(?:[eE][+-]?[0-9]+)?")
-    commas = next((row for row in rows for cell in row.cells if with_comma.fullmatch(cell.strip())), None)
-    points = next((row for row in rows for cell in row.cells if with_point.fullmatch(cell.strip())), None)
+    commas = next((row for row in rows for cell in row.cells if _COMMA.fullmatch(cell.strip())), None)
+    points = next((row for row in rows for cell in row.cells if _POINT.fullmatch(cell.strip())), None)
     if commas and points and options.thousands is None:
         raise ReaderError(
             "the file holds numbers with a decimal comma and numbers with a decimal point",
@@ -201,29 +268,61 @@ def _decimal(rows: list[Row], separator: str, path: Path, options: FileOptions) 
     return "," if commas else "."
 
 
-def _numeric(row: Row, numbers: NumberFormat) -> bool:
-    filled = [cell for cell in row.cells if cell.strip()]
-    return any(numbers.parse(cell) is not None or _looks_numeric(cell) for cell in filled)
+def _header(split: _Split, first: int, comments: list[tuple[int, str]], options: FileOptions) -> _Header:
+    """Names and units: the last lines before the numbers, else the last comment before them."""
+    found = _Header()
+    if options.header is False:
+        return found
+    above = list(split.rows[:first])
+    if options.units_line or (options.units_line is None and len(above) > 1 and _is_units(above, split)):
+        found.units = _to_width(above.pop().cells, split)
+    if above:
+        row = above[-1]
+        cells = _to_width(row.cells, split)
+        repeats = cells is not None and len({cell.strip() for cell in cells if cell.strip()}) < sum(map(_filled, cells))
+        upper = _to_width(above[-2].cells, split) if repeats and len(above) > 1 else None
+        if upper is not None:  # a line of types or of numbers of channels below the names
+            row, cells = above[-2], upper
+        if cells is not None:
+            found.names, found.line = [re.sub(r"^(?:%|//|!|;|\*)+\s*(?=\S)", "", cells[0]), *cells[1:]], row.line
+            return found
+        if split.separator != BLANKS and len(row.cells) > 1:
+            found.notes.append(
+                f"line {row.line} before the numbers has {len(row.cells)} cells for {split.width} columns, "
+                "which are numbered; names: [...] names them"
+            )
+    for line, text in comments[-1:]:
+        cells = _to_width(text.split(split.separator) if split.separator != BLANKS else text.split(), split, text)
+        if cells is not None and (split.width > 1 or len(text.split()) == 1):
+            found.names, found.line = [cell.strip(_MARKS) for cell in cells], line
+            found.notes.append(f"names from the comment in line {line}")
+    return found
 
 
-def _looks_numeric(cell: str) -> bool:
-    # Even a number that this format refuses (1.003.000) does not make a row a header.
-    return re.fullmatch(r"[+-]?[0-9][0-9.,' ]*", cell.strip()) is not None
+def _filled(cell: str) -> bool:
+    return bool(cell.strip())
 
 
-def _is_units(row: Row) -> bool:
-    filled = [cell.strip() for cell in row.cells if cell.strip()]
-    return bool(filled) and all(is_unit(unit_text(cell)) for cell in filled)
+def _is_units(above: list[Row], split: _Split) -> bool:
+    units, names = (_to_width(row.cells, split) for row in (above[-1], above[-2]))
+    if units is None or names is None or not is_units(units):
+        return False
+    # Short names are units too (t, u, V): without brackets it is the line above that must look like names.
+    return sum(map(_filled, names)) >= sum(map(_filled, units)) and not any(kind_of(cell) in DATA for cell in names[:1])
 
 
-def unit_text(cell: str) -> str:
-    """The unit in a cell of a units line, without brackets.
-
-    Args:
-        cell: For example ``"[kPa]"``.
-
-    Returns:
-        For example ``"kPa"``.
-    """
-    text = cell.strip()
-    return text[1:-1].strip() if text[:1] + text[-1:] in {"[]", "()"} else text
+def _to_width(cells: list[str], split: _Split, text: str | None = None) -> list[str] | None:
+    """A header brought to the width of the numbers, or ``None`` if it does not fit them."""
+    cells, width = trimmed(cells, split.width), split.width
+    if split.separator == BLANKS and len(cells) != width:
+        text = " ".join(cells) if text is None else text
+        for cut in (
+            re.sub(r"\s+(?=[\[(<])", "", text.strip()).split(),  # t [s]  u [V]
+            re.split(r"\t|\s{2,}", text.strip()),
+            text.strip().strip(_MARKS).split(),
+        ):
+            if len(cut) == width:
+                return cut
+    if len(cells) == width - 1 > 0 and split.kinds[-1] is Kind.NOTHING:
+        cells = [*cells, ""]
+    return cells if len(cells) == width else None

@@ -1,67 +1,66 @@
 """CSV and its relatives: any of the usual separators and decimal marks, units in the header or below it.
 
-Comments of the form ``# key: value`` before the header become metadata.
+Comments of the form ``# key: value`` before the header, and lines of two cells in a preamble, become metadata.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
-from sysid.ingest.calendar import seconds_since_first
+from sysid.ingest.calendar import Calendar
 from sysid.ingest.headers import Header, parse_header, split_reference
 from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.readers.csv_layout import Layout, Row, read_text, recognise, split_rows, unit_text
+from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
+from sysid.ingest.readers.csv_cells import Kind, unit_text
+from sysid.ingest.readers.csv_layout import Layout, recognise
 from sysid.ingest.readers.reader import Reader
+from sysid.ingest.readers.text_source import open_text
 from sysid.ingest.table import RawColumn, RawTable, recognise_time
+from sysid.ingest.words import WordCollector, states_for
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
-    text, encoding = read_text(path, options.encoding)
-    layout = recognise(text, options, path)
-    rows, comments = split_rows(text, layout.separator, options=options, path=path)
-    headers, body = _headers(rows, layout, options, path)
-    body, notes = _regular(body, len(headers), repairs, path)
-    if len(headers) > 1 and not headers[-1].name and not any(row.cells[len(headers) - 1].strip() for row in body):
-        headers = headers[:-1]  # a separator at the end of every line
-    lines = np.array([row.line for row in body], dtype=np.int64)
-    calendar = _calendar_column(headers, options)
-    columns = []
-    for index, header in enumerate(headers):
-        cells = [row.cells[index] for row in body]
-        if index == calendar:
-            where = f"{path}, column {header.name}"
-            seconds = seconds_since_first(cells, options.time.format, lines=lines, where=where)
-            columns.append(RawColumn(name=header.name, values=seconds, unit="s"))
-        else:
-            columns.append(_column(header, cells, layout=layout, lines=lines, path=path))
+    file = open_text(path, options.encoding)
+    lines, whole = file.head()
+    layout = recognise(lines, options, path, whole=whole)
+    headers = _headers(layout, options, path)
+    time = _calendar_column(headers, layout, options)
+    columns = [_column(i, header, layout, options, path, calendar=i == time) for i, header in enumerate(headers)]
+    body = Body(file=file, layout=layout, columns=columns, comment=options.comment, repairs=repairs)
+    rows = body.read()
+    notes = [*layout.notes, *body.notes]
+    raw, guess = _finished(headers, columns, layout, path, notes, calendar=time)
     if layout.numbers.decimal != ".":
         notes.append("decimal comma")
     return RawTable(
         source=path,
         reader="csv",
-        columns=tuple(columns),
-        time=columns[calendar].name if calendar is not None else recognise_time(columns),
-        lines=lines,
+        columns=raw,
+        time=headers[time].name if time is not None else recognise_time(raw),
+        lines=rows,
         notes=tuple(notes),
-        metadata=dict(_metadata(comments)),
+        metadata=dict(_metadata(layout)),
         settings={
             "separator": layout.separator,
             "decimal": layout.numbers.decimal,
-            "encoding": encoding,
-            "header": layout.header,
-            "units_line": layout.units_line,
+            "encoding": file.encoding,
+            "header": layout.header is not None,
+            "units_line": layout.units is not None,
+            "calendar": time is not None,
+            "zone": guess,
         },
     )
 
 
 READER = Reader(
     name="csv",
-    suffixes=(".csv", ".tsv", ".txt", ".dat", ".asc"),
+    suffixes=(".csv", ".tsv", ".txt", ".dat", ".asc", ".prn", ".tab"),
     read=_read,
     options=frozenset(
         {"separator", "decimal", "thousands", "comment", "encoding", "skip_lines", "header", "units_line"}
@@ -70,90 +69,171 @@ READER = Reader(
 )
 
 
-def _headers(rows: list[Row], layout: Layout, options: FileOptions, path: Path) -> tuple[list[Header], list[Row]]:
-    if not rows:
-        raise ReaderError(
-            "the file holds no samples",
-            where=path,
-            expected="a header line and rows of numbers",
-            got="no line that is neither blank nor a comment",
-            remedy="check that the recording was saved, and the options comment and skip_lines",
-        )
-    width = len(rows[0].cells)
-    texts = rows[0].cells if layout.header else [f"column_{index + 1}" for index in range(width)]
+def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
+    width = len(layout.kinds)
+    texts: Sequence[str] = layout.names or [f"column_{index + 1}" for index in range(width)]
     if options.names is not None:
-        texts = _given_names(options.names, rows[0], path)
+        texts = _given_names(options.names, layout, path)
     headers = [parse_header(text) for text in texts]
-    body = rows[1:] if layout.header else rows
-    if layout.header and layout.units_line and body:
-        units = [split_reference(unit_text(cell)) for cell in body[0].cells]
+    if layout.units is not None:
+        units = [split_reference(unit_text(cell)) for cell in layout.units]
         headers = [
             Header(name=header.name, unit=unit or header.unit, reference=reference or header.reference)
-            for header, (unit, reference) in zip(headers, units, strict=False)
+            for header, (unit, reference) in zip(headers, units, strict=True)
         ]
-        body = body[1:]
-    nameless = [index for index, header in enumerate(headers) if not header.name]
-    if nameless and nameless != [len(headers) - 1]:
-        raise ReaderError(
-            f"column {nameless[0] + 1} has no name",
-            where=f"{path}, line {rows[0].line}",
-            expected="a name for each column",
-            got=", ".join(repr(text) for text in texts),
-            remedy="name it in the file, or give names: [...] for all columns",
-        )
-    return headers, body
+    return headers
 
 
-def _given_names(names: Sequence[str], first: Row, path: Path) -> list[str]:
-    filled = len(first.cells) - (1 if len(first.cells) > 1 and not first.cells[-1].strip() else 0)
-    if len(names) not in {filled, len(first.cells)}:
+def _given_names(names: Sequence[str], layout: Layout, path: Path) -> list[str]:
+    width = len(layout.kinds)
+    # A separator at the end of every line makes a column that needs no name.
+    filled = width - 1 if width > 1 and layout.kinds[-1] is Kind.NOTHING else width
+    if len(names) not in {filled, width}:
         raise ReaderError(
             "names does not fit the columns",
-            where=f"{path}, line {first.line}",
-            expected=f"{len(first.cells)} names",
+            where=f"{path}, line {layout.skip + 1}",
+            expected=f"{width} names",
             got=f"{len(names)}: {', '.join(names)}",
             remedy="give one name per column of the file, in order",
         )
-    return [*names, *[""] * (len(first.cells) - len(names))]
+    return [*names, *[""] * (width - len(names))]
 
 
-def _regular(body: list[Row], width: int, repairs: RepairOptions, path: Path) -> tuple[list[Row], list[str]]:
-    if body and all(len(row.cells) == width + 1 and not row.cells[-1].strip() for row in body):
-        return [Row(line=row.line, cells=row.cells[:width]) for row in body], []
-    ragged = [row for row in body if len(row.cells) != width]
-    if not ragged:
-        return body, []
-    if repairs.ragged == "drop":
-        note = f"{len(ragged)} ragged rows dropped, first at line {ragged[0].line}"
-        return [row for row in body if len(row.cells) == width], [note]
-    raise ReaderError(
-        f"{len(ragged)} rows have too many or too few cells",
-        where=f"{path}, line {ragged[0].line}",
-        expected=f"{width} cells, as in the header",
-        got=f"{len(ragged[0].cells)} cells: {ragged[0].cells}",
-        remedy="correct the line or the separator, or ask for repairs: {ragged: drop}",
-    )
-
-
-def _calendar_column(headers: Sequence[Header], options: FileOptions) -> int | None:
-    """Index of the column of calendar time, if the options say that there is one."""
-    if options.time.unit != "datetime":
+def _calendar_column(headers: Sequence[Header], layout: Layout, options: FileOptions) -> int | None:
+    """Index of the column of calendar time that is time, if there is one."""
+    names, asked = [header.name for header in headers], options.time
+    if asked.step is not None or asked.unit not in {None, "datetime"}:
         return None
-    names = [header.name for header in headers]
-    if options.time.column in names:
-        return names.index(options.time.column)
-    bare = [RawColumn(name=name, values=np.empty(0)) for name in names]
-    recognised = recognise_time(bare) if options.time.column is None else None
-    return names.index(recognised) if recognised else 0
+    if asked.column is not None:
+        here = asked.column in names and (
+            asked.unit == "datetime" or layout.kinds[names.index(asked.column)] is Kind.TIME
+        )
+        return names.index(asked.column) if here else None
+    bare = [RawColumn(name=header.name, values=np.empty(0), unit=header.unit) for header in headers]
+    named = recognise_time(bare)
+    if named is not None and (asked.unit == "datetime" or layout.kinds[names.index(named)] is Kind.TIME):
+        return names.index(named)
+    if named is not None and layout.kinds[names.index(named)] is not Kind.TIME and asked.unit is None:
+        return None
+    return layout.kinds.index(Kind.TIME) if Kind.TIME in layout.kinds else 0 if asked.unit == "datetime" else None
 
 
-def _column(header: Header, cells: Sequence[str], *, layout: Layout, lines: NDArray[np.int64], path: Path) -> RawColumn:
-    values = layout.numbers.column(cells)
+def _column(
+    index: int, header: Header, layout: Layout, options: FileOptions, path: Path, *, calendar: bool
+) -> AnyColumn:
+    kind = layout.kinds[index]
+    if calendar or kind is Kind.TIME:
+        where = f"{path}, column {header.name}"
+        return Stamps(
+            calendar=Calendar(
+                where=where,
+                pattern=options.time.format if calendar else None,
+                zone=options.time.zone if calendar else None,
+            )
+        )
+    if kind is Kind.WORD:
+        return Texts(collector=WordCollector(layout.numbers.missing))
+    if kind is Kind.WHOLE:
+        return Counts()
+    return Numbers(numbers=replace(layout.numbers, states=states_for(options.states, header.name)))
+
+
+def _finished(
+    headers: Sequence[Header],
+    columns: list[AnyColumn],
+    layout: Layout,
+    path: Path,
+    notes: list[str],
+    *,
+    calendar: int | None,
+) -> tuple[tuple[RawColumn, ...], str | None]:
+    """The columns as they are, and the zone that would explain how the clock jumps."""
+    guess = None
+    dates = None if calendar is None else _take_dates(columns, calendar)
+    if dates is not None and calendar is not None:
+        notes.append(f"time is {headers[dates].name} and {headers[calendar].name} together")
+    found = []
+    for index, (header, column) in enumerate(zip(headers, columns, strict=True)):
+        where = f"{path}, column {header.name or index + 1}"
+        if index == dates:
+            continue
+        if isinstance(column, Stamps):
+            raw, told, zone = _stamps(header, column, where, is_time=index == calendar)
+            if index == calendar:
+                guess, notes[len(notes) :] = zone, told
+        elif isinstance(column, Texts):
+            words = column.collector.finish()
+            nothing = np.full(len(words.codes), np.nan)
+            problem = words.problem(where) if words.texts else None
+            raw = RawColumn(name=header.name, values=nothing, unit=header.unit, problem=problem, words=words)
+        else:
+            raw = _numbers(header, column, layout, path)
+        if not header.name:
+            if raw.words is None and raw.problem is None and not np.isfinite(raw.values).any():
+                notes += [f"column {index + 1} has neither name nor values"] if index + 1 < len(headers) else []
+                continue
+            raw = replace(raw, name=f"column_{index + 1}")
+            notes.append(f"column {index + 1} has no name: called column_{index + 1}")
+        found.append(raw)
+    return tuple(found), guess
+
+
+def _take_dates(columns: Sequence[AnyColumn], calendar: int) -> int | None:
+    """The column whose dates belong to the times of day of another, if there is one."""
+    time = columns[calendar]
+    if not isinstance(time, Stamps) or time.problem is not None:
+        return None
+    for index, column in enumerate(columns):
+        other = isinstance(column, Stamps) and index != calendar and column.problem is None
+        if not other or not isinstance(column, Stamps):
+            continue
+        clock, date = (time.calendar, column.calendar)
+        if date.has_date and not date.has_clock and clock.has_clock and not clock.has_date:
+            clock.with_date(date)
+            return index
+        if clock.has_date and not clock.has_clock and date.has_clock and not date.has_date:
+            date.with_date(clock)
+            time.calendar, column.calendar = date, clock
+            return index
+    return None
+
+
+def _stamps(header: Header, column: Stamps, where: str, *, is_time: bool) -> tuple[RawColumn, list[str], str | None]:
+    problem, zone = column.problem, None
+    told: list[str] = []
+    seconds: NDArray[np.float64] = np.full(column.rows, np.nan)
+    if not is_time:
+        problem = problem or ReaderError(
+            "the column holds calendar time beside the time column",
+            where=where,
+            expected="numbers",
+            got="dates or times of day",
+            remedy=f"if it is the time, write time: {{column: {header.name}, unit: datetime}}",
+        )
+    elif problem is None:
+        try:
+            seconds, told, zone = column.calendar.finish()
+        except ReaderError as error:
+            problem = error
+    return RawColumn(name=header.name, values=seconds, unit="s", problem=problem), told, zone
+
+
+def _numbers(header: Header, column: Numbers | Counts, layout: Layout, path: Path) -> RawColumn:
+    values = column.finish()
     problem = None
-    if isinstance(values, int):
-        problem = _not_a_number(cells[values], header, line=int(lines[values]), layout=layout, path=path)
-        values = np.full(len(cells), np.nan)
-    return RawColumn(name=header.name, values=values, unit=header.unit, reference=header.reference, problem=problem)
+    if column.strange:
+        cell, line = next(iter(column.strange.items()))
+        problem = _not_a_number(cell, header, line=line, layout=layout, path=path)
+        values = np.full(len(values), np.nan)
+    return RawColumn(
+        name=header.name,
+        values=values,
+        unit=header.unit,
+        reference=header.reference,
+        problem=problem,
+        strange=tuple(column.strange),
+        counted_from=(column.origin or 0) if isinstance(column, Counts) else 0,
+    )
 
 
 def _not_a_number(cell: str, header: Header, *, line: int, layout: Layout, path: Path) -> ReaderError:
@@ -178,9 +258,10 @@ def _remedy(cell: str) -> str:
         return "if this is calendar time, write time: {column: ..., unit: datetime}"
     if any(letter.isdigit() for letter in cell):
         return "correct the cell, or name the decimal mark (decimal: ',')"
-    return f"if it stands for a missing value, write missing: ['{cell}']"
+    return f"if it stands for a missing value, write missing: ['{cell}']; if for a state, states: {{'{cell}': 0}}"
 
 
-def _metadata(comments: Sequence[str]) -> list[tuple[str, str]]:
-    pairs = [comment.split(":", 1) for comment in comments if ":" in comment]
+def _metadata(layout: Layout) -> list[tuple[str, str]]:
+    pairs = [comment.split(":", 1) for comment in layout.comments if ":" in comment]
+    pairs += [row.cells[:2] for row in layout.preamble if len(row.cells) > 1]
     return [(key.strip(), value.strip()) for key, value in pairs]

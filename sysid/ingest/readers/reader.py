@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.errors import ConfigError, ReaderError
+from sysid.ingest.meaning import with_meaning
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.table import RawTable
 
-_COMMON = {"reader", "time", "columns", "units", "references", "rows"}
+_COMMON = {"reader", "time", "columns", "units", "references", "rows", "states", "long"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +118,7 @@ def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOpt
             remedy="check the path; in a dataset.yaml it is relative to that file",
         )
     try:
-        return reader.read(path, files, repairs)
+        return with_meaning(reader.read(path, files, repairs), files)
     except OSError as error:
         raise ReaderError(
             f"the file cannot be read as {reader.name}",

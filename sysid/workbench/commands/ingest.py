@@ -82,9 +82,10 @@ def _show_file(found: FileFinding, propose: Path | None) -> None:
             remedy="name another one; nothing was changed",
         )
     target = console()
-    every = f"one every {found.sample_time:g} s, {(found.samples - 1) * found.sample_time:g} s in all"
-    guessed = found.time.step is not None and found.time_guessed
-    step = f"no time stamps: {found.time.step:g} s between them is a guess" if guessed else every
+    told = f" ({escape(found.time_told)})" if found.time_told else ""
+    step = f"one every {found.sample_time:g} s{told}, {(found.samples - 1) * found.sample_time:g} s in all"
+    if found.time.step is not None and found.time_guessed:
+        step = f"no time stamps: {found.time.step:g} s between them is a guess"
     target.print(f"{found.path}: read as {found.reader}, {found.samples} samples, {step}", soft_wrap=True)
     table = Table(header_style="bold")
     for heading in ("column", "unit", "from", "to", "missing", "remark"):
@@ -92,7 +93,8 @@ def _show_file(found: FileFinding, propose: Path | None) -> None:
     for column in found.columns:
         reference = "" if column.reference is Reference.NONE else f" {column.reference.value}"
         guess = "?" if column.unit_guessed or column.reference_guessed else ""
-        remark = column.problem or column.aside or ("never changes" if column.constant else "")
+        said = f"the file says {column.said}, which is no unit that is known" if column.said else ""
+        remark = column.problem or column.aside or said or ("never changes" if column.constant else "")
         unit = f"{column.unit}{reference}{guess}"
         span = (f"{column.minimum:.6g}", f"{column.maximum:.6g}")
         table.add_row(escape(column.name), escape(unit), *span, str(column.missing), escape(remark))

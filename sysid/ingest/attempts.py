@@ -1,0 +1,174 @@
+"""Reading a file of which nothing is known: what a person would try in turn, and which of it was a guess."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sysid.errors import ReaderError, UserError
+from sysid.ingest.numbers import USUAL_MISSING
+from sysid.ingest.options import FileOptions, RepairOptions
+from sysid.ingest.reading import read_table
+from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.words import known_states
+
+_LONG_SHARE = 0.6
+_CHANGE_SHARE = 0.5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Attempt:
+    """A file as it could be read.
+
+    Args:
+        table: The file.
+        files: The options that it took.
+        repairs: The repairs that the reader made.
+        guessed: The options among them that are guesses.
+    """
+
+    table: RawTable
+    files: FileOptions
+    repairs: RepairOptions
+    guessed: frozenset[str] = frozenset()
+
+    @property
+    def unusable(self) -> int:
+        """How many columns cannot be used."""
+        return sum(column.problem is not None for column in (*self.table.columns, *self.table.others))
+
+
+def read_somehow(path: Path, files: FileOptions) -> Attempt:
+    """Read a file with options that it seems to need.
+
+    Args:
+        path: The file.
+        files: What is known about it already; it is kept.
+
+    Returns:
+        The best attempt: the one with the fewest columns that cannot be used.
+
+    Raises:
+        ReaderError: If it cannot be read at all.
+        UserError: If an option that is given means nothing for it.
+    """
+    best = _first(path, files)
+    for suggest in SUGGESTIONS:
+        more = suggest(best.table)
+        given = set(files.model_fields_set)
+        if not more or given & set(more) - {"time", "states", "missing"}:
+            continue
+        attempt = _with(best, more, path)
+        if attempt is not None:
+            best = attempt
+    return best
+
+
+def _first(path: Path, files: FileOptions) -> Attempt:
+    """The file as it stands, or without its ragged rows."""
+    error: UserError | None = None
+    for repairs in (RepairOptions(), RepairOptions(ragged="drop")):
+        try:
+            return Attempt(table=read_table(path, files=files, repairs=repairs), files=files, repairs=repairs)
+        except ReaderError as problem:
+            error = error or problem
+    raise error or ReaderError("the file cannot be read", where=path)
+
+
+def _given(files: FileOptions) -> dict[str, Any]:
+    return {name: getattr(files, name) for name in files.model_fields_set}
+
+
+def _with(best: Attempt, more: dict[str, Any], path: Path) -> Attempt | None:
+    """The attempt with further options, or ``None`` if they do not help."""
+    told = frozenset(more) if "time" not in more else frozenset({"zone"})
+    options = FileOptions.model_validate({**_given(best.files), **more})
+    try:
+        table = read_table(path, files=options, repairs=best.repairs)
+    except UserError:
+        return None
+    attempt = replace(best, table=table, files=options, guessed=best.guessed | told)
+    return attempt if attempt.unusable <= best.unusable else None
+
+
+def _thousands(table: RawTable) -> dict[str, Any] | None:
+    """The mark that separates thousands, where it keeps a column from being one of numbers."""
+    decimal = str(table.settings.get("decimal", "."))
+    strange = [text for column in table.columns for text in column.strange]
+    for mark in (".", ",", "'", " "):
+        grouped = re.compile(rf"[+-]?[0-9]{{1,3}}(?:{re.escape(mark)}[0-9]{{3}})+(?:{re.escape(decimal)}[0-9]*)?")
+        if strange and all(grouped.fullmatch(text) for text in strange):
+            return {"thousands": mark, "decimal": decimal}
+    return None
+
+
+def _missing(table: RawTable) -> dict[str, Any] | None:
+    """Texts that mostly stand for a missing value, where they are all that a column of numbers holds beside them."""
+    found: dict[str, None] = {}
+    for column in table.columns:
+        if column.strange and all(text.casefold() in USUAL_MISSING for text in column.strange):
+            found |= dict.fromkeys(column.strange)
+    return {"missing": tuple(found)} if found else None
+
+
+def _states(table: RawTable) -> dict[str, Any] | None:
+    """States that are known."""
+    found: dict[str, dict[str, float]] = {}
+    for column in table.columns:
+        if column.words is not None and column.problem is not None and column.words.complete:
+            states = known_states(column.words.texts)
+            if states is not None:
+                found[column.name] = states
+    if not found:
+        return None
+    tables = list(found.values())
+    return {"states": tables[0] if all(table == tables[0] for table in tables) else found}
+
+
+def _long(table: RawTable) -> dict[str, Any] | None:
+    """A table of (time, signal, value): one column of names, one of numbers, and times that come again."""
+    words = [c for c in table.columns if c.words is not None and c.problem is not None and len(c.words.texts) > 1]
+    numbers = [c for c in table.columns if c.name != table.time and c.problem is None and np.isfinite(c.values).any()]
+    if table.time is None or not words or len(numbers) != 1:
+        return None
+    time = next(column for column in table.columns if column.name == table.time)
+    names = next((column for column in words if _names_rows(column, time)), None)
+    if names is None:
+        return None
+    units = next((c.name for c in words if c is not names and _follows(c, names)), None)
+    return {"long": {"names": names.name, "values": numbers[0].name} | ({"units": units} if units else {})}
+
+
+def _names_rows(names: RawColumn, time: RawColumn) -> bool:
+    if names.words is None or not names.words.complete or time.problem is not None:
+        return False
+    codes = names.words.codes
+    known = np.isfinite(time.values) & (codes >= 0)
+    pairs = np.unique(np.column_stack([time.values[known], codes[known]]), axis=0)
+    if len(pairs) < max(0.9 * known.sum(), 2):
+        return False
+    again = len(np.unique(pairs[:, 0])) <= _LONG_SHARE * len(pairs)
+    return again or float(np.mean(np.diff(codes) != 0)) >= _CHANGE_SHARE
+
+
+def _follows(units: RawColumn, names: RawColumn) -> bool:
+    """Whether a column of words says one thing for each name."""
+    if units.words is None or names.words is None:
+        return False
+    pairs = set(zip(names.words.codes.tolist(), units.words.codes.tolist(), strict=True))
+    return len(pairs) == len(names.words.texts)
+
+
+def _zone(table: RawTable) -> dict[str, Any] | None:
+    """The zone that would explain how a clock jumps by an hour."""
+    zone = table.settings.get("zone")
+    return {"time": {"column": table.time, "unit": "datetime", "zone": zone}} if zone and table.time else None
+
+
+SUGGESTIONS: tuple[Callable[[RawTable], dict[str, Any] | None], ...] = (_thousands, _missing, _states, _zone, _long)
+"""What a table says of the options that it needs, in the order in which they are tried."""

@@ -1,0 +1,82 @@
+"""What a clock without a unit counts, told by the size of its numbers: seconds since 1970, days since 1900 ..."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_FROM, _TO = 946_684_800.0, 4_102_444_800.0  # the years 2000 to 2100, in seconds since 1970
+_DAY = 86_400.0
+_DATE_NAMES = ("date", "datum", "fecha", "data", "timestamp", "time stamp", "datetime", "zeitstempel", "serial")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clock:
+    """What a clock counts.
+
+    Args:
+        unit: The unit of its numbers.
+        told: The unit and since when, for people.
+        seconds: Of one count.
+        low: Smallest count that it is taken for.
+        high: Largest count that it is taken for.
+        by_name: Whether the step must be small, or the name that of a date: plain seconds reach as far.
+    """
+
+    unit: str
+    told: str
+    seconds: float
+    low: float
+    high: float
+    by_name: bool = False
+
+
+CLOCKS = (
+    *(
+        Clock(unit=unit, told=f"{unit} since 1970", seconds=scale, low=_FROM / scale, high=_TO / scale)
+        for unit, scale in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+    ),
+    Clock(unit="day", told="days since 1900, as Excel counts", seconds=_DAY, low=25_569.0, high=73_050.0, by_name=True),
+    Clock(
+        unit="day",
+        told="days since year 0, as MATLAB counts",
+        seconds=_DAY,
+        low=719_529.0,
+        high=767_010.0,
+        by_name=True,
+    ),
+)
+"""The clocks that are known by the size of their numbers."""
+
+
+def clock_of(values: NDArray[np.float64], name: str, *, origin: int = 0) -> Clock | None:
+    """The clock that a column without a unit is.
+
+    Args:
+        values: Shape ``(n,)``; NaN where there is no stamp.
+        name: Name of the column.
+        origin: What the values are counted from.
+
+    Returns:
+        The clock, or ``None`` if the numbers are not those of one.
+
+    Example:
+        >>> clock_of(np.array([1.7e12, 1.7e12 + 100.0]), "stamp").told
+        'ms since 1970'
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < 2:
+        return None
+    steps = np.diff(known[:10_000])
+    rising = steps[steps > 0.0]
+    if not len(rising):
+        return None
+    step, low, high = float(np.median(rising)), float(known.min()) + origin, float(known.max()) + origin
+    dated = any(word in name.casefold() for word in _DATE_NAMES)
+    for clock in CLOCKS:
+        possible = clock.low <= low and high <= clock.high and step * clock.seconds <= _DAY
+        if possible and (not clock.by_name or dated or step * clock.seconds <= 2.0):
+            return clock
+    return None

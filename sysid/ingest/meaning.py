@@ -1,0 +1,125 @@
+"""What columns mean beyond their format: states as numbers, long tables made wide, clocks by their size."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ChannelError, ConfigError, ReaderError
+from sysid.ingest.clocks import clock_of
+from sysid.ingest.options import FileOptions, LongOptions
+from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.words import Words, states_for
+
+
+def with_meaning(table: RawTable, files: FileOptions) -> RawTable:
+    """A table as its options and its contents say.
+
+    Args:
+        table: From any reader.
+        files: How it is read.
+
+    Returns:
+        The table with states as numbers, with a column per signal where it was long, and with the unit of a clock
+        that is known by the size of its numbers.
+
+    Raises:
+        ConfigError: If a table of states or a long table cannot be made as asked for.
+        ChannelError: If a column that is named for it is not there.
+    """
+    _check_states(table, files)
+    records = tuple(replace(record, table=with_meaning(record.table, files)) for record in table.records)
+    columns, others = (tuple(_as_states(c, files) for c in group) for group in (table.columns, table.others))
+    table = replace(table, columns=columns, others=others, records=records)
+    if files.long is not None:
+        table = _wide(table, files.long)
+    return _with_clock(table, files)
+
+
+def _check_states(table: RawTable, files: FileOptions) -> None:
+    for name, given in files.states.items():
+        if isinstance(given, dict) and name not in table.names:
+            raise ChannelError([name], table.names, where=f"{table.source}, field source.files.states")
+
+
+def _as_states(column: RawColumn, files: FileOptions) -> RawColumn:
+    if column.words is None:
+        return column
+    values = column.words.values(states_for(files.states, column.name))
+    return column if values is None else replace(column, values=values, problem=None)
+
+
+def _with_clock(table: RawTable, files: FileOptions) -> RawTable:
+    if (
+        table.time is None
+        or files.time.column is not None
+        or files.time.unit is not None
+        or files.time.step is not None
+    ):
+        return table
+    column = next(column for column in table.columns if column.name == table.time)
+    if column.unit is not None or column.problem is not None:
+        return table
+    clock = clock_of(column.values, column.name, origin=column.counted_from)
+    if clock is None:
+        return table
+    columns = tuple(replace(c, unit=clock.unit) if c is column else c for c in table.columns)
+    settings = {**table.settings, "clock": f"{column.name} counts {clock.told}"}
+    return replace(table, columns=columns, settings=settings)
+
+
+def _wide(table: RawTable, long: LongOptions) -> RawTable:
+    """A table of (time, signal, value) as one column per signal, a row per time."""
+    by_name = {column.name: column for column in table.columns}
+    wanted = [name for name in (long.names, long.values, long.units) if name is not None]
+    missing = [name for name in wanted if name not in by_name]
+    if missing or table.time is None:
+        raise ChannelError(missing or ["time"], table.names, where=f"{table.source}, field source.files.long")
+    names, time = by_name[long.names], by_name[table.time]
+    texts, codes = _names(names, table)
+    stamps, rows = np.unique(time.values, return_index=True)
+    known = np.isfinite(stamps)
+    stamps, rows = stamps[known], rows[known]
+    places = np.searchsorted(stamps, time.values)
+    source = by_name[long.values]
+    if source.problem is not None:
+        raise source.problem
+    columns: list[RawColumn] = [replace(time, values=stamps)]
+    twice = 0
+    for code, text in enumerate(texts):
+        mine = (codes == code) & np.isfinite(time.values)
+        values = np.full(len(stamps), np.nan)
+        values[places[mine]] = source.values[mine]
+        twice += int(mine.sum()) - len(np.unique(places[mine]))
+        unit = _unit_of(by_name.get(long.units or ""), mine)
+        columns.append(RawColumn(name=text, values=values, unit=unit or source.unit))
+    notes = [*table.notes, f"a long table of {len(texts)} signals made wide"]
+    notes += [f"{twice} values stand twice at one time: the last one counts"] if twice else []
+    lines = None if table.lines is None else table.lines[rows]
+    return replace(table, columns=tuple(columns), lines=lines, notes=tuple(notes))
+
+
+def _names(column: RawColumn, table: RawTable) -> tuple[list[str], NDArray[np.integer]]:
+    if column.words is not None and column.words.complete:
+        return list(column.words.texts), column.words.codes
+    if column.problem is None:
+        numbers, codes = np.unique(column.values, return_inverse=True)
+        if len(numbers) <= 256 and np.isfinite(numbers).all():
+            return [f"{column.name}_{number:g}" for number in numbers], codes
+    raise ConfigError(
+        "the column holds no names of signals",
+        where=f"{table.source}, column {column.name}",
+        expected="a few different names",
+        got=column.problem.got if isinstance(column.problem, ReaderError) else "numbers",
+        remedy="name the column that holds them (long: {names: ..., values: ...})",
+    )
+
+
+def _unit_of(units: RawColumn | None, mine: NDArray[np.bool_]) -> str | None:
+    words: Words | None = None if units is None else units.words
+    if words is None or not mine.any():
+        return None
+    first = int(words.codes[mine][0])
+    return words.texts[first] if first >= 0 else None

@@ -1,0 +1,151 @@
+"""Lines to cells, and what a cell looks like: a number, a time, a word, or nothing."""
+
+from __future__ import annotations
+
+import csv
+import enum
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sysid.errors import ReaderError
+from sysid.ingest.calendar import is_calendar
+from sysid.ingest.headers import is_unit
+from sysid.ingest.numbers import MISSING, USUAL_MISSING
+
+BLANKS = " "
+"""The separator that stands for a run of blanks and tabs."""
+
+
+class Kind(enum.Enum):
+    """What a cell looks like."""
+
+    NUMBER = enum.auto()
+    WHOLE = enum.auto()  # a whole number that float64 cannot hold, as a clock counts in nanoseconds
+    TIME = enum.auto()
+    WORD = enum.auto()
+    NOTHING = enum.auto()
+
+
+DATA = frozenset({Kind.NUMBER, Kind.WHOLE, Kind.TIME})
+
+_NUMBER = re.compile(
+    r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+|[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]*)?)(?:[eEdD][+-]?[0-9]+)?"
+    r"|[+-]?(?i:inf(?:inity)?)"
+)
+_WHOLE = re.compile(r"[+-]?[0-9]{16,19}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """A row of cells and the line it stands on (the last one, if a cell holds line breaks)."""
+
+    line: int
+    cells: list[str]
+
+    @property
+    def first_line(self) -> int:
+        """The line on which it begins."""
+        return self.line - sum(cell.count("\n") for cell in self.cells)
+
+
+def kind_of(cell: str, missing: Sequence[str] = ()) -> Kind:
+    """What a cell looks like, whatever the decimal mark.
+
+    Args:
+        cell: Its text.
+        missing: Texts that stand for a missing value in this file.
+
+    Returns:
+        The kind; what usually stands for a missing value is nothing.
+    """
+    text = cell.strip()
+    if text.casefold() in MISSING or text.casefold() in USUAL_MISSING or text in missing:
+        return Kind.NOTHING
+    if _NUMBER.fullmatch(text):
+        return Kind.WHOLE if _WHOLE.fullmatch(text) and not is_calendar(text) else Kind.NUMBER
+    return Kind.TIME if is_calendar(text) else Kind.WORD
+
+
+def trimmed(cells: list[str], width: int) -> list[str]:
+    """A row brought to a width, where a separator more or less at its end is all that lacks.
+
+    Args:
+        cells: The row.
+        width: The width of the table.
+
+    Returns:
+        The row, without empty cells beyond the width.
+    """
+    if len(cells) > width and not any(cell.strip() for cell in cells[width:]):
+        return cells[:width]
+    return cells
+
+
+def split_rows(
+    lines: Iterable[str], separator: str, *, line: int, comment: str, path: Path, whole: bool = True
+) -> Iterator[Row]:
+    """Cells of every row that is neither blank nor a comment.
+
+    Args:
+        lines: Lines with their ends.
+        separator: What stands between cells; a blank stands for a run of blanks.
+        line: Number of the first line.
+        comment: What a comment line begins with.
+        path: The file, for errors.
+        whole: Whether a quote that does not close is an error; otherwise the rows before it are all.
+
+    Yields:
+        The rows.
+
+    Raises:
+        ReaderError: If quotes do not close or a cell is absurdly long.
+    """
+    # A comment becomes a blank line, so that the line numbers in messages stay those of the file.
+    kept = ("\n" if text.startswith(comment) else text for text in lines)
+    if separator == BLANKS:
+        kept = (text.replace("\t", " ").strip() + "\n" for text in kept)
+    parser = csv.reader(kept, delimiter=separator, strict=True, skipinitialspace=separator == BLANKS)
+    try:
+        for cells in parser:
+            if any(cell and not cell.isspace() for cell in cells):
+                yield Row(line=parser.line_num + line - 1, cells=cells)
+    except csv.Error as error:
+        if not whole and "unexpected end" in str(error):
+            return
+        raise ReaderError(
+            "the file cannot be split into cells",
+            where=f"{path}, line {parser.line_num + line - 1}",
+            expected="cells between separators, quotes in pairs",
+            got=error,
+            remedy="correct the line, or name the separator",
+        ) from error
+
+
+def is_units(cells: Sequence[str]) -> bool:
+    """Whether a row below the header is one of units: all in brackets, or at least half of them known.
+
+    Args:
+        cells: The row.
+
+    Returns:
+        True if it is.
+    """
+    filled = [cell.strip() for cell in cells if cell.strip()]
+    known = sum(is_unit(unit_text(cell)) for cell in filled)
+    bracketed = all(unit_text(cell) != cell for cell in filled)
+    return bool(filled) and (bracketed or 2 * known >= len(filled))
+
+
+def unit_text(cell: str) -> str:
+    """The unit in a cell of a units line, without brackets.
+
+    Args:
+        cell: For example ``"[kPa]"``.
+
+    Returns:
+        For example ``"kPa"``.
+    """
+    text = cell.strip()
+    return text[1:-1].strip() if text[:1] + text[-1:] in {"[]", "()", "<>", "{}"} else text
