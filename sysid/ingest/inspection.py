@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -239,14 +240,14 @@ def _of_records(whole: FileFinding, attempt: Attempt) -> FileFinding:
     """The records of a file that go into one data set, and what all of them need."""
     cases = []
     for record in attempt.table.records:
-        role = role_of(record.name)
+        role, found = role_of(record.name), _finding(record.table, attempt)
         cases.append(
             CaseFinding(
                 name=record.name,
                 role=role or "estimation",
                 role_guessed=role is None,
-                options=record.options,
-                finding=_finding(record.table, attempt),
+                options=_with_time(record.options, found.time.column),
+                finding=found,
             )
         )
     kinds: dict[object, list[CaseFinding]] = {}
@@ -277,6 +278,15 @@ def _of_records(whole: FileFinding, attempt: Attempt) -> FileFinding:
         notes=tuple(notes),
         cases=tuple(chosen),
     )
+
+
+def _with_time(options: Mapping[str, Any], time: str | None) -> Mapping[str, Any]:
+    """The options of a record, where one of its columns turned out to be time."""
+    columns = dict(options.get("columns", {}))
+    if time not in columns:
+        return options
+    stamps = columns.pop(time)
+    return {**options, "columns": columns, "time": stamps}
 
 
 def _signature(case: CaseFinding) -> object:

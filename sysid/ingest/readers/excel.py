@@ -1,4 +1,4 @@
-"""Workbooks of Excel, ``.xlsx`` and ``.xls``, by pandas with openpyxl and xlrd (the extra ``excel``).
+"""Workbooks of Excel, ``.xlsx`` and ``.xls``, by openpyxl and xlrd (the extra ``excel``).
 
 In each sheet the header is the last row before the numbers, with a row of units between them if there is one.
 """
@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import datetime
 import importlib.util
-import zipfile
+import io
+import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -70,19 +72,51 @@ READER = Reader(
 
 
 def _sheets(path: Path, engine: str) -> dict[str, NDArray[Any]]:
-    import pandas as pd
-
     try:
-        if engine == "openpyxl":
-            check_zip(path)
-        frames = pd.read_excel(path, sheet_name=None, header=None, engine=engine, dtype=object, na_filter=False)  # type: ignore[call-overload]
-    except (ReaderError, MemoryError):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about styles and such, which are nothing to us
+            sheets = _modern(path) if engine == "openpyxl" else _old(path)
+    except ReaderError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, EOFError, AssertionError) as error:
+    except Exception as error:  # xlrd and openpyxl raise classes of their own and any others on damaged files
         raise damaged(path, "Excel", error) from error
-    except Exception as error:  # xlrd and openpyxl raise classes of their own on damaged files
-        raise damaged(path, "Excel", error) from error
-    return {str(name): frame.to_numpy(dtype=object) for name, frame in frames.items()}
+    return {name: _grid(rows) for name, rows in sheets.items()}
+
+
+def _modern(path: Path) -> dict[str, list[Sequence[Any]]]:
+    import openpyxl
+
+    check_zip(path)
+    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    sheets: dict[str, list[Sequence[Any]]] = {}
+    for sheet in book.worksheets:
+        sheet.reset_dimensions()  # some writers state them wrongly
+        sheets[sheet.title] = list(sheet.iter_rows(values_only=True))
+    book.close()
+    return sheets
+
+
+def _old(path: Path) -> dict[str, list[Sequence[Any]]]:
+    import xlrd
+
+    with xlrd.open_workbook(str(path), on_demand=True, logfile=io.StringIO()) as book:
+
+        def value(cell: Any) -> Any:
+            if cell.ctype == xlrd.XL_CELL_DATE:
+                return xlrd.xldate_as_datetime(cell.value, book.datemode)
+            return None if cell.ctype in {xlrd.XL_CELL_EMPTY, xlrd.XL_CELL_BLANK, xlrd.XL_CELL_ERROR} else cell.value
+
+        return {
+            name: [[value(cell) for cell in row] for row in book.sheet_by_name(name).get_rows()]
+            for name in book.sheet_names()
+        }
+
+
+def _grid(rows: list[Sequence[Any]]) -> NDArray[Any]:
+    grid = np.full((len(rows), max((len(row) for row in rows), default=0)), None, dtype=object)
+    for at, row in enumerate(rows):
+        grid[at, : len(row)] = row
+    return grid
 
 
 def _with_records(chosen: RawTable, tables: dict[str, RawTable]) -> RawTable:

@@ -33,7 +33,8 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     except (ValueError, RecursionError) as error:
         raise damaged(path, "JSON", error) from error
     if not isinstance(tree, dict):
-        tree = {"column": tree}
+        records = isinstance(tree, list) and all(isinstance(item, dict) for item in tree)
+        tree = {"record" if records else "column": tree}
     return table_of(tree, path=path, reader="json", options=options)
 
 

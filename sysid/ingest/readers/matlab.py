@@ -91,7 +91,7 @@ def _load(path: Path) -> dict[str, Any]:
             check_claim(path, ((name, shape) for name, (shape, kind) in there.items() if kind not in _NOT_NUMBERS))
             _check_compressed(path)
             try:
-                loaded = load_from_mat(path)
+                loaded = load_from_mat(path, add_table_attrs=True)
             except (NotImplementedError, ValueError, KeyError, TypeError, AttributeError):
                 loaded = _one_by_one(path, there, load_from_mat)
     except ReaderError:
@@ -117,7 +117,7 @@ def _one_by_one(path: Path, there: Mapping[str, Any], load: Callable[..., dict[s
     found: dict[str, Any] = {}
     for name, (_, kind) in there.items():
         try:
-            found.update(load(path, variable_names=[name]))
+            found.update(load(path, variable_names=[name], add_table_attrs=True))
         except Exception as error:  # noqa: BLE001 - as above; only this variable is lost
             found[name] = refused(_only_matlab(name, str(kind), path, error))
     if all(isinstance(value, Leaf) for name, value in found.items() if not name.startswith("__")):
@@ -208,15 +208,16 @@ def _sparse(value: Any, name: str, path: Path) -> Any:
 
 
 def _frame(frame: Any) -> dict[str, Any]:
-    """A table or a time table."""
+    """A table or a time table, with the units of its variables."""
     columns: dict[str, Any] = {}
+    units = frame.attrs.get("VariableUnits", frame.attrs.get("varUnits", []))
     if frame.index.dtype.kind in "Mm":
-        columns["time" if "time" not in map(str.casefold, map(str, frame.columns)) else "row times"] = _stamps(
-            frame.index
-        )
-    for key in frame.columns:
+        taken = any(str(name).casefold() == "time" for name in frame.columns)
+        columns["row times" if taken else "time"] = _stamps(frame.index)
+    for at, key in enumerate(frame.columns):
         values = frame[key].to_numpy()
-        columns[str(key)] = _stamps(frame[key]) if values.dtype.kind in "Mm" else values
+        unit = str(units[at]) if at < len(units) and units[at] else None
+        columns[str(key)] = _stamps(values) if values.dtype.kind in "Mm" else Leaf(values=values, unit=unit)
     return columns
 
 
