@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -67,13 +67,15 @@ def assemble(
         ConfigError: If the options do not fit the file.
     """
     record = _select(table, wanted, files)
+    source = table.source
+    del table  # its columns stand in the record now, and may be large
     for step in repair.STEPS:
         record = step(record, repairs)
     record = _cut(record, wanted)
     if len(record.stamps) < grid.fewest_samples:
         raise TraceError(
             "the record has too few samples",
-            where=table.source,
+            where=source,
             expected=f"at least {grid.fewest_samples}",
             got=len(record.stamps),
             remedy="record longer, widen start and stop, or lower grid: {fewest_samples: ...}",
@@ -81,7 +83,7 @@ def assemble(
     record = repair.missing_values(record, repairs)
     record = repair.constants(record, repairs)
     gridded, record = _onto_grid(record, wanted, grid, repairs)
-    values, usable, notes = _close_gaps(gridded, repairs, source=table.source, sample_time=wanted.sample_time)
+    values, usable, notes = _close_gaps(gridded, repairs, source=source, sample_time=wanted.sample_time)
     values, rounded = round_channels(values, wanted.channels, wanted.decimals)
     return Trace(
         name=wanted.name,
@@ -110,7 +112,7 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
         columns.append(values)
         notes += [note] if note else []
     return Record(
-        table=table,
+        table=replace(table, columns=(RawColumn(name="", values=stamps),), others=(), records=()),
         rows=np.arange(len(table), dtype=np.intp),
         stamps=stamps,
         names=tuple(channel.name for channel in wanted.channels),
@@ -289,7 +291,7 @@ def _onto_grid(record: Record, wanted: Wanted, grid: GridOptions, repairs: Repai
     if len(timing.gaps) and repairs.gaps is None:
         raise _gap_error(record, timing)
     places = grid_places(stamps, sample_time, start=start, tolerance=grid.tolerance)
-    if places is not None and np.array_equal(np.flatnonzero(np.diff(places) > 1), timing.gaps):
+    if places is not None and np.array_equal(np.flatnonzero(places[1:] > places[:-1] + 1), timing.gaps):
         return place(stamps, record.values, places, record.marked), record
     uneven = timing.jitter > grid.tolerance * timing.step
     if uneven and repairs.jitter is None:
@@ -404,6 +406,8 @@ def round_channels(
     Returns:
         The values, and one sentence per channel that was rounded.
     """
+    if not decimals:
+        return values, []
     rounded = np.array(values, dtype=np.float64)
     notes = []
     for index, channel in enumerate(channels):

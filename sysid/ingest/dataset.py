@@ -209,8 +209,13 @@ def _read(description: DatasetDescription, case: str, folder: Path) -> Trace:
         stop=wish.stop,
     )
     try:
-        table = read_table(folder / (wish.file or ""), files=files, repairs=source.repairs)
-        return assemble(table, wanted, files=files, grid=source.grid, repairs=source.repairs)
+        return assemble(
+            read_table(folder / (wish.file or ""), files=files, repairs=source.repairs),
+            wanted,
+            files=files,
+            grid=source.grid,
+            repairs=source.repairs,
+        )
     except SysidError as error:
         error.add_note(f"reading case {case} of {folder / DESCRIPTION_FILE}")
         raise

@@ -101,6 +101,8 @@ def backward(record: Record, repairs: RepairOptions) -> Record:
     Raises:
         TraceError: If a stamp steps back and no repair was asked for.
     """
+    if not (record.stamps[1:] < record.stamps[:-1]).any():
+        return record
     late = record.stamps[1:] < np.maximum.accumulate(record.stamps)[:-1]
     bad = np.flatnonzero(late) + 1
     if not len(bad):
@@ -136,7 +138,7 @@ def duplicates(record: Record, repairs: RepairOptions) -> Record:
     Raises:
         TraceError: If a stamp stands twice and no repair was asked for.
     """
-    bad = np.flatnonzero(np.diff(record.stamps) == 0.0) + 1
+    bad = np.flatnonzero(record.stamps[1:] == record.stamps[:-1]) + 1
     if not len(bad):
         return record
     first = int(bad[0])

@@ -62,21 +62,29 @@ def survey(stamps: NDArray[np.float64], *, longest_step: float | None = None) ->
         >>> round(timing.step, 6), timing.gaps.tolist(), timing.missing
         (0.1, [2], 2)
     """
+    none = np.zeros(0, dtype=np.intp)
     steps = np.diff(stamps)
-    highest = np.maximum.accumulate(stamps)
-    backward = np.flatnonzero(stamps[1:] < highest[:-1]) + 1
-    duplicates = np.flatnonzero(steps == 0.0) + 1
-    kept = np.flatnonzero(np.concatenate([[True], stamps[1:] > highest[:-1]]))
-    rising = stamps[kept]
-    steps = np.diff(rising)
+    if len(steps) and steps.min() > 0.0:  # in order, as nearly all records are
+        backward = duplicates = none
+        kept, rising = None, stamps
+    else:
+        highest = np.maximum.accumulate(stamps)
+        backward = np.flatnonzero(stamps[1:] < highest[:-1]) + 1
+        duplicates = np.flatnonzero(steps == 0.0) + 1
+        kept = np.flatnonzero(np.concatenate([[True], stamps[1:] > highest[:-1]]))
+        rising = stamps[kept]
+        steps = np.diff(rising)
     if len(steps) == 0:
         median, slope, jitter, slots, is_gap = np.nan, np.nan, 0.0, np.zeros(1), np.zeros(0, dtype=bool)
     else:
         median = float(np.median(steps))
         limit = _GAP_FACTOR * median if longest_step is None else longest_step
         is_gap = steps > limit * (1.0 + 1e-9)
-        # Outside gaps every step is one slot, however uneven: only a gap lacks samples.
-        slots = np.concatenate([[0.0], np.cumsum(np.where(is_gap, np.maximum(np.rint(steps / median), 1.0), 1.0))])
+        slots = np.arange(len(rising), dtype=np.float64)
+        if is_gap.any():
+            # Outside gaps every step is one slot, however uneven: only a gap lacks samples.
+            slots[1:] = np.cumsum(np.where(is_gap, np.maximum(np.rint(steps / median), 1.0), 1.0))
+        del steps
         slope, jitter = _line(slots, rising)
     return Timing(
         samples=len(stamps),
@@ -85,8 +93,8 @@ def survey(stamps: NDArray[np.float64], *, longest_step: float | None = None) ->
         step=slope,
         median_step=median,
         jitter=jitter,
-        gaps=kept[:-1][is_gap],
-        missing=int(slots[-1]) - len(steps),
+        gaps=np.flatnonzero(is_gap) if kept is None else kept[:-1][is_gap],
+        missing=int(slots[-1]) - (len(rising) - 1),
         duplicates=duplicates,
         backward=backward,
     )
@@ -96,7 +104,9 @@ def _line(slots: NDArray[np.float64], stamps: NDArray[np.float64]) -> tuple[floa
     """Slope of the least-squares line through the stamps, and the largest distance from it."""
     x, y = slots - slots.mean(), stamps - stamps.mean()
     slope = float(x @ y / (x @ x))
-    return slope, float(np.abs(y - slope * x).max())
+    x *= slope
+    y -= x
+    return slope, float(max(y.max(), -y.min()))
 
 
 def round_step(step: float) -> float:

@@ -20,7 +20,7 @@ from sysid.units import Reference
 def _parquet(path: Path) -> tuple[Any, int, Iterator[Any]]:
     from pyarrow import parquet
 
-    file = parquet.ParquetFile(path, memory_map=True)
+    file = parquet.ParquetFile(path)
     groups = (file.read_row_group(index) for index in range(file.num_row_groups))
     return file.schema_arrow, int(file.metadata.num_rows), groups
 
@@ -56,6 +56,7 @@ def _reads(kind: str, opened: Callable[[Path], tuple[Any, int, Iterator[Any]]]) 
             arrays = _arrays(schema, rows, parts)
         except (pa.ArrowException, OSError) as error:
             raise damaged(path, kind, error) from error
+        pa.default_memory_pool().release_unused()
         columns = [_column(field, array, path) for field, array in zip(schema, arrays, strict=True)]
         meta = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items() if key == b"sysid"}
         return RawTable(

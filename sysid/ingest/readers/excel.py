@@ -87,12 +87,13 @@ def _modern(path: Path) -> dict[str, list[Sequence[Any]]]:
     import openpyxl
 
     check_zip(path)
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    sheets: dict[str, list[Sequence[Any]]] = {}
-    for sheet in book.worksheets:
-        sheet.reset_dimensions()  # some writers state them wrongly
-        sheets[sheet.title] = list(sheet.iter_rows(values_only=True))
-    book.close()
+    with path.open("rb") as file:  # by name it would refuse whatever ends in anything else
+        book = openpyxl.load_workbook(file, read_only=True, data_only=True)
+        sheets: dict[str, list[Sequence[Any]]] = {}
+        for sheet in book.worksheets:
+            sheet.reset_dimensions()  # some writers state them wrongly
+            sheets[sheet.title] = list(sheet.iter_rows(values_only=True))
+        book.close()
     return sheets
 
 
