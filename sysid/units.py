@@ -156,6 +156,23 @@ _USUAL = frozenset(
 """Units that need not be looked up: pint takes 0.3 s to import and build."""
 
 
+_PRESSURES = frozenset({"Pa", "hPa", "kPa", "MPa", "bar", "mbar", "psi"})
+
+
+def is_pressure(unit: str) -> bool:
+    """Whether a unit is one of pressure, so that a channel in it must say what it is measured from.
+
+    Args:
+        unit: Any text.
+
+    Returns:
+        True if it is.
+    """
+    if unit in _USUAL:
+        return unit in _PRESSURES
+    return plain_unit(unit) is not None and _parsed(unit).is_compatible_with(_parsed("Pa"))
+
+
 def check_unit(unit: str) -> str:
     """Return ``unit`` if pint knows it, or knows what people mean by it.
 

@@ -18,7 +18,7 @@ from sysid.ingest.options import (
     TimeOption,
 )
 from sysid.traces import Channel, Role
-from sysid.units import Reference, check_unit, convert
+from sysid.units import Reference, check_unit, is_pressure
 from sysid.yaml_files import FieldError, check, read_yaml
 
 
@@ -51,7 +51,7 @@ class ChannelDescription(Options):
             raise FieldError(
                 error.what, expected=error.expected, got=error.got, remedy=error.remedy or "correct the unit"
             ) from None
-        pressure = _is_pressure(self.unit)
+        pressure = is_pressure(self.unit)
         if pressure and self.reference is None:
             raise FieldError(
                 f"channel {self.name} does not say what its pressure is measured from",
@@ -77,16 +77,6 @@ class ChannelDescription(Options):
             reference=self.reference or Reference.NONE,
             description=self.description,
         )
-
-
-def _is_pressure(unit: str) -> bool:
-    import numpy as np
-
-    try:
-        convert(np.zeros(1), unit, "Pa")
-    except UnitError:
-        return False
-    return True
 
 
 class SourceDescription(Options):

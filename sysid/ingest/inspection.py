@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import UnitError
 from sysid.ingest.assemble import stamps_in_seconds
 from sysid.ingest.attempts import Attempt, read_somehow
 from sysid.ingest.blanks import blanks_mean
@@ -21,7 +20,7 @@ from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOp
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.table import RawColumn, RawTable, is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
-from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert
+from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert, is_pressure
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
@@ -420,10 +419,9 @@ def _unit_in_name(name: str) -> str | None:
 
 
 def _guess_reference(values: NDArray[np.float64], unit: str) -> Reference:
-    try:
-        pascals = convert(values, unit, "Pa")
-    except UnitError:
+    if not is_pressure(unit):
         return Reference.NONE
+    pascals = convert(values, unit, "Pa")
     # An absolute record that is ever at rest shows the atmosphere as its smallest value.
     near_atmosphere = len(values) and 0.8 < float(pascals.min()) / STANDARD_ATMOSPHERE_PA < 1.15
     return Reference.ABSOLUTE if near_atmosphere else Reference.GAUGE

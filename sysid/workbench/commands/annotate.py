@@ -15,7 +15,7 @@ from sysid.traces import TraceSet
 from sysid.units import Reference
 from sysid.validation.annotator import Annotator
 from sysid.workbench.annotation import annotated_set, find_annotator
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.store import write_bytes
 

@@ -10,7 +10,7 @@ from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, find_pipeline, read_pipeline
 from sysid.workbench.fits.data import Data, load_data
 from sysid.workbench.fits.record import read_fit, read_scores
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 from sysid.workbench.runner.store import RunFolder
 
 

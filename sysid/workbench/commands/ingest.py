@@ -16,7 +16,7 @@ from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import svg
 from sysid.traces import TraceSet
 from sysid.units import Reference
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.schemas import schema_line

@@ -16,7 +16,7 @@ from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.numbers import number
 from sysid.validation.metrics import percent
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import nearby, slug
 from sysid.workbench.runner.store import write_bytes
 

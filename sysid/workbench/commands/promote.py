@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 from sysid.workbench.tracking.mlflow_store import connect, store_uri
 from sysid.workbench.tracking.registry import promote
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 
 
 def report_command(run_folder: Path, *, against: Path | None, pdf: bool) -> None:

@@ -8,7 +8,8 @@ from sysid.errors import ConfigError
 from sysid.workbench.fits.config import find_pipeline, read_pipeline
 from sysid.workbench.fits.run import run_pipeline
 from sysid.workbench.kinds import DEFAULT, RunRequest, kind_of, kinds
-from sysid.workbench.runner.listeners import Audience, console, typed_command
+from sysid.workbench.runner.console import console
+from sysid.workbench.runner.listeners import Audience, typed_command
 from sysid.workbench.runner.screen import duration, table_of_fits, table_of_steps
 
 

@@ -13,7 +13,7 @@ from sysid.export.flags import Flag
 from sysid.export.reading import read_bundle
 from sysid.export.simulation import Simulation, read_inputs, simulate_bundle
 from sysid.ingest import write_trace
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 
 PICTURES = (".png", ".svg", ".pdf")
 """What a picture may end in."""

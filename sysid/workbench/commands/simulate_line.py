@@ -16,7 +16,7 @@ from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.runner import read_line
 from sysid.workbench.commands.simulate import check_picture
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 
 DRAWN = 5
 """Places in the picture at most: more lines of one field are not told apart."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from sysid.errors import SysidError
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 from sysid.workbench.tracking.mlflow_store import QUIET, latest_experiment, store_uri
 from sysid.workbench.tracking.mlflow_views import VIEW
 

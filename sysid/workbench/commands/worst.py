@@ -14,7 +14,7 @@ from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.ingest import DatasetDescription, find_dataset, read_description
 from sysid.workbench.runner import events
-from sysid.workbench.runner.listeners import console
+from sysid.workbench.runner.console import console
 from sysid.workbench.runner.screen import Screen
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.worst import Kept, drawn, errors_of, kept_text

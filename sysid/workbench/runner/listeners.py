@@ -9,22 +9,10 @@ from pathlib import Path
 
 from rich.console import Console
 
+from sysid.workbench.runner.console import console
 from sysid.workbench.runner.events import Event, Warned, Watcher
 from sysid.workbench.runner.screen import LogFile, Screen
 from sysid.workbench.tracking.listener import Tracker
-
-PIPED_WIDTH = 160
-"""Columns where there is no terminal to ask: enough for a table of five cases on one line."""
-
-
-def console() -> Console:
-    """Where results are shown.
-
-    Returns:
-        A console on standard output.
-    """
-    plain = Console(highlight=False)
-    return plain if plain.is_terminal else Console(highlight=False, width=PIPED_WIDTH)
 
 
 def typed_command(verb: str, pipeline: str, out: Path | None) -> str:
