@@ -54,25 +54,6 @@ class LimitCheck:
     limits: tuple[Passed, ...]
     traces: int
 
-    @property
-    def passed(self) -> list[Passed]:
-        """Those that some trace passes, the furthest first."""
-        return sorted((one for one in self.limits if one.most > 0.0), key=lambda one: -one.summed)
-
-    @property
-    def sentence(self) -> str | None:
-        """How many are passed, and which the furthest; ``None`` where no limit is a channel."""
-        if not self.limits:
-            return None
-        if not (passed := self.passed):
-            return f"No training trace ({self.traces}) passes a limit that is a channel ({len(self.limits)})."
-        worst = passed[0]
-        return (
-            f"Training traces ({self.traces}) pass {len(passed)} of {len(self.limits)} limits that are channels, "
-            f"{worst.limit} the furthest: {worst.output} would be held back by {worst.summed:.2g} {worst.unit} over "
-            f"{worst.trace}."
-        )
-
 
 def check_limits(composite: Composite, traces: Sequence[Trace]) -> LimitCheck:
     """Hold measured traces against what is declared of their limits.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from sysid.models import Activity, Cascade
 from sysid.traces import Trace
@@ -80,31 +79,3 @@ def _sum(activities: Iterable[Activity]) -> Activity:
         lost=sum(one.lost for one in found),
         samples=sum(one.samples for one in found),
     )
-
-
-def holding_table(found: Sequence[Holding]) -> dict[str, Any]:
-    """The limits and how often they act.
-
-    Args:
-        found: What came of it; at least one.
-
-    Returns:
-        A table, as :class:`sysid.reporting.judging.tables.TableRecord` has it.
-    """
-    rows: list[list[Any]] = []
-    for one in found:
-        for side, limit in (("low", one.low), ("high", one.high)):
-            if limit is not None:
-                shown = limit if isinstance(limit, str) else f"{limit:g} {one.unit}"
-                what = f"{one.output} at its {'lower' if side == 'low' else 'upper'} limit"
-                shares = [
-                    None if a is None else 100.0 * getattr(a, side) / a.samples for a in (one.cases, one.sequences)
-                ]
-                rows.append([what, shown, *shares])
-    return {
-        "caption": "Limits that hold an output in free run",
-        "head": [("", ""), ("Limit", ""), ("Scored cases", "% of samples"), ("Random sequences", "% of samples")],
-        "rows": rows,
-        "note": "A limit that is a channel follows what is declared of the system: an output rests on it while "
-        "nothing flows.",
-    }

@@ -24,6 +24,7 @@ class Attempt:
         chosen: Whether it is the result.
         members: Of a committee, the starts that it unites, once for each vote.
         without: Inputs that it does without.
+        status: Name of the status that it had then; empty where it was not recorded.
     """
 
     start: int
@@ -38,6 +39,7 @@ class Attempt:
     chosen: bool = False
     members: tuple[int, ...] = ()
     without: tuple[str, ...] = ()
+    status: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""

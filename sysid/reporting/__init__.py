@@ -14,13 +14,14 @@ if TYPE_CHECKING:
     from sysid.reporting.comparing.published import published_names as published_names
     from sysid.reporting.comparing.published import read_published as read_published
     from sysid.reporting.figures.fit_figures import case_figure as case_figure
+    from sysid.reporting.kinds import read_run as read_run
+    from sysid.reporting.kinds import results_json_schema as results_json_schema
     from sysid.reporting.pdf import write_pdf as write_pdf
     from sysid.reporting.publication import publish_run as publish_run
     from sysid.reporting.report import write_report as write_report
     from sysid.reporting.results import Results as Results
     from sysid.reporting.results import parse_results as parse_results
     from sysid.reporting.results import read_results as read_results
-    from sysid.reporting.results import results_json_schema as results_json_schema
     from sysid.reporting.results import write_results as write_results
     from sysid.reporting.signals import CaseSignals as CaseSignals
     from sysid.reporting.signals import read_signals as read_signals
@@ -39,8 +40,9 @@ _HOME = {
     "published_names": "comparing.published",
     "read_published": "comparing.published",
     "read_results": "results",
+    "read_run": "kinds",
     "read_signals": "signals",
-    "results_json_schema": "results",
+    "results_json_schema": "kinds",
     "write_comparison": "comparing.against_page",
     "write_pdf": "pdf",
     "write_report": "report",

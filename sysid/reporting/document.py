@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +12,10 @@ from sysid.reporting.amplitude import amplitude_section
 from sysid.reporting.comparing.published import PublishedTable
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
-from sysid.reporting.judging.tables import judgement_sections, read_judgements
+from sysid.reporting.judging.document import judgement_sections
 from sysid.reporting.moments import Moment, worst_moments
 from sysid.reporting.numbers import number
-from sysid.reporting.parts import Part, Picture, Section, identifier, picture
+from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.runtime_table import exported_run_times
 from sysid.reporting.signals import CaseSignals, read_signals
@@ -37,25 +36,7 @@ from sysid.reporting.tables import (
     scored_cases,
 )
 from sysid.reporting.training_view import training_parts, trust_sections
-from sysid.reporting.verdict import Verdict, verdict
-
-if TYPE_CHECKING:
-    from sysid.reporting.judging.results import JudgementResults
-
-
-@dataclass(frozen=True, kw_only=True)
-class Document:
-    """Everything that the page shows.
-
-    Args:
-        results: The results it was made from: of fits, or of a judgement.
-        verdict: Stands first.
-        sections: The rest, in order.
-    """
-
-    results: Results | JudgementResults
-    verdict: Verdict
-    sections: tuple[Section, ...]
+from sysid.reporting.verdict import verdict
 
 
 def build_document(folder: Path, results: Results, published: PublishedTable | None) -> Document:
@@ -88,7 +69,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         sections += [] if by_level is None else [by_level]
     sections += [*trust_sections(results), *evidence_sections(folder, results)]
     states = state_section(results)
-    sections += ([] if states is None else [states]) + judgement_sections(read_judgements(folder))
+    sections += ([] if states is None else [states]) + judgement_sections(folder)
     sections += [_run_times(results, published), _tried(results)]
     exports = export_table(results)
     if exports is not None:

@@ -8,8 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select
 from markupsafe import Markup
 
 import sysid
-from sysid.reporting.document import Document
-from sysid.reporting.parts import Picture
+from sysid.reporting.parts import Document, Picture
 from sysid.reporting.tables import Table, facts
 
 

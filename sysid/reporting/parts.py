@@ -1,4 +1,4 @@
-"""What a report is put together from: sections of tables, pictures and paragraphs."""
+"""What a report is put together from: a verdict, and sections of tables, pictures and paragraphs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from sysid.reporting.figures.svg import svg
-from sysid.reporting.tables import Table
+from sysid.reporting.records import DataSetRecord, RunResults
+from sysid.reporting.tables import Table, plain_table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +43,51 @@ class Section:
     parts: tuple[Part, ...]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Tile:
+    """One figure that stands out.
+
+    Args:
+        figure: With its unit.
+        words: What it is.
+    """
+
+    figure: str
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What a reader with one minute should know.
+
+    Args:
+        headline: One sentence.
+        tiles: The figures that stand out.
+        points: Pairs of a keyword and a sentence.
+        warnings: What makes the verdict weaker than it looks.
+    """
+
+    headline: str
+    tiles: tuple[Tile, ...]
+    points: tuple[tuple[str, str], ...]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Document:
+    """Everything that a page shows.
+
+    Args:
+        results: The results it was made from.
+        verdict: Stands first.
+        sections: The rest, in order.
+    """
+
+    results: RunResults
+    verdict: Verdict
+    sections: tuple[Section, ...]
+
+
 def picture(figure: Figure, title: str, caption: str, name: str) -> Picture:
     """A figure with its caption, which is also what is read aloud.
 
@@ -60,3 +106,19 @@ def picture(figure: Figure, title: str, caption: str, name: str) -> Picture:
 def identifier(slug: str) -> str:
     """A fit's slug as part of an id in the page."""
     return re.sub(r"[^A-Za-z0-9-]", "-", slug)
+
+
+def data_set_section(data: DataSetRecord) -> list[Section]:
+    """The data sets that were read, with their digests.
+
+    Args:
+        data: What was read.
+
+    Returns:
+        A section; none where a judge brings its own scenes.
+    """
+    if not data.digest:
+        return []
+    digests = {data.name: data.digest, **data.others}
+    table = plain_table("Data sets that were read.", [("data set", ""), ("SHA-256", "")], [*map(list, digests.items())])
+    return [Section(anchor="data", title="Traces", parts=(table,))]

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from sysid.errors import ConfigError
-from sysid.reporting.comparing.published import read_published
-from sysid.reporting.comparing.published_comparison import with_published
-from sysid.reporting.document import Document, build_document
 from sysid.reporting.html import readable
-from sysid.reporting.judging.results import judgement_document, read_judgement_results
+from sysid.reporting.kinds import read_run, run_document, run_scores
 from sysid.reporting.markdown import (
     MARK,
     PAGE,
@@ -26,8 +21,10 @@ from sysid.reporting.markdown import (
     refuse_others,
     section_lines,
 )
-from sysid.reporting.results import Results, read_results
-from sysid.reporting.scores import Score, score_of, write_scores
+from sysid.reporting.parts import Document
+from sysid.reporting.records import RunResults
+from sysid.reporting.results import Results
+from sysid.reporting.scores import write_scores
 from sysid.reporting.tables import scored_cases
 
 LEFT_OUT: Final = ("fit-", "frequency-response", "residuals")
@@ -44,15 +41,6 @@ FROZEN_LINE: Final = f"""
 The frozen line lies beside this page, in [{LINE}]({LINE}): `sysid simulate` with `--places` and this folder runs every
 place of it in one call.
 """
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Source:
-    """What a page is made from: the report, and the drawings that belong into it."""
-
-    document: Document
-    scores: list[Score]
-    shown: Callable[[str], bool]
 
 
 def publish_run(
@@ -76,9 +64,10 @@ def publish_run(
             that name that is not ours.
         BundleError: If the bundle is damaged.
     """
-    source = _source(Path(run_folder), workspace)
+    document = run_document(Path(run_folder), read_run(Path(run_folder)), workspace=workspace)
+    scores = run_scores(document.results)
     frozen = _frozen(Path(run_folder)) if bundle else ()
-    chosen = name or source.document.results.pipeline
+    chosen = name or document.results.pipeline
     target = into / chosen
     refuse_others(target)
     into.mkdir(parents=True, exist_ok=True)
@@ -87,7 +76,7 @@ def publish_run(
         draft = Path(scratch) / chosen
         draft.mkdir()
         command = f"sysid publish {run_folder} --as {chosen}{' --bundle' if frozen else ''}"
-        text = _page(source, chosen, command, draft)
+        text = _page(document, chosen, command, draft)
         for left in frozen:
             if left.is_dir():
                 shutil.copytree(left, draft / BUNDLE)
@@ -96,26 +85,12 @@ def publish_run(
                 shutil.copyfile(left, draft / LINE)
                 text += FROZEN_LINE
         (draft / PAGE).write_text(text, encoding="utf-8", newline="\n")
-        if source.scores:
-            write_scores(draft, source.scores)
+        if scores:
+            write_scores(draft, scores)
         if target.exists():
             target.rename(Path(scratch) / "before")
         draft.rename(target)
     return target / PAGE
-
-
-def _source(folder: Path, workspace: Path | None) -> _Source:
-    judged = read_judgement_results(folder)
-    if judged is not None:
-        return _Source(document=judgement_document(judged), scores=judged.judgement.scores, shown=lambda _: True)
-    stored = read_results(folder)
-    published = None if stored.published is None else read_published(stored.published, workspace=workspace)
-    results = with_published(stored, published)
-    return _Source(
-        document=build_document(folder, results, published),
-        scores=score_of(results),
-        shown=lambda drawing: _worst_case(drawing, results),
-    )
 
 
 def _frozen(run_folder: Path) -> list[Path]:
@@ -136,14 +111,13 @@ def _frozen(run_folder: Path) -> list[Path]:
     return found
 
 
-def _page(source: _Source, name: str, command: str, folder: Path) -> str:
-    document = source.document
+def _page(document: Document, name: str, command: str, folder: Path) -> str:
     lines = [MARK, f"# {name}", "", document.results.description, ""]
     lines += [f"**{arrow(document.verdict.headline)}**", ""]
     lines += [f"- **{arrow(word)}.** {arrow(sentence)}" for word, sentence in document.verdict.points]
     lines += [f"- **Warning.** {warning}" for warning in document.verdict.warnings]
     lines += ["", *_provenance(document, command), ""]
-    drawings = Drawings(folder=folder, shown=source.shown)
+    drawings = Drawings(folder=folder, shown=lambda drawing: _belongs(drawing, document.results))
     for section in document.sections:
         if not section.anchor.startswith(LEFT_OUT):
             lines += section_lines(section, drawings)
@@ -164,11 +138,13 @@ def _provenance(document: Document, command: str) -> list[str]:
     return facts_lines({key: escape(text) for key, text in rows.items()})
 
 
-def _worst_case(drawing: str, results: Results) -> bool:
-    """Of the pictures of single cases only that of the case where the chosen fit is weakest."""
+def _belongs(drawing: str, results: RunResults) -> bool:
+    """Of the pictures of single cases of fits only that of the case where the chosen fit is weakest."""
+    if not drawing.startswith("case-") or not isinstance(results, Results):
+        return True
     best = results.best_fit
-    if not drawing.startswith("case-") or best is None:
-        return not drawing.startswith("case-")
+    if best is None:
+        return False
     judged = scored_cases(best) or best.cases
     worst = max(judged, key=lambda case: judged[case].free_run.mse)
     return drawing.endswith(f"-{list(best.cases).index(worst)}")

@@ -5,19 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.atomic import replacing
-from sysid.reporting.comparing.published import read_published
-from sysid.reporting.comparing.published_comparison import with_published
-from sysid.reporting.document import build_document
 from sysid.reporting.html import render_html
-from sysid.reporting.judging.results import read_judgement_results, write_judgement_report
-from sysid.reporting.results import read_results, write_results
+from sysid.reporting.kinds import read_run, run_document
+from sysid.reporting.records import RESULTS_FILE, write_record
 
 
 def write_report(run_folder: Path, *, workspace: Path | None = None) -> Path:
-    """Make the report of a run from what the run stored; nothing is fitted or simulated.
+    """Make the report of a run of any kind from what the run stored; nothing is fitted or simulated.
 
     Args:
-        run_folder: The run's folder, with ``results.json`` and ``fits/<slug>/signals.npz``.
+        run_folder: The run's folder, with ``results.json`` and the signals beside it.
         workspace: Where the user's own tables of published figures lie; ``None`` is the current folder.
 
     Returns:
@@ -28,14 +25,9 @@ def write_report(run_folder: Path, *, workspace: Path | None = None) -> Path:
             figures is not known.
     """
     folder = Path(run_folder)
-    judged = read_judgement_results(folder)
-    if judged is not None:
-        return write_judgement_report(folder, judged)
-    stored = read_results(folder)
-    published = None if stored.published is None else read_published(stored.published, workspace=workspace)
-    results = with_published(stored, published)
-    page = render_html(build_document(folder, results, published))
-    write_results(folder / "report", results)
+    document = run_document(folder, read_run(folder), workspace=workspace)
+    page = render_html(document)
+    write_record(folder / "report" / RESULTS_FILE, document.results)
     path = folder / "report" / "index.html"
     with replacing(path) as draft:
         draft.write_text(page, encoding="utf-8")

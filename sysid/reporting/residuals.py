@@ -8,7 +8,7 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sysid.errors import ConfigError
-from sysid.reporting.results import Number
+from sysid.reporting.records import Number
 
 RESIDUALS_FILE: Final = "residuals.json"
 

@@ -1,47 +1,34 @@
-"""results.json: what a run found, read and written with its contract.
+"""results.json of a run of fits, a sweep's among them: what it found, read and written with its contract.
 
-The contract is documented in ``reports/README.md``. A reader skips keys that it does not know, and refuses a
+The contract is documented in ``docs/results.md``. A reader skips keys that it does not know, and refuses a
 ``schema_version`` newer than its own.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping as Dict
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
+from pydantic import Field
 
-from sysid.atomic import replacing
-from sysid.errors import ConfigError
 from sysid.estimation import Loop, Status
+from sysid.reporting.records import (
+    RESULTS_FILE,
+    DataSetRecord,
+    Number,
+    Record,
+    RunResults,
+    damaged,
+    parse_record,
+    read_document,
+    write_record,
+)
 from sysid.traces import Role
 
-SCHEMA_VERSION: Final = 1
-RESULTS_FILE: Final = "results.json"
 
-
-def _nan_for_null(value: object) -> object:
-    return math.nan if value is None else value
-
-
-# JSON has no word for infinity and NaN: a figure that is not finite is written as null, and read as NaN.
-Number = Annotated[
-    float,
-    BeforeValidator(_nan_for_null),
-    WithJsonSchema({"type": ["number", "null"]}),
-]
-
-
-class _Record(BaseModel):
-    """Frozen; keys from a later release are kept, so that a copy loses nothing."""
-
-    model_config = ConfigDict(frozen=True, extra="allow", protected_namespaces=())
-
-
-class FiguresRecord(_Record):
+class FiguresRecord(Record):
     """Figures of merit of one output against one target."""
 
     mse: Number = Field(description="Mean squared error, in the unit squared.")
@@ -51,17 +38,17 @@ class FiguresRecord(_Record):
     unit: str = Field(description="Unit of the output.")
 
 
-class PublishedRecord(_Record):
+class PublishedRecord(Record):
     """A published figure set beside ours; written by the report, not by the run."""
 
-    value: Number
-    unit: str
+    value: Number = Field(description="The published figure.")
+    unit: str = Field(description="Of the figure.")
     source: str = Field(description="Where it is printed, such as 'Table 5.1'.")
     label: str = Field(description="Which model it belongs to.")
     ratio: Number = Field(description="Our figure divided by the published one.")
 
 
-class CoverageRecord(_Record):
+class CoverageRecord(Record):
     """How often an interval of the output holds what was measured."""
 
     level: Number = Field(description="How often it should, 0 to 1.")
@@ -76,14 +63,14 @@ class StateRecord(FiguresRecord):
     share: Number = Field(description="Of the samples that count, 0 to 1.")
 
 
-class CaseRecord(_Record):
+class CaseRecord(Record):
     """One fit on one case."""
 
     role: Role
     free_run: FiguresRecord = Field(description="The model fed with its own past output: the figure that counts.")
     one_step: FiguresRecord = Field(description="One step ahead from measured output: open loop.")
     run_time_s: Number = Field(description="Seconds that the free run took: median of repeats, warm.")
-    n_samples: int = Field(ge=1)
+    n_samples: int = Field(ge=1, description="Samples that were scored.")
     begins_at: int = Field(default=0, description="Sample of the case at which the free run begins and is scored.")
     simulated_s: Number = Field(description="Length of the case in seconds.")
     coverage: dict[str, CoverageRecord] | None = Field(
@@ -97,67 +84,68 @@ class CaseRecord(_Record):
     )
 
 
-class RunTimeRecord(_Record):
+class RunTimeRecord(Record):
     """How long an exported file takes for 20,000 samples, beside its model's own compiled free run."""
 
     cars: int = Field(description="Runs side by side in one call.")
-    seconds: Number
+    seconds: Number = Field(description="Of one call.")
     ratio: Number = Field(description="To the model's own free run, for each car.")
 
 
-class ExportRecord(_Record):
+class ExportRecord(Record):
     """One exported file and how it compares with its model."""
 
-    format: str
+    format: str = Field(description="Name of the exporter, such as onnx.")
     file: str = Field(description="Path, relative to the run folder.")
     largest_difference: Number = Field(description="Over all cases, in the output's unit.")
     tolerance: Number = Field(description="What was allowed, in the same unit.")
-    unit: str = ""
+    unit: str = Field(default="", description="Of the difference.")
     run_times: list[RunTimeRecord] = Field(default=[], description="Empty where none were measured.")
 
 
-class LearningCurve(_Record):
+class LearningCurve(Record):
     """Loss over the iterations."""
 
-    iteration: list[Number] = []
+    iteration: list[Number] = Field(default=[], description="Number of the iteration.")
     mse: list[Number] = Field(default=[], description="Over the estimation records, in the output's unit squared.")
 
 
-class EvidenceRecord(_Record):
+class EvidenceRecord(Record):
     """What Bayesian regularisation found."""
 
-    log_evidence: Number
+    log_evidence: Number = Field(description="Logarithm of the marginal likelihood.")
     correlation_time: Number = Field(default=math.nan, description="Samples after which a residual is news.")
     alphas: dict[str, Number] = Field(default={}, description="Precision of the prior, per group of weights.")
     effective_parameters: dict[str, Number] = Field(default={}, description="Per group of weights.")
     parameters: dict[str, Number] = Field(default={}, description="Per group of weights.")
 
 
-class AttemptRecord(_Record):
+class AttemptRecord(Record):
     """One start as it stood when it was looked at."""
 
     start: int = Field(description="Which start, from 1 on.")
-    seed: int | None = None
-    iterations: int
-    elapsed_s: Number
+    seed: int | None = Field(default=None, description="Of the start; null for one that was given.")
+    iterations: int = Field(description="Done by then.")
+    elapsed_s: Number = Field(description="Seconds that it had taken.")
     estimation_mse: Number = Field(description="On the estimation records, in the output's unit squared.")
     selection_mse: Number = Field(description="Geometric mean over the selection traces.")
-    log_evidence: Number
-    effective_parameters: Number
+    log_evidence: Number = Field(description="Null where none was computed.")
+    effective_parameters: Number = Field(description="Parameters that the data determine.")
     stable: bool | None = Field(default=None, description="What the check of its free run said, where it was asked.")
-    chosen: bool = False
+    chosen: bool = Field(default=False, description="Whether it is the result.")
     members: list[int] = Field(default=[], description="Of a committee, the starts that it unites, once for each vote.")
     without: list[str] = Field(default=[], description="Inputs that it does without.")
+    status: str = Field(default="", description="Name of the status that it had then; empty where not recorded.")
 
 
-class StabilityRecord(_Record):
+class StabilityRecord(Record):
     """What a check of the free run over random sequences found."""
 
-    stable: bool
+    stable: bool = Field(description="Whether it is.")
     text: str = Field(description="The finding as a sentence.")
     source: str = Field(description="Where the sequences come from.")
-    seed: int
-    sequences: int
+    seed: int = Field(description="Of the sequences.")
+    sequences: int = Field(description="How many were run.")
     unbounded: int = Field(description="How many left the bounds.")
     judged: int = Field(description="How many had a plateau to settle on.")
     unsettled: int = Field(description="How many of those settled elsewhere.")
@@ -168,27 +156,27 @@ class StabilityRecord(_Record):
     worst: str = Field(description="Name of the worst sequence.")
 
 
-class FitRecord(_Record):
+class FitRecord(Record):
     """One fit: what it is, how it ended, and how good it is on every case."""
 
-    name: str
+    name: str = Field(description="Its name in tables.")
     slug: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+-]*$", description="Its folder under fits/.")
     mapping: str = Field(description="Written as in 'BP+AR -> BC'.")
-    structure: dict[str, Any]
+    structure: dict[str, Any] = Field(description="All fields of the structure.")
     label: str = Field(description="Structure in a few characters, such as 'NARX 4/4/20'.")
     loop: Loop
-    seed: int | None = None
+    seed: int | None = Field(default=None, description="Of its random start.")
     initial: str | None = Field(default=None, description="Name of the fit that this one was started from.")
-    train_time_s: Number
+    train_time_s: Number = Field(description="Wall seconds of the fit.")
     status: str = Field(description="Name of the status, such as CONVERGED.")
-    notes: list[str] = []
+    notes: list[str] = Field(default=[], description="Sentences on choices that were made.")
     evidence: EvidenceRecord | None = None
     attempts: list[AttemptRecord] = Field(default=[], description="Every start at every look.")
     stability: StabilityRecord | None = Field(default=None, description="Of the free run over random sequences.")
-    n_parameters: int | None = None
+    n_parameters: int | None = Field(default=None, description="Fitted parameters; null where not counted.")
     selection_mse: Number = Field(default=math.nan, description="Free-run mse on the traces that chose between fits.")
     cases: dict[str, CaseRecord]
-    exports: list[ExportRecord] = []
+    exports: list[ExportRecord] = Field(default=[])
     learning_curve: LearningCurve | None = None
 
     @property
@@ -202,75 +190,65 @@ class FitRecord(_Record):
         return next((case.free_run.unit for case in self.cases.values()), "")
 
 
-class DataCaseRecord(_Record):
+class DataCaseRecord(Record):
     """One trace of the data set."""
 
     role: Role
-    samples: int
-    duration_s: Number
-    provenance: list[str] = []
+    samples: int = Field(description="How many it has.")
+    duration_s: Number = Field(description="Length in seconds.")
+    provenance: list[str] = Field(default=[], description="Sentences on where it comes from.")
 
 
-class DataRecord(_Record):
-    """The data set."""
+class DataRecord(DataSetRecord):
+    """The data set of fits."""
 
-    name: str
-    digest: str
     sample_time: Number = Field(description="Seconds.")
     cases: dict[str, DataCaseRecord]
 
 
-class SelectionRecord(_Record):
+class SelectionRecord(Record):
     """The traces that chose between fits."""
 
     name: str = Field(description="Name of their data set.")
     cases: dict[str, Any] = Field(description="By name of the trace.")
 
 
-class BestRecord(_Record):
+class BestRecord(Record):
     """Which fit was chosen."""
 
-    name: str
+    name: str = Field(description="Name of the fit.")
     chosen_by: str = Field(description="One sentence: by which figure, on which traces.")
     cases_chose: bool = Field(
         default=False, description="Whether the cases that are scored took part, as in a published sweep that did so."
     )
 
 
-class AmplitudeRecord(_Record):
+class AmplitudeRecord(Record):
     """The best linear model and the best network at one amplitude."""
 
     amplitude: str = Field(description="minimum, intermediate or full: how far the output of its cases moves.")
-    cases: list[str]
+    cases: list[str] = Field(description="Names of its cases.")
     linear: str = Field(description="Name of the linear fit with the highest mean fit over these cases.")
     linear_fit: Number = Field(description="That free-run fit in percent.")
     network: str = Field(description="Name of the network with the highest mean fit over these cases.")
     network_fit: Number = Field(description="That free-run fit in percent.")
 
 
-class LinearityRecord(_Record):
+class LinearityRecord(Record):
     """Whether a linear model is enough, amplitude by amplitude."""
 
     answer: str = Field(description="LINEAR, NETWORK, NEITHER or UNKNOWN.")
     text: str = Field(description="The answer as a sentence.")
-    rows: list[AmplitudeRecord] = []
+    rows: list[AmplitudeRecord] = Field(default=[])
 
 
-class Results(_Record):
-    """All of results.json."""
+class Results(RunResults):
+    """All of results.json of a run of fits, or of a sweep."""
 
-    schema_version: int = SCHEMA_VERSION
-    pipeline: str
-    description: str = ""
-    command: str = Field(description="The command that makes the run again.")
-    created: str = Field(description="Date and time, ISO 8601.")
-    environment: dict[str, Any]
-    seed: int | None
-    start: dict[str, Any] | None = Field(default=None, description="How each free run begins.")
     data: DataRecord
-    selection: SelectionRecord | None = None
-    fits: list[FitRecord] = Field(min_length=1)
-    best: BestRecord | None = None
+    selection: SelectionRecord | None = Field(default=None, description="The traces that chose between fits.")
+    fits: list[FitRecord] = Field(min_length=1, description="One object a fit.")
+    best: BestRecord | None = Field(default=None, description="Which fit was chosen.")
     linearity: LinearityRecord | None = Field(default=None, description="Whether a linear model is enough.")
     published: str | None = Field(default=None, description="Reference table to set beside ours.")
 
@@ -300,26 +278,12 @@ def parse_results(document: Dict[str, Any], *, where: object) -> Results:
     Raises:
         ConfigError: If they were written by a newer release, or a field is missing or wrong.
     """
-    version = document.get("schema_version", SCHEMA_VERSION)
-    if isinstance(version, int) and version > SCHEMA_VERSION:
-        raise ConfigError(
-            "the results were written by a newer release",
-            where=where,
-            expected=f"schema_version up to {SCHEMA_VERSION}",
-            got=version,
-            remedy="upgrade the workbench, or make the report with the release that made the run",
-        )
-    try:
-        results = Results.model_validate(document)
-    except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"]) or "the whole file"
-        raise _damaged(where, f"{field}: {first['msg']}", f"{first['input']!r:.80}") from error
+    results = parse_record(Results, {"schema_version": 1} | dict(document), where=where)
     names = [fit.name for fit in results.fits]
     if len(set(names)) < len(names) or len({fit.slug for fit in results.fits}) < len(names):
-        raise _damaged(where, "a name and a slug of its own for every fit", ", ".join(names))
+        raise damaged(where, "a name and a slug of its own for every fit", ", ".join(names))
     if results.best is not None and results.best.name not in names:
-        raise _damaged(where, f"best.name: one of {', '.join(names)}", results.best.name)
+        raise damaged(where, f"best.name: one of {', '.join(names)}", results.best.name)
     return results
 
 
@@ -336,21 +300,7 @@ def read_results(folder: Path) -> Results:
         ConfigError: If there is no results.json, it is damaged, or it was written by a newer release.
     """
     path = Path(folder) / RESULTS_FILE
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError) as error:
-        raise ConfigError(
-            "the folder holds no results",
-            where=folder,
-            expected=f"a run folder with {RESULTS_FILE}",
-            got="no such file",
-            remedy="name the folder of a finished run, such as runs/<pipeline>, or run the pipeline first",
-        ) from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise _damaged(path, "JSON in UTF-8", error) from error
-    if not isinstance(document, dict):
-        raise _damaged(path, "a JSON object at the top level", type(document).__name__)
-    return parse_results(document, where=path)
+    return parse_results(read_document(path), where=path)
 
 
 def write_results(folder: Path, results: Results) -> Path:
@@ -363,30 +313,4 @@ def write_results(folder: Path, results: Results) -> Path:
     Returns:
         The file.
     """
-    path = Path(folder) / RESULTS_FILE
-    with replacing(path) as draft:
-        draft.write_text(results.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    return path
-
-
-def results_json_schema() -> dict[str, Any]:
-    """The JSON schema of results.json.
-
-    Returns:
-        The schema, draft 2020-12.
-
-    Example:
-        >>> sorted(results_json_schema()["required"])
-        ['command', 'created', 'data', 'environment', 'fits', 'pipeline', 'seed']
-    """
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Results.model_json_schema()}
-
-
-def _damaged(where: object, expected: object, got: object) -> ConfigError:
-    return ConfigError(
-        "the results are damaged",
-        where=where,
-        expected=expected,
-        got=got,
-        remedy="run the pipeline again; it resumes from what is finished",
-    )
+    return write_record(Path(folder) / RESULTS_FILE, results)

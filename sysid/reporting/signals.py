@@ -1,4 +1,4 @@
-"""The stored signals of a fit: target, free run and one-step prediction of every case."""
+"""The stored signals of a run: target, free run and one-step prediction of every case."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 
 SIGNALS_FILE: Final = "signals.npz"
-_PARTS: Final = ("time", "target", "simulated", "predicted")
-_INTERVAL: Final = ("low", "high")
+MONTE_CARLO_FILE: Final = "monte-carlo.npz"
+"""Of an assembly: the random sequences that it is worst on."""
+
+_PARTS: Final = ("time", "target", "simulated")
+_OPTIONAL: Final = ("predicted", "low", "high")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,7 +28,7 @@ class CaseSignals:
         time: Seconds, shape ``(n_samples,)``.
         target: Measured output, shape ``(n_samples,)``.
         simulated: Free run, shape ``(n_samples,)``.
-        predicted: One step ahead, shape ``(n_samples,)``.
+        predicted: One step ahead, shape ``(n_samples,)``; ``None`` of an assembly, which has no such run.
         low: Lower end of the free run's interval, shape ``(n_samples,)``; ``None`` where there is none.
         high: Upper end of it.
     """
@@ -33,7 +36,7 @@ class CaseSignals:
     time: NDArray[np.float64]
     target: NDArray[np.float64]
     simulated: NDArray[np.float64]
-    predicted: NDArray[np.float64]
+    predicted: NDArray[np.float64] | None = None
     low: NDArray[np.float64] | None = None
     high: NDArray[np.float64] | None = None
 
@@ -44,12 +47,14 @@ class CaseSignals:
         return np.asarray(simulated - self.target)
 
 
-def read_signals(folder: Path, cases: list[str]) -> dict[str, CaseSignals]:
-    """Read the signals of one fit.
+def read_signals(folder: Path, cases: list[str], *, of: str = "", file: str = SIGNALS_FILE) -> dict[str, CaseSignals]:
+    """Read the signals of one fit, or of an output of an assembly.
 
     Args:
-        folder: The fit's folder.
+        folder: The fit's folder, or the run folder of an assembly.
         cases: Names of the cases that are wanted.
+        of: The output, of an assembly.
+        file: Name of the file.
 
     Returns:
         The signals by case, in the order asked for.
@@ -57,13 +62,13 @@ def read_signals(folder: Path, cases: list[str]) -> dict[str, CaseSignals]:
     Raises:
         ConfigError: If the file is missing or damaged, or a case is not in it.
     """
-    path = Path(folder) / SIGNALS_FILE
+    path, before = Path(folder) / file, f"{of}/" if of else ""
     try:
         # Opened here: NumPy leaves its own file open when the archive turns out to be damaged.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            return {case: _case(stored, case, path) for case in cases}
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
+            return {case: _case(stored, f"{before}{case}", path) for case in cases}
     except FileNotFoundError as error:
-        raise _damaged(path, "the signals of the fit", "no such file") from error
+        raise _damaged(path, "the signals of the run", "no such file") from error
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise _damaged(path, "a NumPy .npz archive of plain arrays", error) from error
 
@@ -72,7 +77,7 @@ def _case(stored: np.lib.npyio.NpzFile, case: str, path: Path) -> CaseSignals:
     missing = [f"{case}/{part}" for part in _PARTS if f"{case}/{part}" not in stored.files]
     if missing:
         raise _damaged(path, ", ".join(missing), f"arrays of {_present(stored)}")
-    kept = [*_PARTS, *(part for part in _INTERVAL if f"{case}/{part}" in stored.files)]
+    kept = [*_PARTS, *(part for part in _OPTIONAL if f"{case}/{part}" in stored.files)]
     parts = {part: np.asarray(stored[f"{case}/{part}"], dtype=np.float64) for part in kept}
     shapes = {array.shape for array in parts.values()}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):

@@ -62,6 +62,47 @@ def figure_cell(
     return Cell(text=number(value, missing=missing, digits=digits), value=value, below=below, mark=mark)
 
 
+def plain_table(
+    caption: str,
+    head: Sequence[tuple[str, str]],
+    rows: Sequence[Sequence[int | float | str | None]],
+    *,
+    note: str = "",
+    folded: Sequence[str] = (),
+) -> Table:
+    """A table of counts, numbers, words, and ``None`` or NaN for what there is not; the first word names its row.
+
+    Args:
+        caption: What it shows, units included.
+        head: Names of the columns, each with a second line.
+        rows: The rows, one value a column.
+        note: A sentence below it.
+        folded: Sentences that are folded away below that.
+
+    Returns:
+        The table.
+    """
+    cells = tuple(tuple(plain_cell(value, first=k == 0) for k, value in enumerate(row)) for row in rows)
+    return Table(caption=caption, head=tuple(head), rows=cells, note=note, folded=tuple(folded))
+
+
+def plain_cell(value: float | str | None, *, first: bool = False) -> Cell:
+    """A count, a number, a word or nothing as a cell.
+
+    Args:
+        value: The value.
+        first: Whether it is the first of its row, which a word then names.
+
+    Returns:
+        The cell.
+    """
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return Cell(text="")
+    if isinstance(value, int):  # a count has no significant digits
+        return Cell(text=str(value), value=value, mark="number")
+    return Cell(text=value, header=first) if isinstance(value, str) else figure_cell(value)
+
+
 def case_columns(fits: Sequence[FitRecord]) -> dict[str, Role]:
     """The cases of some fits with their roles, in the order of the file."""
     return {name: case.role for fit in fits for name, case in fit.cases.items()}

@@ -5,43 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from sysid.estimation import Status
 from sysid.reporting.moments import Moment
 from sysid.reporting.numbers import number, quantity, seconds, times
+from sysid.reporting.parts import Tile, Verdict
 from sysid.reporting.results import CaseRecord, FitRecord, Results
 from sysid.reporting.tables import mean_mse, real_time_factor, scored_cases
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tile:
-    """One figure that stands out.
-
-    Args:
-        figure: With its unit.
-        words: What it is.
-    """
-
-    figure: str
-    words: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """What a reader with one minute should know.
-
-    Args:
-        headline: One sentence.
-        tiles: The figures that stand out.
-        points: Pairs of a keyword and a sentence.
-        warnings: What makes the verdict weaker than it looks.
-    """
-
-    headline: str
-    tiles: tuple[Tile, ...]
-    points: tuple[tuple[str, str], ...]
-    warnings: tuple[str, ...]
 
 
 def verdict(results: Results, moments: Sequence[Moment], comparability: str) -> Verdict:

@@ -328,14 +328,18 @@ def ui(
     raise typer.Exit(ui_command(port, browser=not no_browser))
 
 
-@app.command(epilog="Example: sysid schema .")
+@app.command(epilog="Example: sysid schema .  sysid schema --results")
 def schema(
     folder: Annotated[Path, typer.Argument(help="A workspace.")] = Path(),
+    results: Annotated[bool, typer.Option("--results", help="Print the schema of results.json instead.")] = False,
 ) -> None:
     """Write the JSON schemas of pipelines and data sets into a workspace: editors complete and check by them."""
-    from sysid.workbench.commands.schema import schema_command
+    from sysid.workbench.commands.schema import print_results_schema, schema_command
 
-    schema_command(folder)
+    if results:
+        print_results_schema()
+    else:
+        schema_command(folder)
 
 
 @app.command(epilog="Example: sysid init mine")

@@ -12,9 +12,10 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.reporting import publish_run, read_results
-from sysid.reporting.judging.results import JudgementResults, SceneRecord, SubjectRecord, write_judgement_results
-from sysid.reporting.judging.tables import parse_judgement
+from sysid.reporting.judging.results import JudgementResults, SubjectRecord, parse_judgement
+from sysid.reporting.judging.tables import judgement_headline
 from sysid.reporting.markdown import MARK
+from sysid.reporting.records import RESULTS_FILE, DataSetRecord, write_record
 
 PAIR = ("ARX", "NARX free run")
 
@@ -83,24 +84,33 @@ def test_a_folder_of_somebody_else_is_left_alone(page: tuple[Path, Path], tmp_pa
 
 def test_what_a_judge_said_is_published_in_the_same_way(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    said: dict[str, Any] = {"title": "Stops", "headline": "It stops <late>.", "sentences": ["By a little."]}
-    said["tables"] = [{"caption": "By scene", "head": [["scene", ""], ["late", "m"]], "rows": [["hill", 1.25]]}]
-    write_judgement_results(
-        folder,
+    judgement = parse_judgement(
+        {
+            "title": "Stops",
+            "method": "By <little>.",
+            "scenes": ["hill"],
+            "quantities": {"late": {"name": "late", "unit": "m"}},
+            "subjects": {"one": {"hill": {"differences": {"late": 1.25}}}},
+        },
+        where="test",
+    )
+    write_record(
+        folder / RESULTS_FILE,
         JudgementResults(
             kind="stops",
             pipeline="stopping",
             command="sysid run stopping",
             created="2026-11-21T04:00:00+00:00",
             environment={"commit": "9ffa098", "cpu": "A", "cores": 2},
-            data=SceneRecord(name="of the judge stops"),
+            data=DataSetRecord(name="of the judge stops"),
             subjects=[SubjectRecord(name="one", parts=["valve: fit a of run b"])],
-            judgement=parse_judgement(said, where="test"),
+            judgement=judgement,
         ),
     )
     text = publish_run(folder, tmp_path / "reports").read_text(encoding="utf-8")
     for words in (
-        "**It stops &lt;late>.**",
+        f"**{judgement_headline(judgement)}**",
+        "By &lt;little>.",
         "- **one.** valve: fit a of run b",
         "| run | `sysid run stopping` |",
         f"| published | `sysid publish {folder} --as stopping` |",
@@ -109,7 +119,7 @@ def test_what_a_judge_said_is_published_in_the_same_way(tmp_path: Path) -> None:
         "| commit | 9ffa098 |",
         "| machine | A, 2 cores |",
         "| data | of the judge stops |",
-        "| scene | late (m) |\n| --- | --- |\n| hill | 1.25 |",
+        "| scenario | late (m) |\n| --- | --- |\n| hill | 1.25 |",
     ):
         assert words in text, words
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.estimation.attempts import Attempt
 from sysid.estimation.least_squares.basis import RebasedProvider
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
@@ -98,6 +99,8 @@ class CascadeFit:
         seed: Seed of its random start; ``None`` where the fit began with the members as they were.
         evidence: From Bayesian regularisation.
         notes: Sentences worth knowing: which state was chosen among which, and by what.
+        attempts: Every start at every look, and the one that was chosen; its errors are squared, in the errors that
+            count as one.
     """
 
     model: Cascade
@@ -108,6 +111,7 @@ class CascadeFit:
     seed: int | None = None
     evidence: Evidence | None = None
     notes: tuple[str, ...] = field(default=())
+    attempts: tuple[Attempt, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON values."""
@@ -122,6 +126,7 @@ class CascadeFit:
             if self.evidence is None
             else {name: getattr(self.evidence, name) for name in Evidence.__dataclass_fields__},
             "notes": list(self.notes),
+            "attempts": [attempt.to_dict() for attempt in self.attempts],
         }
 
     @classmethod
@@ -143,6 +148,7 @@ class CascadeFit:
             seed=fields["seed"],
             evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
             notes=tuple(fields["notes"]),
+            attempts=tuple(Attempt.from_dict(attempt) for attempt in fields.get("attempts", ())),
         )
 
 
@@ -150,6 +156,7 @@ class CascadeFit:
 class _Candidate:
     """One start as it stood at a look; without a solution, as it was given."""
 
+    start: int
     seed: int | None
     model: Cascade
     score: float
@@ -159,6 +166,22 @@ class _Candidate:
     @property
     def iteration(self) -> int:
         return self.solution.state.iteration if self.solution else 0
+
+    def attempt(self, *, chosen: bool) -> Attempt:
+        """What is kept of it."""
+        solution, evidence = self.solution, self.solution.evidence if self.solution else None
+        return Attempt(
+            start=self.start,
+            seed=self.seed,
+            iterations=self.iteration,
+            elapsed_s=solution.curve[-1].elapsed_s if solution and solution.curve else 0.0,
+            estimation_mse=self.loss,
+            selection_mse=self.score,
+            log_evidence=evidence.log_evidence if evidence else -np.inf,
+            effective_parameters=evidence.total_effective_parameters if evidence else np.nan,
+            chosen=chosen,
+            status=solution.status.name if solution else "",
+        )
 
     @property
     def origin(self) -> str:
@@ -202,7 +225,8 @@ class Joint:
             The best state seen; a start that was given is one of them.
         """
         training, began = self.training, time.perf_counter() - checkpoints_of(self.on_progress).earlier_s
-        seen = [self._candidate(None, theta, None) for seed, theta in starts if seed is None]
+        numbers = {seed: number for number, (seed, _) in enumerate(starts, start=1)}
+        seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
         alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
         interrupted = False
         for look in range(1, training.looks + 1):
@@ -211,7 +235,7 @@ class Joint:
                 name = f"start {'as given' if seed is None else seed}, look {look}"
                 solution = self._advance(where, look, began, f"{number + 1}/{len(alive)}", name)
                 if not isinstance(where, Solution) or solution.state is not where.state:
-                    seen.append(self._candidate(seed, solution.theta, solution))
+                    seen.append(self._candidate((numbers[seed], seed), solution.theta, solution))
                 reached.append((seed, solution))
                 interrupted = solution.status is Status.INTERRUPTED
                 if interrupted:
@@ -262,13 +286,17 @@ class Joint:
         )
         return LevenbergMarquardt(termination=limits, evidence_after=training.evidence_after, on_iteration=report)
 
-    def _candidate(self, seed: int | None, theta: NDArray[np.float64], solution: Solution | None) -> _Candidate:
+    def _candidate(
+        self, start: tuple[int, int | None], theta: NDArray[np.float64], solution: Solution | None
+    ) -> _Candidate:
         plain = self.layout.to_plain @ theta
         # A given start is kept to the last digit, which the way into the basis and back would change.
         model = self.provider.at(plain) if solution else self.provider.cascade
         loss = solution.at.loss if solution else self.provider.loss(plain)
         mse = 2.0 * loss / self.provider.n_samples
-        return _Candidate(seed=seed, model=model, score=self._score(model), loss=mse, solution=solution)
+        number, seed = start
+        score = self._score(model)
+        return _Candidate(start=number, seed=seed, model=model, score=score, loss=mse, solution=solution)
 
     def _score(self, model: Cascade) -> float:
         """As between the starts of a network: one trace on which all fail must not choose alone."""
@@ -300,6 +328,7 @@ class Joint:
                 f"Chosen {how} among {len(seen)} states: {chosen.sentence}.",
                 *_others([one for one in seen if one is not chosen]),
             ),
+            attempts=tuple(one.attempt(chosen=one is chosen) for one in seen),
         )
 
     def _status(self, chosen: _Candidate, seen: Sequence[_Candidate], *, interrupted: bool) -> Status:

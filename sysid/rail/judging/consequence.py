@@ -1,8 +1,8 @@
 """The judge of pipelines of kind ``consequence``: what models' errors do to a train, step by step.
 
 A judge is found by its name among the installed packages (entry-point group ``sysid.judges``). It says what is to be
-done as steps, each with the terms that its result depends on, and makes one document of their results: plain JSON
-values, so that whoever runs the steps can keep them, and whoever shows the document need not know what a train is.
+done as steps, each with the terms that its result depends on, and makes one document of their results: figures under
+named keys, so that whoever runs the steps can keep them, and whoever shows them need not know what a train is.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from sysid.rail.dynamics.brake import ReferenceBrake
 from sysid.rail.dynamics.drive import Run
 from sysid.rail.dynamics.port import Part, brake_of
 from sysid.rail.dynamics.train import Train, read_train
-from sysid.rail.judging.consequence_tables import consequence_document
+from sysid.rail.judging.consequence_figures import consequence_document
 from sysid.rail.judging.judge import MakeBrake, difference, error_rung
 from sysid.rail.judging.scenario_catalogue import all_scenarios
 from sysid.rail.judging.scenarios import Consequence, Scenario
@@ -152,7 +152,7 @@ class TrainJudge:
             results: Of each step, by its name.
 
         Returns:
-            JSON values: ``title``, ``headline``, ``sentences``, ``tables``, ``charts``, and ``metrics`` by subject.
+            JSON values: figures under named keys, as ``consequence_figures`` says.
         """
         scene = _Scene.of(options)
         judged = {subject: {name: results[f"{subject}: {name}"] for name in scene.chosen} for subject in subjects}

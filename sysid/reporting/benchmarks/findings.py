@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 from sysid.atomic import replacing
 from sysid.reporting.comparing.figures_file import read_figures
 from sysid.reporting.numbers import number
-from sysid.reporting.results import Number
+from sysid.reporting.records import Number
 from sysid.reporting.scores import Score
 
 FINDINGS_FILE: Final = "findings.json"
@@ -76,7 +76,7 @@ class Benchmark(_Record):
     environment: dict[str, Any] = Field(default={}, description="As in environment.json.")
     load: float | None = Field(default=None, description="Load of the machine when it began; 0 is an idle one.")
     data: dict[str, str] = Field(default={}, description="SHA-256 of each file or data set that it read, by name.")
-    findings: list[Finding] = []
+    findings: list[Finding] = Field(default=[])
     scores: list[Score] = Field(default=[], description="Errors by case of the peers' models, where it scored some.")
     printed: str = Field(default="", description="Everything that it printed.")
 

@@ -13,9 +13,8 @@ from sysid.reporting.comparing.against import Comparison, Contest, compare_runs
 from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.html import page_template, readable
 from sysid.reporting.numbers import quantity, seconds, times
-from sysid.reporting.parts import Part, Section, picture
+from sysid.reporting.parts import Part, Section, Tile, Verdict, picture
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
-from sysid.reporting.verdict import Tile, Verdict
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,167 +1,178 @@
-"""The report of a run that judged models: its results.json and its page."""
+"""What a judge found, as figures under documented keys; and results.json of a run that judged.
+
+A judge says what a model's error does where the model is used. Which figures those are is its own business: it names
+them, with their units, and gives their values scene by scene. Tables, charts and sentences are made of them elsewhere.
+"""
 
 from __future__ import annotations
 
-import json
+import math
+from collections.abc import Mapping as Dict
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, model_validator
 
-from sysid.atomic import replacing
-from sysid.errors import ConfigError
-from sysid.reporting.document import Document
-from sysid.reporting.html import render_html
-from sysid.reporting.judging.tables import JudgementRecord, judgement_sections
-from sysid.reporting.parts import Section
-from sysid.reporting.results import RESULTS_FILE
-from sysid.reporting.tables import Cell, Table
-from sysid.reporting.verdict import Verdict
+from sysid.reporting.records import Number, Record, RunResults, parse_record, read_document
 
-SCHEMA_VERSION: Final = 1
+FOLDER: Final = "judgements"
+"""In the folder of a run: what judges said of its fits, one file each."""
+
+MEND: Final = "run its pipeline again; a judge of another package has to be mended there"
 
 
-class SceneRecord(BaseModel):
-    """What the models were judged on."""
+class QuantityRecord(Record):
+    """A figure that a judge gives."""
 
-    model_config = ConfigDict(frozen=True, extra="allow")
-    name: str = Field(description="The data set, or the judge, which brings its own scenes.")
-    digest: str = Field(default="", description="SHA-256 of the data set.")
-    others: dict[str, str] = Field(default={}, description="SHA-256 of the other data sets that were read, by name.")
+    name: str = Field(description="What it is, in a few words: the head of its column.")
+    unit: str = Field(default="", description="Its unit; empty without one.")
+    meaning: str = Field(default="", description="In a sentence.")
 
 
-class SubjectRecord(BaseModel):
+class CurveRecord(Record):
+    """A signal over time, thinned."""
+
+    time: list[Number] = Field(description="Seconds.")
+    value: list[Number] = Field(description="In the unit of the quantity.")
+
+
+class SceneRecord(Record):
+    """What became of one scene, with a subject or with the reference."""
+
+    refused: str = Field(default="", description="Why the scene could not be run; then it has no figures.")
+    measures: dict[str, Number | str | bool | None] = Field(
+        default={}, description="By quantity: what came of it, of the reference and of a subject alike."
+    )
+    differences: dict[str, Number] = Field(default={}, description="By quantity: a subject against the reference.")
+    signals: dict[str, CurveRecord] = Field(default={}, description="By quantity.")
+
+
+class SensitivityStep(Record):
+    """What an artificial error of a size does."""
+
+    size: Number = Field(description="Of the error.")
+    error: Number = Field(description="The error figure that it has.")
+    differences: dict[str, Number] = Field(description="Largest magnitude over its scenes, by quantity.")
+
+
+class ToleranceRecord(Record):
+    """How large an error may be before a difference passes the limit."""
+
+    quantity: str = Field(description="Key of the difference.")
+    reached: Literal["within", "passed", "crossed"] = Field(
+        description="Within the limit at every size tried, past it at every size, or passed between two."
+    )
+    error: Number = Field(default=math.nan, description="The error figure where it passes the limit, if crossed.")
+
+
+class SensitivityRecord(Record):
+    """The reference with an artificial error, by rising size."""
+
+    kind: str = Field(description="Such as bias.")
+    meaning: str = Field(default="", description="In a few words.")
+    unit: str = Field(description="Of the sizes.")
+    steps: list[SensitivityStep]
+    tolerances: list[ToleranceRecord] = Field(default=[])
+
+
+class JudgementRecord(Record):
+    """Everything a judge found of some models."""
+
+    schema_version: int = Field(default=2, description="2.")
+    title: str = Field(description="What was judged, in a word.")
+    method: str = Field(default="", description="What was done, in a sentence or two.")
+    reference_name: str = Field(default="reference", description="What the subjects are held against.")
+    scenes: list[str] = Field(min_length=1, description="In the order of the tables.")
+    headline_scenes: list[str] = Field(default=[], description="Those that the first sentence tells of.")
+    quantities: dict[str, QuantityRecord] = Field(
+        description="Every key that stands in measures, differences, signals."
+    )
+    error: str | None = Field(default=None, description="Key of the difference that is the error of the models.")
+    limited: list[str] = Field(default=[], description="Keys of the differences that the limit is for.")
+    limit: Number = Field(default=math.nan, description="That each of these should stay within, in their unit.")
+    reference: dict[str, SceneRecord] = Field(default={}, description="By scene.")
+    subjects: dict[str, dict[str, SceneRecord]] = Field(min_length=1, description="By subject and scene.")
+    sensitivity: list[SensitivityRecord] = Field(default=[])
+
+    @model_validator(mode="after")
+    def _named(self) -> JudgementRecord:
+        used = {self.error, *self.limited} - {None}
+        for by_scene in (self.reference, *self.subjects.values()):
+            for one in by_scene.values():
+                used |= {*one.measures, *one.differences, *one.signals}
+        unknown = sorted(str(key) for key in used - set(self.quantities))
+        if unknown:
+            raise ValueError(f"quantities does not say what {', '.join(unknown)} is")
+        return self
+
+    def run(self, subject: str) -> dict[str, SceneRecord]:
+        """The scenes that a subject could be run in."""
+        return {name: one for name, one in self.subjects[subject].items() if not one.refused}
+
+    def worst(self, subject: str, quantity: str) -> float:
+        """Largest magnitude of a difference over the scenes; NaN without any."""
+        values = [abs(one.differences[quantity]) for one in self.run(subject).values() if quantity in one.differences]
+        return max(values, default=math.nan)
+
+    def mean(self, subject: str, quantity: str) -> float:
+        """Mean of a difference over the scenes; NaN without any."""
+        values = [one.differences[quantity] for one in self.run(subject).values() if quantity in one.differences]
+        return sum(values) / len(values) if values else math.nan
+
+    def metrics(self) -> dict[str, dict[str, float]]:
+        """Numbers to track with each subject: its differences by scene, the worst of those limited, its mean error."""
+        return {subject: self._metrics(subject) for subject in self.subjects}
+
+    def _metrics(self, subject: str) -> dict[str, float]:
+        found = {f"worst_{key}": self.worst(subject, key) for key in self.limited}
+        if self.error is not None:
+            found[f"mean_{self.error}"] = self.mean(subject, self.error)
+        for scene, one in self.run(subject).items():
+            found |= {f"{key}/{scene}": value for key, value in one.differences.items()}
+        return {name: value for name, value in found.items() if math.isfinite(value)}
+
+
+class SubjectRecord(Record):
     """What was judged."""
 
-    model_config = ConfigDict(frozen=True, extra="allow")
-    name: str
+    name: str = Field(description="What it is called.")
     parts: list[str] = Field(description="Models, and where each comes from.")
 
 
-class JudgementResults(BaseModel):
+class JudgementResults(RunResults):
     """All of results.json of a run that judged."""
 
-    model_config = ConfigDict(frozen=True, extra="allow", protected_namespaces=())
-    schema_version: int = SCHEMA_VERSION
-    kind: str = Field(description="Kind of the pipeline: the judge's name.")
-    pipeline: str
-    description: str = ""
-    command: str = Field(description="The command that makes the run again.")
-    created: str = Field(description="Date and time, ISO 8601.")
-    environment: dict[str, Any]
-    seed: int | None = None
-    start: dict[str, Any] | None = None
-    data: SceneRecord
     subjects: list[SubjectRecord]
     judgement: JudgementRecord
 
 
-def read_judgement_results(folder: Path) -> JudgementResults | None:
-    """The results of a run that judged.
+def parse_judgement(document: Dict[str, Any], *, where: object) -> JudgementRecord:
+    """Check what a judge found.
 
     Args:
-        folder: The run's folder.
+        document: Its JSON values.
+        where: Named in errors.
 
     Returns:
-        The results; ``None`` where the folder holds no results, or those of a run that fitted.
+        The record.
 
     Raises:
-        ConfigError: If they are damaged or from a newer release.
+        ConfigError: If a field is missing or wrong.
     """
-    path = Path(folder) / RESULTS_FILE
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        # Whoever reads results of fits says what is wrong with such a file.
-        return None
-    if not isinstance(document, dict) or "judgement" not in document:
-        return None
-    version = document.get("schema_version")
-    try:
-        if not isinstance(version, int) or version > SCHEMA_VERSION:
-            raise ConfigError(
-                "the results were written by a newer release",
-                where=path,
-                expected=f"schema_version up to {SCHEMA_VERSION}",
-                got=version,
-                remedy="upgrade the workbench, or make the report with the release that made the run",
-            )
-        return JudgementResults.model_validate(document)
-    except ValidationError as error:
-        raise ConfigError(
-            "the results are damaged",
-            where=path,
-            expected="the results of a judgement",
-            got=f"{error.errors()[0]['loc']}: {error.errors()[0]['msg']}",
-            remedy="run the pipeline again; it goes on from what is finished",
-        ) from error
+    return parse_record(JudgementRecord, document, where=where, what="the figures of the judgement", remedy=MEND)
 
 
-def write_judgement_results(folder: Path, results: JudgementResults) -> Path:
-    """Write results.json.
-
-    Args:
-        folder: The folder it goes into; made if missing.
-        results: The results.
-
-    Returns:
-        The file.
-    """
-    path = Path(folder) / RESULTS_FILE
-    with replacing(path) as draft:
-        draft.write_text(results.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    return path
-
-
-def judgement_document(results: JudgementResults) -> Document:
-    """The parts of the page.
-
-    Args:
-        results: Of the run.
-
-    Returns:
-        The parts.
-    """
-    judgement = results.judgement
-    judged = tuple((subject.name, "; ".join(subject.parts)) for subject in results.subjects)
-    points = tuple(judgement.points) or judged
-    verdict = Verdict(headline=judgement.headline, tiles=(), points=points, warnings=())
-    # The headline stands in the verdict already.
-    sections = judgement_sections([judgement.model_copy(update={"headline": ""})])
-    if points is not judged:
-        sections.append(_subjects(judged))
-    sections += _data(results.data)
-    return Document(results=results, verdict=verdict, sections=tuple(sections))
-
-
-def _subjects(judged: tuple[tuple[str, str], ...]) -> Section:
-    rows = tuple((Cell(text=name, header=True), Cell(text=parts)) for name, parts in judged)
-    table = Table(caption="What was judged, and what it is made of.", head=(("", ""), ("models", "")), rows=rows)
-    return Section(anchor="judged", title="What was judged", parts=(table,))
-
-
-def _data(data: SceneRecord) -> list[Section]:
-    if not data.digest:
-        return []
-    digests = {data.name: data.digest, **data.others}
-    rows = tuple((Cell(text=name, header=True), Cell(text=digest)) for name, digest in digests.items())
-    table = Table(caption="Data sets that were read.", head=(("data set", ""), ("SHA-256", "")), rows=rows)
-    return [Section(anchor="data", title="Traces", parts=(table,))]
-
-
-def write_judgement_report(folder: Path, results: JudgementResults) -> Path:
-    """Write the page of a run that judged.
+def judgement_documents(folder: Path) -> dict[Path, dict[str, Any]]:
+    """What judges said of the fits of a run, of whichever version.
 
     Args:
         folder: The run's folder.
-        results: Its results.
 
     Returns:
-        The page, ``report/index.html``; ``report/results.json`` beside it holds the same numbers.
+        Plain data by file, in the order of the files' names; none for a run that nobody judged.
+
+    Raises:
+        ConfigError: If a file is damaged.
     """
-    page = render_html(judgement_document(results))
-    write_judgement_results(folder / "report", results)
-    path = folder / "report" / "index.html"
-    with replacing(path) as draft:
-        draft.write_text(page, encoding="utf-8")
-    return path
+    files = sorted((Path(folder) / FOLDER).glob("*.json"))
+    return {file: read_document(file, remedy="remove the file, or run its pipeline again") for file in files}

@@ -1,199 +1,264 @@
-"""What a judge found: tables and charts as stored values, and how they become a section of a report.
-
-A judge says what a model's error does where the model is used. Which figures those are is its own business: here they
-are tables, charts and sentences.
-"""
+"""Tables and charts of what a judge found, whatever it is about: the figures say themselves what they are."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Any, Final, Literal
+import math
+from collections.abc import Sequence
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from sysid.reporting.charts import Chart, Line
+from sysid.reporting.judging.results import JudgementRecord, SensitivityRecord
+from sysid.reporting.numbers import number
+from sysid.reporting.tables import Table, plain_table
 
-from sysid.errors import ConfigError
-from sysid.reporting.figures.style import MARKERS, PALETTE, TARGET, new_figure, series_style, styled
-from sysid.reporting.parts import Part, Section, identifier, picture
-from sysid.reporting.scores import Score
-from sysid.reporting.tables import Cell, Table, figure_cell
-
-FOLDER: Final = "judgements"
-"""In the folder of a run: what judges said of its fits, one file each."""
+Value = int | float | str | None
+Head = list[tuple[str, str]]
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="allow")
-
-
-class TableRecord(_Record):
-    """A table."""
-
-    caption: str
-    head: list[tuple[str, str]] = Field(description="Names of the columns, each with a second line, such as its unit.")
-    rows: list[list[int | float | str | None]] = Field(
-        description="Counts, numbers, words, or null for what there is not."
-    )
-    note: str = ""
-    folded: list[str] = Field(default=[], description="Sentences for whoever asks further; folded away below it.")
-
-
-class LineRecord(_Record):
-    """One series of a chart."""
-
-    name: str
-    x: list[float]
-    y: list[float]
-    target: bool = Field(default=False, description="Whether it is what the others are held against.")
-    marks: bool = Field(default=False, description="Marks without a line.")
-    points: bool = Field(default=False, description="A line with a mark at each of its points.")
-
-
-class ChartRecord(_Record):
-    """A chart."""
-
-    title: str
-    caption: str
-    x: str = Field(description="What the x axis is, with its unit.")
-    y: str = Field(description="What the y axis is, with its unit.")
-    logarithmic: bool | Literal["x"] = Field(default=False, description="Both axes, or the x axis alone.")
-    lines: list[LineRecord]
-
-
-class JudgementRecord(_Record):
-    """Everything a judge said of some models."""
-
-    title: str
-    headline: str
-    points: list[tuple[str, str]] = Field(default=[], description="Keyword and sentence, for the verdict.")
-    sentences: list[str] = []
-    tables: list[TableRecord] = []
-    charts: list[ChartRecord] = []
-    scores: list[Score] = Field(default=[], description="Errors by case of what was chosen, for a scorecard.")
-    metrics: dict[str, dict[str, float]] = Field(default={}, description="By model, numbers to track with it.")
-
-
-def parse_judgement(document: Any, *, where: object) -> JudgementRecord:
-    """Check what a judge said.
+def judgement_tables(record: JudgementRecord) -> list[Table]:
+    """A summary first, then how large an error may be, each subject scene by scene, and what came of every scene.
 
     Args:
-        document: Its JSON values.
-        where: Named in errors.
+        record: What was found.
 
     Returns:
-        The record.
-
-    Raises:
-        ConfigError: If a field is missing or wrong.
+        The tables.
     """
-    try:
-        return JudgementRecord.model_validate(document)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise ConfigError(
-            "the judgement cannot be used",
-            where=where,
-            expected=first["msg"],
-            got=f"{'.'.join(str(part) for part in first['loc'])}: {first['input']!r:.80}",
-            remedy="run its pipeline again; a judge of another package has to be mended there",
-        ) from error
-
-
-def read_judgements(folder: Path) -> list[JudgementRecord]:
-    """What judges said of the fits of a run.
-
-    Args:
-        folder: The run's folder.
-
-    Returns:
-        In the order of the files' names; none for a run that nobody judged.
-
-    Raises:
-        ConfigError: If a file is damaged.
-    """
-    found = []
-    for file in sorted((Path(folder) / FOLDER).glob("*.json")):
-        try:
-            document = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError) as error:
-            raise ConfigError(
-                "the judgement cannot be read",
-                where=file,
-                expected="JSON in UTF-8",
-                got=error,
-                remedy="remove the file, or run its pipeline again",
-            ) from error
-        found.append(parse_judgement(document, where=file))
-    return found
-
-
-def judgement_sections(records: list[JudgementRecord]) -> list[Section]:
-    """Judgements as sections of a report.
-
-    Args:
-        records: The judgements.
-
-    Returns:
-        One section for each.
-    """
-    return [_section(record, index) for index, record in enumerate(records)]
-
-
-def _section(record: JudgementRecord, index: int) -> Section:
-    name = identifier(f"{record.title.lower()}-{index}" if index else record.title.lower())
-    parts: list[Part] = [text for text in (record.headline, *record.sentences) if text]
-    parts += [_table(table) for table in record.tables[:1]]
-    charts = [
-        picture(_figure(chart), chart.title, chart.caption, f"{name}-chart-{number}")
-        for number, chart in enumerate(record.charts)
+    return [
+        *([summary_table(record)] if record.limited or record.error else []),
+        *([sensitivity_table(record)] if record.sensitivity else []),
+        *(differences_table(record, subject) for subject in record.subjects if _keys(record, "differences")),
+        *([measures_table(record)] if _keys(record, "measures") else []),
     ]
-    parts += charts[:1]
-    parts += [_table(table) for table in record.tables[1:]]
-    parts += charts[1:]
-    return Section(anchor=name, title=record.title, parts=tuple(parts))
 
 
-def _table(table: TableRecord) -> Table:
-    rows = tuple(tuple(_cell(value, first=k == 0) for k, value in enumerate(row)) for row in table.rows)
-    head, folded = tuple(table.head), tuple(table.folded)
-    return Table(caption=table.caption, head=head, rows=rows, note=table.note, folded=folded)
+def summary_table(record: JudgementRecord) -> Table:
+    """Mean error and worst differences of each subject over all scenes, and in how many it stays within the limit."""
+    error = [] if record.error is None else [record.error]
+    limit = f"all within {record.limit:g} {_limit_unit(record)}".strip()
+    rows: list[list[Value]] = []
+    for subject, scenes in record.subjects.items():
+        run = record.run(subject)
+        within = sum(all(abs(one.differences[key]) <= record.limit for key in record.limited) for one in run.values())
+        rows.append(
+            [
+                subject,
+                *(record.mean(subject, key) for key in error),
+                *(record.worst(subject, key) for key in record.limited),
+                *([f"{within} of {len(run)}"] if record.limited else []),
+                str(len(scenes) - len(run)),
+            ]
+        )
+    head: Head = [("model", ""), *(_column(record, key, "mean") for key in error)]
+    head += [_column(record, key, "worst") for key in record.limited]
+    head += [(limit, "scenarios")] if record.limited else []
+    return plain_table(
+        "What each model's error does, over all scenarios.", [*head, ("not possible", "scenarios")], rows
+    )
 
 
-def _cell(value: float | str | None, *, first: bool) -> Cell:
-    if value is None:
-        return Cell(text="")
-    if isinstance(value, int):  # a count has no significant digits
-        return Cell(text=str(value), value=value, mark="number")
-    return Cell(text=value, header=first) if isinstance(value, str) else figure_cell(value)
+def sensitivity_table(record: JudgementRecord) -> Table:
+    """What artificial errors of rising size do, and at which each difference passes the limit."""
+    rows: list[list[Value]] = []
+    for one in record.sensitivity:
+        rows += [
+            [
+                one.kind,
+                f"{step.size:g} {one.unit}",
+                step.error,
+                *(step.differences.get(key, math.nan) for key in record.limited),
+            ]
+            for step in one.steps
+        ]
+    for one in record.sensitivity:
+        found = {tolerance.quantity: tolerance.error for tolerance in one.tolerances}
+        passed = f"{one.kind}: passes {record.limit:g} {_limit_unit(record)} at"
+        rows.append([passed, _unit(record, record.error), None, *(found.get(key, math.nan) for key in record.limited)])
+    meanings = "; ".join(f"{one.kind}, {one.meaning}" for one in record.sensitivity if one.meaning)
+    return plain_table(
+        "How large an error may be: worst consequence by size.",
+        [
+            ("error", ""),
+            ("size", ""),
+            *([_column(record, record.error)] if record.error else [("error figure", "")]),
+            *(_column(record, key, "worst") for key in record.limited),
+        ],
+        rows,
+        note=f"The {record.reference_name} with an artificial error{f' ({meanings})' if meanings else ''}. The last "
+        "rows give the error at which each figure passes the limit; empty where none of the sizes does, or all do.",
+    )
 
 
-def _figure(chart: ChartRecord) -> Figure:
-    """A chart; series differ in colour, dashes and marks, so that it is read in grey too."""
-    with styled():
-        figure = new_figure(7.6, 3.6)
-        axes = figure.subplots()
-        for index, line in enumerate(chart.lines):
-            _draw(axes, line, index)
-        if chart.logarithmic:
-            axes.set_xscale("log")
-        if chart.logarithmic is True:
-            axes.set_yscale("log")
-        axes.set_xlabel(chart.x)
-        axes.set_ylabel(chart.y)
-        if chart.lines:
-            axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
-        return figure
+def differences_table(record: JudgementRecord, subject: str) -> Table:
+    """A subject against the reference, scene by scene, and why a scene could not be run."""
+    keys = _keys(record, "differences")
+    refused = any(one.refused for one in record.subjects[subject].values())
+    rows: list[list[Value]] = [
+        [
+            scene,
+            *(one.differences.get(key) for key in keys),
+            *([one.refused or None] if refused else []),
+        ]
+        for scene, one in record.subjects[subject].items()
+    ]
+    head: Head = [("scenario", ""), *(_column(record, key) for key in keys)]
+    return plain_table(
+        f"{subject} against the {record.reference_name}, by scenario.",
+        [*head, *([("not possible", "")] if refused else [])],
+        rows,
+    )
 
 
-def _draw(axes: Axes, line: LineRecord, index: int) -> None:
-    x, y = np.array(line.x), np.array(line.y)
-    if line.target:
-        axes.plot(x, y, color=TARGET, linewidth=1.6, label=line.name)
-    elif line.marks:
-        colour, mark = PALETTE[index % len(PALETTE)], MARKERS[index % len(MARKERS)]
-        axes.plot(x, y, color=colour, marker=mark, linestyle="none", markersize=5, label=line.name)
-    else:
-        axes.plot(x, y, **(series_style(index) | ({} if line.points else {"marker": ""})), label=line.name)
+def measures_table(record: JudgementRecord) -> Table:
+    """What came of every scene, with the reference and with each subject."""
+    keys = _keys(record, "measures")
+    rows: list[list[Value]] = []
+    for scene in record.scenes:
+        sides = {record.reference_name: record.reference.get(scene)}
+        sides |= {subject: record.run(subject).get(scene) for subject in record.subjects}
+        told = [(name, one) for name, one in sides.items() if one is not None and one.measures]
+        rows += [
+            [scene if index == 0 else "", name, *(_said(one.measures.get(key)) for key in keys)]
+            for index, (name, one) in enumerate(told)
+        ]
+    head: Head = [("scenario", ""), ("model", ""), *(_column(record, key) for key in keys)]
+    return plain_table("What came of each scenario.", head, rows)
+
+
+def judgement_charts(record: JudgementRecord) -> list[Chart]:
+    """What an error costs, and the signals of every scene.
+
+    Args:
+        record: What was found.
+
+    Returns:
+        The charts.
+    """
+    return [*([_cost_chart(record)] if record.error and record.limited else []), *_signal_charts(record)]
+
+
+def _cost_chart(record: JudgementRecord) -> Chart:
+    error = str(record.error)
+    lines = [line for one in record.sensitivity for line in _steps(record, one)]
+    for subject in record.subjects:
+        for key in record.limited:
+            pairs = ((o.differences[error], abs(o.differences[key])) for o in record.run(subject).values())
+            points = sorted(pair for pair in pairs if min(pair) > 0.0)
+            name = f"{subject}: {record.quantities[key].name}"
+            lines.append(Line(name=name, x=[p[0] for p in points], y=[p[1] for p in points], how="marks"))
+    ends = [step.error for one in record.sensitivity for step in one.steps]
+    if ends and math.isfinite(record.limit):
+        name = f"{record.limit:g} {_limit_unit(record)}"
+        lines.append(Line(name=name, x=[min(ends), max(ends)], y=[record.limit] * 2, how="target"))
+    return Chart(
+        title="What an error costs",
+        caption="Consequence against the error of the models. Lines: artificial errors of the "
+        f"{record.reference_name}, worst scenario; marks: each model in each scenario.",
+        x=f"{record.quantities[error].name} [{_unit(record, error)}]",
+        y=f"consequence [{_limit_unit(record)}]",
+        logarithmic="xy",
+        lines=lines,
+    )
+
+
+def _steps(record: JudgementRecord, one: SensitivityRecord) -> list[Line]:
+    return [
+        Line(
+            name=f"{record.quantities[key].name}, {one.kind}",
+            x=[step.error for step in one.steps],
+            y=[step.differences.get(key, math.nan) for step in one.steps],
+        )
+        for key in record.limited
+    ]
+
+
+def _signal_charts(record: JudgementRecord) -> list[Chart]:
+    charts = []
+    for scene in record.scenes:
+        reference = record.reference.get(scene)
+        for key in _keys(record, "signals"):
+            own = {name: record.run(name)[scene].signals for name in record.subjects if scene in record.run(name)}
+            curves = {name: signals[key] for name, signals in own.items() if key in signals}
+            trusted = None if reference is None else reference.signals.get(key)
+            if not curves:
+                continue
+            named = record.quantities[key].name
+            lines = [Line(name=name, x=one.time, y=one.value) for name, one in curves.items()]
+            if trusted is not None:
+                lines.insert(0, Line(name=record.reference_name, x=trusted.time, y=trusted.value, how="target"))
+            charts.append(
+                Chart(
+                    title=f"{named.capitalize()}: {scene}",
+                    caption=f"{named.capitalize()}, {scene}: the {record.reference_name} and each model.",
+                    x="time [s]",
+                    y=f"{named} [{_unit(record, key)}]",
+                    lines=lines,
+                )
+            )
+    return charts
+
+
+def judgement_headline(record: JudgementRecord) -> str:
+    """What the first sentence says: in the scenes that it tells of, how far each subject is from the reference."""
+    told = []
+    for subject in record.subjects:
+        run = record.run(subject)
+        scenes = [name for name in record.headline_scenes or record.scenes if name in run]
+        parts = [f"{scene} {_differs(record, run[scene].differences)}" for scene in scenes]
+        told.append(f"{subject}: {'; '.join(part.strip() for part in parts) or 'no scenario could be run'}")
+    return f"Against the {record.reference_name}. {'. '.join(told)}."
+
+
+def _differs(record: JudgementRecord, differences: dict[str, float]) -> str:
+    keys = record.limited or [key for key in differences if key != record.error]
+    said = [
+        f"{differences[key]:+.2f} {_unit(record, key)} in {record.quantities[key].name}".replace("-", "−")
+        for key in keys
+        if key in differences
+    ]
+    text = ", ".join(said)
+    if record.error in differences:
+        return f"{text} at {number(differences[str(record.error)])} {_unit(record, record.error)}".strip()
+    return text
+
+
+def tolerance_sentences(record: JudgementRecord) -> list[str]:
+    """How large an error may be before the consequence passes the limit; none where nobody tried."""
+    told = [one for one in record.sensitivity if one.tolerances]
+    if not told:
+        return []
+    words = {"within": "stays within it at every size tried", "passed": "passes it at every size tried"}
+    parts = [
+        f"as {one.meaning or one.kind}, "
+        + " and ".join(
+            f"{record.quantities[found.quantity].name} "
+            + words.get(found.reached, f"up to {number(found.error, digits=2)} {_unit(record, record.error)}")
+            for found in one.tolerances
+        )
+        for one in told
+    ]
+    limit = f"{record.limit:g} {_limit_unit(record)}"
+    return [f"How large an error may be before the consequence passes {limit}: {'; '.join(parts)}."]
+
+
+def _keys(record: JudgementRecord, part: str) -> Sequence[str]:
+    """The quantities of one part of the scenes, in the order in which the judge declares them."""
+    sides = [*record.reference.values(), *(one for by in record.subjects.values() for one in by.values())]
+    used = {key for one in sides for key in getattr(one, part)}
+    return [key for key in record.quantities if key in used]
+
+
+def _unit(record: JudgementRecord, key: str | None) -> str:
+    return "" if key is None else record.quantities[key].unit
+
+
+def _limit_unit(record: JudgementRecord) -> str:
+    return _unit(record, record.limited[0] if record.limited else None)
+
+
+def _column(record: JudgementRecord, key: str, what: str = "") -> tuple[str, str]:
+    quantity = record.quantities[key]
+    return quantity.name, ", ".join(part for part in (quantity.unit, what) if part)
+
+
+def _said(value: float | str | bool | None) -> Value:
+    return ("yes" if value else "no") if isinstance(value, bool) else value

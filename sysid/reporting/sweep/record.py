@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError
-from sysid.reporting.results import Number
+from sysid.reporting.records import Number
 
 SCHEMA_VERSION: Final = 1
 SWEEP_FILE: Final = "sweep.json"
@@ -30,7 +30,7 @@ class _Record(BaseModel):
 class TrialCase(_Record):
     """One trial on one case."""
 
-    role: str
+    role: str = Field(description="What the case is used for.")
     free_run_mse: Number = Field(description="In the output's unit squared.")
     one_step_mse: Number = Field(description="In the output's unit squared.")
     run_time_s: Number = Field(description="Seconds of the free run: least of the repeats.")
@@ -41,22 +41,24 @@ class Trial(_Record):
 
     number: int = Field(ge=1, description="Its place in the grid.")
     key: str = Field(description="Digest of everything it depends on.")
-    label: str
-    structure: dict[str, Any]
+    label: str = Field(description="Short form of the structure.")
+    structure: dict[str, Any] = Field(description="All fields of the structure.")
     values: dict[str, Any] = Field(default={}, description="Its value in each range.")
     status: str = Field(description="Name of the fit's status, or FAILED.")
-    usable: bool
+    usable: bool = Field(description="Whether it may be chosen.")
     reason: str = Field(default="", description="Why it failed.")
     dropped_at: int | None = Field(default=None, description="Look after which it was dropped, from 1 on.")
-    iterations: int = 0
+    iterations: int = Field(default=0, description="Of all of its training.")
     seconds: Number = Field(default=math.nan, description="Wall time of all of its training.")
     cpu_s: Number = Field(default=math.nan, description="Processor time of all of its training and scoring.")
-    parameters: int = 0
+    parameters: int = Field(default=0, description="Fitted parameters.")
     operations: int = Field(default=0, description="Multiplications of one step.")
-    log_evidence: Number = math.nan
-    selection_free_run_mse: Number = math.nan
-    selection_one_step_mse: Number = math.nan
-    cases: dict[str, TrialCase] = {}
+    log_evidence: Number = Field(default=math.nan, description="Null where none was computed.")
+    selection_free_run_mse: Number = Field(
+        default=math.nan, description="Mean over the selection traces, unit squared."
+    )
+    selection_one_step_mse: Number = Field(default=math.nan, description="The same one step ahead.")
+    cases: dict[str, TrialCase] = Field(default={})
 
     @property
     def in_full(self) -> bool:
@@ -123,23 +125,23 @@ FIGURES: Final[dict[str, Figure]] = {
 class SweepRecord(_Record):
     """All of sweep.json."""
 
-    schema_version: int = SCHEMA_VERSION
-    name: str
-    mapping: str
+    schema_version: int = Field(default=SCHEMA_VERSION, description="Of this file.")
+    name: str = Field(description="Name of the sweep.")
+    mapping: str = Field(description="Written as in 'BP+AR -> BC'.")
     unit: str = Field(description="Unit of the output.")
-    method: str
-    loop: str = ""
+    method: str = Field(description="How the points were chosen: grid, random, tpe or nsga-ii.")
+    loop: str = Field(default="", description="open or closed: what was trained for.")
     points: int = Field(description="Points of the grid, whether all were tried or not.")
     ranges: dict[str, list[Any]] = Field(default={}, description="By field, every value that it can take.")
-    objectives: list[str]
-    choose_by: str
-    choose_on: str
+    objectives: list[str] = Field(description="Figures that are minimised.")
+    choose_by: str = Field(description="Figure that chooses the winner.")
+    choose_on: str = Field(description="Traces that choose: selection, estimation or cases.")
     chosen_by: str = Field(description="One sentence: by which figure, on which traces.")
-    reproduces: str | None = None
-    published: str | None = None
-    warm_start: str = "none"
-    rungs: list[dict[str, Any]] = []
-    workers: int
+    reproduces: str | None = Field(default=None, description="What it repeats, where it does.")
+    published: str | None = Field(default=None, description="Reference table to set beside it.")
+    warm_start: str = Field(default="none", description="Where networks begin: none, linear, or from smaller ones.")
+    rungs: list[dict[str, Any]] = Field(default=[], description="Looks at which trials were dropped.")
+    workers: int = Field(description="Processes that worked on it.")
     wall_s: Number = Field(description="Seconds from the first trial to the last, of all sessions together.")
     winner: int | None = Field(default=None, description="Number of the trial that was chosen.")
     beside: list[Trial] = Field(default=[], description="Chosen by hand, trained like the trials.")

@@ -2,36 +2,28 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sysid.composite.active_learning import Growth, Look, sequence_errors
+from sysid.composite.active_learning import Look, sequence_errors
 from sysid.composite.limits_held import holding
 from sysid.composite.monte_carlo import Stress, stress
 from sysid.composite.training import TrainedComposite
 from sysid.models import Cascade
-from sysid.reporting.judging.results import (
-    JudgementResults,
-    SceneRecord,
-    SubjectRecord,
-    write_judgement_results,
-)
-from sysid.reporting.judging.tables import parse_judgement
+from sysid.reporting.assembly.results import AssemblyResults
+from sysid.reporting.records import RESULTS_FILE, write_record
 from sysid.traces import Trace, TraceSet
 from sysid.validation import evaluate_cascade
 from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.context import Context
-from sysid.workbench.assembly.document import SELECTION, Outcome, document
 from sysid.workbench.assembly.lessons import lessons_of
 from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
 from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.member_scores import score_candidates
-from sysid.workbench.assembly.written import written
+from sysid.workbench.assembly.record import Outcome, assembly_results, write_signals
 from sysid.workbench.runner import events
-from sysid.workbench.runner.environment import environment
 from sysid.workbench.runner.store import digest, strict, write_json
 
 if TYPE_CHECKING:
@@ -55,7 +47,7 @@ class Finish:
     trained: TrainedComposite
     notes: tuple[str, ...]
 
-    def results(self, cases: TraceSet, material: Material) -> JudgementResults:
+    def results(self, cases: TraceSet, material: Material) -> AssemblyResults:
         """Score every stage, choose one, and prove and export it.
 
         Args:
@@ -63,30 +55,12 @@ class Finish:
             material: What was trained on, and chooses.
 
         Returns:
-            What is reported, as it is stored.
+            What is stored.
         """
-        config = self.context.config
-        said = document(config, self._outcome(cases, material))
-        results = JudgementResults(
-            kind=config.kind,
-            pipeline=config.name,
-            description=config.description,
-            command=self.context.command,
-            created=time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-            environment=dict(environment()),
-            seed=config.seed,
-            data=SceneRecord(
-                name=cases.name,
-                digest=cases.digest,
-                others={name: found for name, found in self.context.digests.items() if name != cases.name},
-            ),
-            subjects=[
-                SubjectRecord(name=stage, parts=parts)
-                for stage, parts in written(config.composite, self.trained.stages).items()
-            ],
-            judgement=parse_judgement(strict(said), where="assembly"),
-        )
-        write_judgement_results(self.context.store.path, results)
+        found, folder = self._outcome(cases, material), self.context.store.path
+        write_signals(folder, found, self.context.config.outputs, cases)
+        results = assembly_results(self.context, self.trained, found, cases, self.notes)
+        write_record(folder / RESULTS_FILE, results)
         return results
 
     def _outcome(self, cases: TraceSet, material: Material) -> Outcome:
@@ -107,17 +81,11 @@ class Finish:
         candidates = self.trained.candidates
         members = [] if candidates is None else score_candidates(candidates, tuple(cases))
         return Outcome(
-            whole=whole, stages=scores, selection=chosen_by, chosen=chosen, notes=self.notes,
-            rounds=self.trained.rounds, timing=timing[chosen], cases=tuple(cases), stressed=stressed, worst=worst,
-            line=line, growth=self._growth, unseen=self._unseen(sequences), exported=exported,
-            limits=self.trained.limits,
+            whole=whole, stages=scores, selection=chosen_by, chosen=chosen, timing=timing[chosen], stressed=stressed,
+            worst=worst, line=line, unseen=self._unseen(sequences), exported=exported,
             holding=holding(whole, config.outputs, tuple(cases), sequences), members=members,
             lessons=lessons_of(scores, members, cases, config.lessons),
         )  # fmt: skip
-
-    @property
-    def _growth(self) -> tuple[Growth, ...]:
-        return () if self.trained.growth is None else (self.trained.growth,)
 
     def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...], tuple[Trace, ...]]:
         """What came of the random sequences, those that the whole did worst on, and all of them."""
@@ -201,16 +169,15 @@ class Finish:
         self.context.tell(events.StepDone(step=step, stored=False, detail=str(page)))
         return page
 
-    def track(self, results: JudgementResults, page: Path) -> None:
+    def track(self, results: AssemblyResults, page: Path) -> None:
         """Have each stage tracked as a run of its own, its figures beside the others'.
 
         Args:
             results: What is reported.
             page: The report.
         """
-        by_stage = results.judgement.metrics
-        chosen = min(by_stage, key=lambda stage: by_stage[stage][SELECTION])
-        for stage, metrics in by_stage.items():
+        chosen = results.whole.stage
+        for stage, metrics in results.metrics().items():
             self.context.tell(
                 events.JudgementReady(
                     pipeline=self.context.config.name,

@@ -1,25 +1,26 @@
-"""Lessons of modelling by parts, put to the test by the stages of an assembly: whether each held, in words and figures.
+"""Ablation: what the stages of an assembly say of each step of modelling by parts.
 
-Each compares what comes before with what comes after, on scored cases that nothing was fitted to. A lesson that the
+Each compares what comes before with what comes after, on scored cases that nothing was fitted to. A step that the
 pipeline has no stage for is not put to the test, and not mentioned.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
 from sysid.composite.members import geometric_mean
 from sysid.composite.training import ALONE, CHOSEN, ONE_STEP, RETRAINED, TOGETHER
-from sysid.reporting.numbers import number, times
 from sysid.traces import Role, TraceSet
 from sysid.workbench.assembly.member_scores import MemberScores
 from sysid.workbench.assembly.stage_config import LessonsConfig
 
 Scores = Mapping[str, Mapping[str, float]]
+Step = Literal["close_loop", "choose_together", "retrain", "train_together"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,45 +31,28 @@ class Comparison:
         what: A member, or the whole.
         before: Geometric mean of its mean squared errors over the cases, infinite where a free run diverges.
         after: The same after.
-        one_step: The same one step ahead of what comes before, where that is what deceives; ``None`` elsewhere.
+        one_step: The same one step ahead of what comes before, where that is what deceives; NaN elsewhere.
     """
 
     what: str
     before: float
     after: float
-    one_step: float | None = None
-
-    @property
-    def better(self) -> bool:
-        """Whether it is better after."""
-        return self.after < self.before
+    one_step: float = math.nan
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lesson:
-    """A lesson and what came of it.
+    """A step of modelling by parts, put to the test.
 
     Args:
-        claim: What it says.
-        before: What stands before, in a few words.
-        after: What stands after.
+        step: Which, as :class:`sysid.reporting.assembly.results.AblationRecord` has it.
         comparisons: Where it was put to the test.
         published: What was published on it.
     """
 
-    claim: str
-    before: str
-    after: str
+    step: Step
     comparisons: tuple[Comparison, ...]
     published: str
-
-    @property
-    def verdict(self) -> str:
-        """Whether it held."""
-        held = [one.what for one in self.comparisons if one.better]
-        if len(held) == len(self.comparisons):
-            return "held"
-        return f"held for {', '.join(held)} only" if held else "did not hold"
 
 
 def lessons_of(
@@ -109,30 +93,18 @@ def lessons_of(
     parts = [stage for stage in stages if stage in {ALONE, CHOSEN, RETRAINED}]
     found = [
         Lesson(
-            claim="A network that was fitted one step ahead fails once its loop is closed",
-            before="fitted one step ahead",
-            after="fitted in free run",
+            step="close_loop",
             comparisons=(*alone, *compared(ONE_STEP, ALONE)),
             published=published.closing,
         ),
+        Lesson(step="choose_together", comparisons=compared(ALONE, CHOSEN), published=published.together),
         Lesson(
-            claim="The members that are best alone are not the best together",
-            before="of the best alone",
-            after="of the best together",
-            comparisons=compared(ALONE, CHOSEN),
-            published=published.together,
-        ),
-        Lesson(
-            claim="Training members again on what the others put out helps",
-            before="before",
-            after="retrained",
+            step="retrain",
             comparisons=compared(CHOSEN if CHOSEN in stages else ALONE, RETRAINED),
             published=published.retraining,
         ),
         Lesson(
-            claim="Training the whole as one goes further than its parts",
-            before="in parts",
-            after="end to end",
+            step="train_together",
             comparisons=compared(parts[-1] if parts else None, trained[-1] if trained else None),
             published=published.end_to_end,
         ),
@@ -148,53 +120,3 @@ def _mean(errors: Iterable[float]) -> float:
     """Geometric mean, infinite where one is no number."""
     values = list(errors)
     return geometric_mean(values) if np.all(np.isfinite(values)) else float("inf")
-
-
-def lessons_table(lessons: Sequence[Lesson]) -> dict[str, Any]:
-    """The lessons with their figures.
-
-    Args:
-        lessons: The lessons.
-
-    Returns:
-        A table, as :class:`sysid.reporting.judging.tables.TableRecord` has it.
-    """
-    rows = [
-        [
-            one.claim if index == 0 else "",
-            f"{part.what}: {one.before}{_deceptive(part)}, then {one.after}",
-            *(value if np.isfinite(value) else "diverges" for value in (part.before, part.after)),
-            times(part.before / part.after) if np.isfinite(part.before / part.after) else "",
-            one.verdict if index == 0 else "",
-            one.published if index == 0 else "",
-        ]
-        for one in lessons
-        for index, part in enumerate(one.comparisons)
-    ]
-    return {
-        "caption": "The lessons, and whether each held",
-        "head": [
-            ("Lesson", ""), ("Put to the test", ""), ("Before", "mse"), ("After", "mse"), ("Less by", ""),
-            ("Verdict", ""), ("Published", ""),
-        ],
-        "rows": rows,
-        "note": "Mean squared error of the free run, the geometric mean over outputs and over the cases that nothing "
-        "was fitted to.",
-    }  # fmt: skip
-
-
-def _deceptive(part: Comparison) -> str:
-    """The error one step ahead, where it is what one would have gone by."""
-    return "" if part.one_step is None else f" (where it has {number(part.one_step)})"
-
-
-def lessons_point(lessons: Sequence[Lesson]) -> tuple[str, str]:
-    """For the verdict.
-
-    Args:
-        lessons: The lessons.
-
-    Returns:
-        Keyword and sentence.
-    """
-    return "Lessons", " ".join(f"{one.claim}: {one.verdict}." for one in lessons)

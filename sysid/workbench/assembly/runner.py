@@ -8,8 +8,9 @@ from typing import Any
 from sysid.composite import train
 from sysid.errors import ConfigError
 from sysid.models import Cascade, cascade_from_dict
+from sysid.reporting.assembly.document import headline
+from sysid.reporting.assembly.results import AssemblyResults
 from sysid.reporting.comparing.published import read_published
-from sysid.reporting.judging.results import JudgementResults
 from sysid.workbench.assembly.begun import read_whole
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
@@ -59,11 +60,11 @@ def run_assembly(request: RunRequest) -> int:
     finally:
         audience.screen.close()
     audience.target.print()
-    audience.target.print(results.judgement.headline, soft_wrap=True)
+    audience.target.print(headline(results), soft_wrap=True)
     return audience.end({"Report": nearby(page), "Results": nearby(context.store.results)})
 
 
-def _run(context: Context) -> tuple[JudgementResults, Path]:
+def _run(context: Context) -> tuple[AssemblyResults, Path]:
     """Every step, in order; the results and the page."""
     context.joined.keep(context.store.path)
     write_json(context.store.path / "environment.json", environment())

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sysid.estimation import CascadeFit, FitResult, Posterior, Status
-from sysid.reporting.results import SCHEMA_VERSION
+from sysid.reporting.records import SCHEMA_VERSION
 from sysid.traces import Role
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
 from sysid.workbench.fits.config import PipelineConfig

@@ -36,7 +36,7 @@ class Judge(Protocol):
         """What is to be done; the steps do not depend on each other."""
 
     def document(self, options: Any, subjects: Subjects, results: Mapping[str, Any]) -> dict[str, Any]:
-        """All results, by name of their step, as :class:`sysid.reporting.judging.tables.JudgementRecord` has them."""
+        """All results, by name of their step, as :class:`sysid.reporting.judging.results.JudgementRecord` has them."""
 
 
 def find_judge(name: str, *, where: object) -> Judge:

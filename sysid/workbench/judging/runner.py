@@ -1,4 +1,4 @@
-"""A run of a pipeline that judges: models loaded, steps done or found again, one document, report, tracking."""
+"""A run of a pipeline that judges: models loaded, steps done or found again, figures, report, tracking."""
 
 from __future__ import annotations
 
@@ -9,14 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.reporting.judging.results import (
-    JudgementResults,
-    SceneRecord,
-    SubjectRecord,
-    read_judgement_results,
-    write_judgement_results,
-)
-from sysid.reporting.judging.tables import FOLDER, parse_judgement
+from sysid.reporting.judging.results import FOLDER, JudgementResults, SubjectRecord, parse_judgement
+from sysid.reporting.judging.tables import judgement_headline
+from sysid.reporting.kinds import read_run
+from sysid.reporting.records import RESULTS_FILE, DataSetRecord, RunResults, write_record
 from sysid.workbench.judging.config import JudgementConfig
 from sysid.workbench.judging.judge import Judge, find_judge
 from sysid.workbench.judging.sources import Fetch, Found, find_model
@@ -65,7 +61,7 @@ def run_judgement(request: RunRequest) -> int:
     finally:
         audience.screen.close()
     audience.target.print()
-    audience.target.print(results.judgement.headline, soft_wrap=True)
+    audience.target.print(judgement_headline(results.judgement), soft_wrap=True)
     return audience.end({"Report": nearby(page), "Results": nearby(run.store.results)})
 
 
@@ -104,8 +100,8 @@ class _Run:
             fresh=self.fresh,
             tell=self._tell,
         )
-        document = self.judge.document(options, subjects, done)
-        results = self._results(found, strict(document))
+        figures = self.judge.document(options, subjects, done)
+        results = self._results(found, strict(figures))
         page = self._report(results, found)
         self._track(results, found, page)
         return results, page
@@ -125,7 +121,7 @@ class _Run:
         self._tell(StepDone(step=step, stored=False, detail=", ".join(found)))
         return found
 
-    def _results(self, found: Mapping[str, Sequence[Found]], document: Any) -> JudgementResults:
+    def _results(self, found: Mapping[str, Sequence[Found]], figures: Any) -> JudgementResults:
         results = JudgementResults(
             kind=self.config.kind,
             pipeline=self.config.name,
@@ -133,15 +129,15 @@ class _Run:
             command=self.command,
             created=time.strftime("%Y-%m-%dT%H:%M:%S%z"),
             environment=dict(self.environment),
-            data=SceneRecord(name=f"of the judge {self.config.kind}"),
+            data=DataSetRecord(name=f"of the judge {self.config.kind}"),
             subjects=[SubjectRecord(name=name, parts=[one.said for one in parts]) for name, parts in found.items()],
-            judgement=parse_judgement(document, where=f"judge {self.config.kind}"),
+            judgement=parse_judgement(figures, where=f"judge {self.config.kind}"),
         )
         before = _stored(self.store.path)
-        if before is not None and _undated(before) == _undated(results):
+        if isinstance(before, JudgementResults) and _undated(before) == _undated(results):
             # Nothing is new, so that what was made then keeps its date.
             return before
-        write_judgement_results(self.store.path, results)
+        write_record(self.store.path / RESULTS_FILE, results)
         return results
 
     def _report(self, results: JudgementResults, found: Mapping[str, Sequence[Found]]) -> Path:
@@ -162,13 +158,13 @@ class _Run:
         return page
 
     def _track(self, results: JudgementResults, found: Mapping[str, Sequence[Found]], page: Path) -> None:
-        for subject, metrics in results.judgement.metrics.items():
+        for subject, metrics in results.judgement.metrics().items():
             parts = found[subject]
             self._tell(
                 JudgementReady(
                     pipeline=self.config.name,
                     subject=subject,
-                    digest=digest(strict({"metrics": metrics, "headline": results.judgement.headline})),
+                    digest=digest(strict({"metrics": metrics, "title": results.judgement.title})),
                     metrics=metrics,
                     fit_keys=tuple(one.fit_key for one in parts if one.fit_key),
                     tracked_as=tuple(one.tracked_as for one in parts if one.tracked_as),
@@ -179,11 +175,11 @@ class _Run:
             )
 
 
-def _stored(folder: Path) -> JudgementResults | None:
+def _stored(folder: Path) -> RunResults | None:
     try:
-        return read_judgement_results(folder)
+        return read_run(folder)
     except ConfigError:
-        # Damaged, or of another release: written anew.
+        # None yet, damaged, or of another release: written anew.
         return None
 
 

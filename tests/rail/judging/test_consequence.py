@@ -12,6 +12,7 @@ from sysid.errors import ConfigError
 from sysid.models import ARX, ARXModel, Mapping
 from sysid.rail.dynamics.train import heavy_haul
 from sysid.rail.judging.consequence import JUDGE, ConsequenceOptions
+from sysid.rail.judging.consequence_figures import consequence_document
 from sysid.rail.judging.scenario_catalogue import all_scenarios
 
 TRAIN = """\
@@ -63,17 +64,43 @@ def test_a_judgement_of_a_simple_brake(train: str) -> None:
     assert "pipe pressures" in ends["refused"]
     assert results["bias of 0.1 psi"]["distance"] < results["bias of 3 psi"]["distance"]
     document = JUDGE.document(chosen, SUBJECTS, results)
-    assert "full service" in document["headline"]
-    metrics = document["metrics"]["simple"]
-    assert metrics["distance_percent/full service"] == stop["distance_percent"]
-    assert all(math.isfinite(value) for value in metrics.values())
-    summary, *_ = document["tables"]
-    assert summary["rows"][0][0] == "simple"
-    assert summary["rows"][0][-1] == "1"
-    widths = {len(row) - len(table["head"]) for table in document["tables"] for row in table["rows"]}
-    assert widths == {0}
-    # The reference stands in every chart of a speed.
-    assert [line["name"] for line in document["charts"][1]["lines"]] == ["reference", "simple"]
+    assert document["headline_scenes"] == ["full service"]
+    assert document["scenes"] == ["full service", "emergency, both ends"]
+    found = document["subjects"]["simple"]
+    assert found["full service"]["differences"]["distance_percent"] == stop["distance_percent"]
+    assert found["full service"]["differences"]["cylinder_mse"] == stop["mse_psi2"]
+    assert found["full service"]["differences"]["speed_kmh"] == pytest.approx(3.6 * stop["speed_m_s"])
+    assert found["full service"]["measures"]["distance_m"] == stop["other"]["distance_m"]
+    assert document["reference"]["full service"]["measures"]["distance_m"] == stop["reference"]["distance_m"]
+    assert found["emergency, both ends"] == {"refused": ends["refused"]}
+    assert list(document["reference"]) == ["full service"]
+    (bias, noise) = document["sensitivity"]
+    assert [step["size"] for step in bias["steps"]] == [0.1, 3.0]
+    assert bias["steps"][0]["differences"]["distance_percent"] == 100.0 * results["bias of 0.1 psi"]["distance"]
+    assert [one["quantity"] for one in noise["tolerances"]] == document["limited"]
+    # Every key says what it is, with its unit.
+    told = {*found["full service"]["differences"], *found["full service"]["measures"], "speed"}
+    assert told == set(document["quantities"])
+    assert all(one["name"] and one["meaning"] for one in document["quantities"].values())
+
+
+@pytest.mark.parametrize(
+    ("consequences", "reached", "error"),
+    [((2.0, 3.0), "passed", None), ((0.1, 0.2), "within", None), ((0.1, 10.0), "crossed", 10.0)],
+)
+def test_how_large_an_error_may_be_is_told_apart(consequences: tuple[float, ...], reached: str, error: float) -> None:
+    rows = [
+        {"size_psi": size, "mse_psi2": size**2, "distance": percent / 100.0, "time": 0.0, "force": 0.0}
+        for size, percent in zip((1.0, 10.0), consequences, strict=True)
+    ]
+    document = consequence_document(train="t", speed=80.0, limit=1.0, judged={}, ladders={"bias": rows})
+    found = {one["quantity"]: one for one in document["sensitivity"][0]["tolerances"]}
+    assert found["distance_percent"]["reached"] == reached
+    assert found["time_percent"]["reached"] == "within"
+    if error is None:
+        assert math.isnan(found["distance_percent"]["error"])
+    else:
+        assert found["distance_percent"]["error"] == pytest.approx(error)
 
 
 def test_the_reference_against_itself_would_be_nothing(train: str) -> None:

@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid.reporting.assembly.results import AssemblyResults
+from sysid.reporting.kinds import read_run
+
 ROLES = {"A": "estimation", "B": "estimation", "S": "selection", "V": "validation"}
 
 PIPELINE = """\
@@ -76,3 +79,10 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "pipelines" / "tanks.yaml").write_text(PIPELINE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def assembly_results(folder: Path) -> AssemblyResults:
+    """What a run of an assembly stored."""
+    results = read_run(folder)
+    assert isinstance(results, AssemblyResults)
+    return results

@@ -11,11 +11,10 @@ from sysid.errors import BundleError, ConfigError
 from sysid.export import export_bundle
 from sysid.ingest import load_dataset
 from sysid.reporting import publish_run
-from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
-from tests.workbench.assembly.conftest import PIPELINE
+from tests.workbench.assembly.conftest import PIPELINE, assembly_results
 
 QUICK = PIPELINE.replace("candidates: 2", "candidates: 1").replace(
     "retrain: {members: [lower], max_iterations: 5}\n", ""
@@ -40,17 +39,11 @@ def trained(workspace: Path) -> Path:
 
 def test_its_networks_stand_where_members_would_be_fitted(workspace: Path, trained: Path) -> None:
     folder = run(workspace, "further", SECOND)
-    results = read_judgement_results(folder)
-    assert results is not None
-    assert [subject.name for subject in results.subjects] == ["as it was begun from", "trained end to end"]
+    results, before = assembly_results(folder), assembly_results(trained)
+    assert [stage.name for stage in results.stages] == ["as it was begun from", "trained end to end"]
     assert not list(folder.rglob("fit.json"))
-    before, after = read_judgement_results(trained), results.judgement.tables[0]
-    assert before is not None
-    chosen = next(row for row in before.judgement.tables[0].rows if str(row[0]).endswith("(chosen)"))
-    assert after.rows[0][1:] == chosen[1:]
-    assert any(
-        "Begun from the networks of bundle (sysid run tanks; digest " in one for one in results.judgement.sentences
-    )
+    assert (results.stages[0].mse, results.stages[0].selection) == (before.chosen.mse, before.chosen.selection)
+    assert results.notes[0].startswith("Begun from the networks of bundle (sysid run tanks; digest ")
 
 
 def test_its_rounds_are_found_again_until_it_begins_from_another_whole(workspace: Path, trained: Path) -> None:
@@ -119,7 +112,7 @@ def test_a_published_bundle_is_begun_from_as_well(workspace: Path, trained: Path
     assert "[bundle](bundle)" in page.read_text(encoding="utf-8")
     shutil.rmtree(trained)
     published = SECOND.replace("../runs/tanks/bundle", "../reports/tanks/bundle")
-    assert read_judgement_results(run(workspace, "further", published)) is not None
+    assert assembly_results(run(workspace, "further", published)).whole.stage
 
 
 def test_a_line_is_published_beside_the_page_as_it_is(workspace: Path) -> None:

@@ -10,14 +10,16 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.ingest import load_dataset
-from sysid.reporting.judging.results import read_judgement_results
-from sysid.reporting.judging.tables import TableRecord
+from sysid.reporting.assembly.member_tables import member_tables
+from sysid.reporting.assembly.results import MemberRecord
+from sysid.reporting.assembly.tables import stage_table
+from sysid.reporting.comparing.published import read_published
 from sysid.reporting.sweep.record import SweepRecord
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.sweep.run import read_sweep_file, run_sweep
-from tests.workbench.assembly.conftest import PIPELINE
+from tests.workbench.assembly.conftest import PIPELINE, assembly_results
 
 BASE = (
     PIPELINE.replace("    candidates: 2\n", "")
@@ -63,53 +65,47 @@ def run(workspace: Path, text: str) -> Path:
     return workspace / "runs" / "tanks"
 
 
-def tables(folder: Path) -> dict[str, TableRecord]:
-    """The report's tables by what they begin with."""
-    results = read_judgement_results(folder)
-    assert results is not None
-    return {" ".join(one.caption.split(":")[:1]): one for one in results.judgement.tables}
+def members(folder: Path) -> dict[str, MemberRecord]:
+    """The members that had a choice, by their mapping."""
+    return {one.mapping: one for one in assembly_results(folder).members}
 
 
 def test_every_structure_is_fitted_from_every_seed(workspace: Path) -> None:
     folder = run(workspace, SEVERAL)
-    rows = tables(folder)["upper -> lower by itself, behind measured inputs"].rows
-    names = [str(row[0]).split(" (")[0] for row in rows]
-    assert names == ["NARX 1/1/3, seed 3", "NARX 1/1/3, seed 1003", "NARX 2/2/2, seed 3", "NARX 2/2/2, seed 1003"]
-    best = min(rows, key=lambda row: float(row[-1] or 0.0))
-    assert "(best alone" in str(best[0])
-    assert sum("best alone" in str(row[0]) for row in rows) == sum("chosen" in str(row[0]) for row in rows) == 1
-    # What stands in the table is what the stored fit does by itself.
+    found = members(folder)["upper -> lower"].candidates
+    assert [(one.structure, one.seed) for one in found] == [
+        (structure, seed) for structure in ("NARX 1/1/3", "NARX 2/2/2") for seed in (3, 1003)
+    ]
+    assert min(found, key=lambda one: one.selection).best_alone
+    assert sum(one.best_alone for one in found) == sum(one.chosen for one in found) == 1
+    # What is stored is what the stored fit does by itself.
     fit = read_fit(folder / "fits" / "upper-lower-2")
     trace = load_dataset("tanks", search=(workspace / "datasets",))["V"]
     error = np.mean((fit.model.simulate(trace.columns(["upper"])) - trace["lower"]) ** 2)
-    assert rows[2][4] == pytest.approx(error, rel=1e-9)
+    assert found[2].free_run_mse["V"] == pytest.approx(error, rel=1e-9)
 
 
-def test_a_single_fit_has_no_table_of_candidates(workspace: Path) -> None:
-    assert not any("by itself" in caption for caption in tables(run(workspace, BASE)))
+def test_a_single_fit_had_no_choice(workspace: Path) -> None:
+    assert members(run(workspace, BASE)) == {}
 
 
 def test_one_step_ahead_is_a_stage_and_a_table(workspace: Path) -> None:
     folder = run(workspace, SEVERAL + ONE_STEP)
-    results = read_judgement_results(folder)
-    assert results is not None
-    stages = [one.name for one in results.subjects]
+    results = assembly_results(folder)
+    stages = [one.name for one in results.stages]
     assert stages == ["each alone, one step ahead", "each alone", "chosen together"]
-    found = tables(folder)
-    rows = found["upper -> lower by itself, fitted one step ahead"].rows
-    assert [row[0] for row in rows[:2]] == ["NARX 1/1/3, seed 3: one step ahead", "NARX 1/1/3, seed 3: in free run"]
-    assert len(rows) == 8
-    assert len(found["pump+lower -> upper by itself, fitted one step ahead"].rows) == 2
+    found = {mapping: [one.one_step for one in member.candidates] for mapping, member in members(folder).items()}
+    assert {mapping: len(fits) for mapping, fits in found.items()} == {"pump+lower -> upper": 1, "upper -> lower": 4}
+    assert None not in [one for fits in found.values() for one in fits]
+    first = found["upper -> lower"][0]
+    assert first is not None
     fit = read_fit(folder / "fits" / "upper-lower-0-one-step")
     assert fit.loop.value == "open"
     trace = load_dataset("tanks", search=(workspace / "datasets",))["V"]
     ahead = fit.model.predict(trace.columns(["upper"]), trace["lower"])
-    assert rows[0][4] == pytest.approx(np.mean((ahead - trace["lower"]) ** 2), rel=1e-9)
-    assert float(rows[0][4] or 0.0) < float(rows[1][4] or 0.0), (
-        "the past output is measured in one, its own in the other"
-    )
-    (lesson, *_) = [row for row in found["The lessons, and whether each held"].rows if row[0]]
-    assert lesson[0] == "A network that was fitted one step ahead fails once its loop is closed"
+    assert first.one_step_mse["V"] == pytest.approx(np.mean((ahead - trace["lower"]) ** 2), rel=1e-9)
+    assert first.one_step_mse["V"] < first.free_run_mse["V"], "the past output is measured in one, its own in the other"
+    assert results.ablation[0].step == "close_loop"
 
 
 def test_published_models_stand_beside_candidates_of_their_structure(workspace: Path) -> None:
@@ -117,20 +113,22 @@ def test_published_models_stand_beside_candidates_of_their_structure(workspace: 
     (workspace / "reports" / "published" / "tanks.yaml").write_text(PUBLISHED, encoding="utf-8")
     (workspace / "reports" / "published" / "tanks.csv").write_text(FIGURES, encoding="utf-8")
     whole = "published_models: tanks\npublished_whole: pump -> upper->lower\n"
-    found = tables(run(workspace, f"{SEVERAL}{ONE_STEP}{whole}"))
-    assert found["upper -> lower by itself, behind measured inputs"].rows[-1] == [
-        "Table 2: NARX 2/2/2", None, None, None, 0.25, None,
-    ]  # fmt: skip
-    rows = found["upper -> lower by itself, fitted one step ahead"].rows
-    assert [row[0] for row in rows if "Table" in str(row[0])] == ["Table 3: NARX 2/2/2", "Table 4: NARX 2/2/2"]
-    assert found["lower"].rows[-2:] == [
-        ["Table 6: first", None, None, None, 0.75, None],
-        ["Table 6: second", None, None, None, 0.5, None],
+    folder = run(workspace, f"{SEVERAL}{ONE_STEP}{whole}")
+    results, published = assembly_results(folder), read_published("tanks", workspace=workspace)
+    upper, lower = (member_tables(one, published) for one in results.members)
+    free, ahead, times = (
+        [[cell.text for cell in row[:1]] + [cell.value for cell in row[1:]] for row in t.rows] for t in lower
+    )
+    assert free[-1] == ["Table 2: NARX 2/2/2", None, None, None, 0.25, None]
+    assert [row[0] for row in ahead if "Table" in str(row[0])] == ["Table 3: NARX 2/2/2", "Table 4: NARX 2/2/2"]
+    assert [row[0] for row in times] == ["NARX 1/1/3", "NARX 2/2/2", "Table 5: NARX 2/2/2"]
+    assert times[-1][4] == 500.0, "in milliseconds, as ours"
+    assert len(upper) == 2, "no run time is published of it"
+    first, second = stage_table(results, "lower", published).rows[-2:]
+    assert [(row[0].text, row[4].value) for row in (first, second)] == [
+        ("Table 6: first", 0.75),
+        ("Table 6: second", 0.5),
     ]
-    structures = found["upper -> lower by itself"].rows
-    assert [row[0] for row in structures] == ["NARX 1/1/3", "NARX 2/2/2", "Table 5: NARX 2/2/2"]
-    assert structures[-1][4] == 500.0, "in milliseconds, as ours"
-    assert not any("pump+lower -> upper by itself: run time" in name for name in found), "none is published of it"
 
 
 def test_a_wrong_name_of_published_models_is_said_before_anything_is_fitted(workspace: Path) -> None:
@@ -151,10 +149,8 @@ def test_a_member_of_another_structure_than_its_first_is_retrained_as_it_is(work
         "{kind: NARX, input_delays: [900], output_delays: 1, neurons: 1}",
     )
     folder = run(workspace, f"{better}retrain: {{members: [lower], max_iterations: 3}}\n")
-    results = read_judgement_results(folder)
-    assert results is not None
-    chosen = next(one for one in results.subjects if one.name == "chosen together")
-    assert any("lower: NARX 2/2/2" in part for part in chosen.parts) or "all as before" in chosen.parts
+    (lower,) = [one for one in assembly_results(folder).members if one.mapping == "upper -> lower"]
+    assert [one.structure for one in lower.candidates if one.chosen] == ["NARX 2/2/2"]
     assert read_fit(folder / "fits" / "upper-lower-retrained-0").model.structure.label == "NARX 2/2/2"
 
 
@@ -195,11 +191,11 @@ def test_candidates_are_the_best_of_a_sweep(workspace: Path) -> None:
     record = sweep(workspace, SWEEP)
     best = sorted(record.tried_in_full, key=record.choice)[:3]
     folder = run(workspace, FROM_SWEEP + ONE_STEP)
-    rows = tables(folder)["upper -> lower by itself, behind measured inputs"].rows
-    assert [str(row[0]).split(",")[0] for row in rows] == [one.label for one in best]
+    found = members(folder)["upper -> lower"].candidates
+    assert [one.structure for one in found] == [one.label for one in best]
     # They are taken as they are: the same error on the same case.
-    for row, trial in zip(rows, best, strict=True):
-        assert row[4] == pytest.approx(trial.cases["V"].free_run_mse, rel=1e-9)
+    for one, trial in zip(found, best, strict=True):
+        assert one.free_run_mse["V"] == pytest.approx(trial.cases["V"].free_run_mse, rel=1e-9)
     assert not (folder / "fits" / "upper-lower-0" / "fit.json").exists()
     assert (folder / "fits" / "upper-lower-2-one-step" / "fit.json").is_file()
 

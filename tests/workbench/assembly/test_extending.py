@@ -10,13 +10,12 @@ import pytest
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
-from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.kinds import RunRequest
 from sysid.yaml_files import check, parse_yaml, read_yaml
-from tests.workbench.assembly.conftest import PIPELINE
+from tests.workbench.assembly.conftest import PIPELINE, assembly_results
 
 BASE = """\
 kind: assembly
@@ -248,9 +247,7 @@ def run(workspace: Path, name: str, text: str, *, out: Path | None = None) -> Pa
 def test_a_pipeline_that_extends_runs_as_the_one_written_out(workspace: Path) -> None:
     run(workspace, "tanks", QUICK)
     folder = run(workspace, "grown", GROWN)
-    results = read_judgement_results(folder)
-    assert results is not None
-    assert results.pipeline == "grown"
+    assert assembly_results(folder).pipeline == "grown"
     # A run folder says by itself what was run.
     assert (folder / "pipeline.yaml").read_text(encoding="utf-8") == GROWN
     whole = folder / "pipeline-joined.yaml"

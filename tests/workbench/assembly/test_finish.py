@@ -11,10 +11,9 @@ import pytest
 
 from sysid.export import read_bundle
 from sysid.export.manifest import schema_text
-from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.kinds import RunRequest
-from tests.workbench.assembly.conftest import PIPELINE, write_tanks
+from tests.workbench.assembly.conftest import PIPELINE, assembly_results, write_tanks
 
 QUICK = (
     PIPELINE.replace("candidates: 2", "candidates: 1")
@@ -54,8 +53,7 @@ def test_a_bundle_names_what_it_was_trained_and_chosen_on(
     assert run_assembly(RunRequest(path=file, typed="tanks", tracking=False)) == 0
 
     folder = workspace / "runs" / "tanks"
-    results = read_judgement_results(folder)
-    assert results is not None
+    results = assembly_results(folder)
     digests = {results.data.name: results.data.digest, **results.data.others}
     manifest = read_bundle(folder / "bundle").metadata
     jsonschema.validate(manifest, json.loads(schema_text()))

@@ -7,16 +7,12 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from sysid.composite.active_learning import Look
 from sysid.composite.round import JointRound
 from sysid.errors import ConfigError
-from sysid.reporting.judging.results import read_judgement_results
 from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.assembly.stage_config import GrowConfig
-from sysid.workbench.assembly.views import growth_charts, growth_table
 from sysid.workbench.kinds import RunRequest
-from tests.composite.test_active_learning import Trained
-from tests.workbench.assembly.conftest import PIPELINE, write_tanks
+from tests.workbench.assembly.conftest import PIPELINE, assembly_results, write_tanks
 from tests.workbench.assembly.test_config import config
 
 ASKED = {"data": "pool", "outputs": ("AR", "BP"), "within": 0.1, "add": 3, "rounds": 4}
@@ -26,40 +22,6 @@ def test_a_round_may_add_as_many_as_it_names():
     assert GrowConfig.model_validate(ASKED | {"add": [10, 20, 40], "rounds": None}).additions == (10, 20, 40)
     assert GrowConfig.model_validate(ASKED).additions == (3, 3, 3, 3)
     assert GrowConfig(data="pool", outputs=("BC",), within=1.0).additions == (20,) * 5
-
-
-def test_the_table_counts_what_is_counted_and_the_curves_have_a_point_for_each_round():
-    found = Trained(right_after=(2,)).found
-    table = growth_table(found, "grown, round 2")
-    assert [row[0] for row in table["rows"]] == ["0", "1", "2 (chosen)"]
-    counts = [row[1:4] for row in table["rows"]]
-    assert counts == [[0, 2, 120], [3, 5, 300], [3, 8, 480]]
-    assert all(type(value) is int for row in counts for value in row)
-    assert [row[4] for row in table["rows"]] == [None, 2.5, 2.5]
-    assert table["rows"][2][5] == 100.0
-    assert [head[0] for head in table["head"][5:6]] == ["Under 0.1 psi"]
-    error, share = growth_charts(found)
-    assert error["y"] == "root mean square error of a sequence (psi)"
-    assert (error["logarithmic"], share["logarithmic"]) == (True, "x")
-    for chart in (error, share):
-        assert all(line["x"] == [120.0, 300.0, 480.0] for line in chart["lines"])
-        assert [line["points"] for line in chart["lines"]] == [not line["target"] for line in chart["lines"]]
-    assert error["lines"][0]["y"] == [each.look.rare for each in found.rounds]
-    assert share["lines"][0]["y"] == [100.0 * each.look.within for each in found.rounds]
-
-
-def test_stages_on_random_sequences_stand_beside_what_the_pool_says():
-    found = Trained(right_after=(2,)).found
-    looks = {one.stage: Look(within=0.1 * one.number, median=0.0, rare=5.0 - one.number) for one in found.rounds}
-    table = growth_table(found, "grown, round 2", looks)
-    assert all(len(row) == len(table["head"]) for row in table["rows"])
-    assert [row[-2:] for row in table["rows"]] == [[0.0, 5.0], [pytest.approx(10.0), 4.0], [pytest.approx(20.0), 3.0]]
-    lines = {line["name"]: line["y"] for line in growth_charts(found, looks)[0]["lines"]}
-    assert lines["99 % of the random sequences under"] == [5.0, 4.0, 3.0]
-    # A stage that was not run on them has no figure, and the curve none at all.
-    partial = {stage: look for stage, look in looks.items() if look.rare < 5.0}
-    assert growth_table(found, "grown, round 2", partial)["rows"][0][-2:] == [None, None]
-    assert all("random" not in line["name"] for line in growth_charts(found, partial)[0]["lines"])
 
 
 GROWN = "grow: {data: pool, outputs: [lower], within: 0.001, add: 1, rounds: 2, train: [{max_iterations: 2}]}\n"
@@ -85,29 +47,24 @@ def run(workspace: Path, text: str, name: str = "tanks"):
     file = workspace / "pipelines" / f"{name}.yaml"
     file.write_text(text.replace("name: tanks", f"name: {name}"), encoding="utf-8")
     assert run_assembly(RunRequest(path=file, typed=name, tracking=False)) == 0
-    found = read_judgement_results(workspace / "runs" / name)
-    assert found is not None
-    return found
+    return assembly_results(workspace / "runs" / name)
 
 
 def test_a_run_grows_resumes_and_reports(pooled: Path) -> None:
     results = run(pooled, LEAN)
     stages = ["each alone", "trained end to end", "grown, round 1", "grown, round 2"]
-    assert [one.name for one in results.subjects] == stages
-    found = results.judgement
-    assert [row[0].removesuffix(" (chosen)") for row in found.tables[0].rows[: len(stages)]] == stages
-    assert [one.title for one in found.charts][:2] == ["Error over data", "Share over data"]
-    rows = next(one.rows for one in found.tables if one.caption.startswith("How much data"))
-    assert [row[1:4] for row in rows] == [[0, 1, 300], [1, 2, 600], [1, 3, 900]]
-    rounds = next(one.rows for one in found.tables if one.caption.startswith("Training end to end"))
-    assert [(row[0], row[3]) for row in rounds] == [("1", 1), ("1 of growth", 2), ("2 of growth", 3)]
-    assert any("Grown over 2 rounds by 2 sequences, at which the whole was worst" in one for one in found.sentences)
+    assert [one.name for one in results.stages] == stages
+    (found,) = results.active_learning
+    counts = [(len(one.added), one.traces, one.samples) for one in found.rounds]
+    assert counts == [(0, 1, 300), (1, 2, 600), (1, 3, 900)]
+    assert [(one.name, one.traces) for one in results.rounds] == [("1", 1), ("1 of growth", 2), ("2 of growth", 3)]
+    assert found.pick == "worst"
     # The stages' score and the curve's are one figure: by the selection traces and those of the pool.
-    assert [row[-1] for row in found.tables[0].rows[1 : len(stages)]] == [row[-1] for row in rows]
+    assert [one.selection for one in results.stages[1:]] == [one.selection for one in found.rounds]
 
     files = [pooled / "runs" / "tanks" / f"{name}.json" for name in ("together", "grown-1", "grown-2")]
     stamps = [one.stat().st_mtime_ns for one in files]
-    assert run(pooled, LEAN).judgement.tables[0] == found.tables[0]
+    assert run(pooled, LEAN).stages == results.stages
     assert [one.stat().st_mtime_ns for one in files] == stamps, "nothing is trained again"
     run(pooled, LEAN.replace("add: 1, rounds: 2", "add: [1, 1], pick: next"))
     assert files[0].stat().st_mtime_ns == stamps[0], "growth leaves what was before it"
@@ -115,13 +72,12 @@ def test_a_run_grows_resumes_and_reports(pooled: Path) -> None:
 
 def test_where_there_is_a_stress_each_round_is_put_to_it(pooled: Path) -> None:
     text = LEAN + "stress: {data: tanks, output: lower, within: 0.5}\n"
-    found = run(pooled, text).judgement
-    growth = next(one for one in found.tables if one.caption.startswith("How much data"))
-    stress = next(one for one in found.tables if "random sequences of the reference" in one.caption)
-    assert growth.head[-2:] == [("Random sequences", "% under their limit"), ("99 % of them", "under")]
-    (chosen,) = [row for row in growth.rows if str(row[0]).endswith("(chosen)")]
-    quantiles = {str(row[0]): row[1] for row in stress.rows}
-    assert chosen[-1] == pytest.approx(quantiles["99 % of the sequences at most, cm"])
+    results = run(pooled, text)
+    (chosen,) = [one for one in results.active_learning[0].rounds if one.stage == results.whole.stage]
+    assert chosen.monte_carlo is not None
+    assert results.monte_carlo is not None
+    assert chosen.monte_carlo.p99 == pytest.approx(results.monte_carlo.quantiles[0.99])
+    assert chosen.monte_carlo.within == results.monte_carlo.within
 
 
 def test_each_round_goes_through_several_trainings_that_have_all_that_was_added(
@@ -145,9 +101,7 @@ def test_each_round_goes_through_several_trainings_that_have_all_that_was_added(
         (("upper",), ("lower",), 1, 3, 2),
         (("upper",), ("lower",), 2, 3, 2),
     ]
-    rounds = next(one for one in results.judgement.tables if one.caption.startswith("Training end to end"))
-    assert [row[0] for row in rounds.rows][1:] == [f"{one} of growth" for one in ("1.1", "1.2", "2.1", "2.2")]
-    assert any(one.startswith("Round 1.2 of growth: ") for one in rounds.folded)
+    assert [one.name for one in results.rounds[1:]] == [f"{one} of growth" for one in ("1.1", "1.2", "2.1", "2.2")]
     assert (pooled / "runs" / "tanks" / "grown-2-2.json").is_file()
 
 
@@ -155,7 +109,7 @@ def test_what_is_begun_from_another_whole_grows_too(pooled: Path) -> None:
     run(pooled, LEAN.replace("export: null", "export: {formats: [c]}").replace(GROWN, ""))
     results = run(pooled, LEAN.replace("seed: 3", "seed: 3\nbegin: ../runs/tanks/bundle"), "further")
     stages = ["as it was begun from", "trained end to end", "grown, round 1", "grown, round 2"]
-    assert [one.name for one in results.subjects] == stages
+    assert [one.name for one in results.stages] == stages
 
 
 def test_a_pool_without_sequences_that_train_nothing_is_refused(pooled: Path) -> None:

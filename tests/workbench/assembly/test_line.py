@@ -13,7 +13,6 @@ from sysid.errors import ConfigError
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.assembly.line import line_of, places_of, score_line
 from sysid.workbench.assembly.proof_config import LineConfig
-from sysid.workbench.assembly.views import line_chart, line_metrics, line_point, line_table
 from tests.composite.composites import models, pipe, trace
 from tests.workbench.assembly.test_config import TWO_PLACES, config
 
@@ -58,17 +57,6 @@ def test_each_place_is_scored_by_itself():
     assert scores.seen["AR"].tolist() == [True, False, True]
     for case in ("A", "B"):
         assert_allclose(scores.mse["AR"][case], [0.0, 0.25, 0.0], atol=1e-12)
-    table = line_table(scores, "AR")
-    assert [row[:4] for row in table["rows"]] == [
-        [case, pytest.approx(0.25), pytest.approx(0.25), 4.0] for case in ("A", "B")
-    ]
-    assert [one["name"] for one in line_chart(scores, "AR")["lines"]] == ["A", "B", "fitted here"]
-    assert line_metrics(scores) == pytest.approx(
-        {f"AR/{case}/unseen places/{what}": 0.25 for case in ("A", "B") for what in ("mse", "worst mse")}
-    )
-    keyword, sentence = line_point(scores)
-    assert keyword == "Everywhere"
-    assert "at worst 0.250 (" in sentence
 
 
 def test_data_without_places_are_refused():

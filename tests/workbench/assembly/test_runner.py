@@ -16,12 +16,13 @@ from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, Status
 from sysid.export import read_bundle
 from sysid.reporting import publish_run
-from sysid.reporting.judging.results import read_judgement_results
+from sysid.reporting.assembly.document import headline
+from sysid.reporting.signals import read_signals
 from sysid.workbench.assembly.runner import read_assembly, run_assembly
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest, kind_of
 from sysid.workbench.tracking.mlflow_store import connect, store_uri
-from tests.workbench.assembly.conftest import levels
+from tests.workbench.assembly.conftest import ROLES, assembly_results, levels
 
 
 def run(workspace: Path, *, fresh: bool = False, tracking: bool = False) -> int:
@@ -33,35 +34,27 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
     assert kind_of(workspace / "pipelines" / "tanks.yaml") == "assembly"
     assert run(workspace) == 0
     folder = workspace / "runs" / "tanks"
-    results = read_judgement_results(folder)
-    assert results is not None
-    stages = [subject.name for subject in results.subjects]
+    results = assembly_results(folder)
+    stages = [stage.name for stage in results.stages]
     assert stages == ["each alone", "chosen together", "retrained", "trained end to end"]
-    upper, lower, lessons, alone, rounds, stress, timing, holding = results.judgement.tables
-    assert [row[0] for row in lower.rows if str(row[0]).removesuffix(" (chosen)") in stages] == [
-        row[0] for row in upper.rows
-    ]
-    assert lower.rows[-2:] == [
-        ["Table 1", None, None, None, 0.4, None],
-        ["aimed at: 0.5 of it", None, None, None, 0.2, None],
-    ]
-    assert [row[0] for row in lessons.rows if row[0]] == [
-        "The members that are best alone are not the best together",
-        "Training members again on what the others put out helps",
-        "Training the whole as one goes further than its parts",
-    ]
-    assert alone.caption.startswith("pump+lower -> upper by itself")
-    assert [row[0] for row in rounds.rows] == ["1"]
-    assert any("diverged" in str(row[0]) for row in stress.rows)
-    assert len(timing.rows) == 4
-    assert [row[:2] for row in holding.rows] == [["lower at its lower limit", "0 cm"]]
-    # What the table says is what the stored assembly does.
+    assert all({*stage.mse} == {"upper", "lower"} for stage in results.stages)
+    assert [one.step for one in results.ablation] == ["choose_together", "retrain", "train_together"]
+    assert [one.mapping for one in results.members] == ["pump+lower -> upper"]
+    assert [one.name for one in results.rounds] == ["1"]
+    assert results.monte_carlo is not None
+    assert results.monte_carlo.sequences == 4
+    assert {name: case.role.value for name, case in results.cases.items()} == ROLES
+    assert [(one.output, one.low, one.high) for one in results.limits] == [("lower", 0.0, None)]
+    published = results.published["lower"]
+    assert (published.source, published.target, published.mse) == ("Table 1", 0.5, {"V": 0.4})
+    # What is stored is what the stored assembly does.
     whole = read_assembly(folder)
     pump = np.repeat(np.random.default_rng(3).uniform(0.0, 2.0, 15), 20)
     pump[:5] = 0.0
     error = np.mean((whole.simulate(pump[:, None])["lower"] - levels(pump)[1]) ** 2)
-    chosen = next(row for row in lower.rows if str(row[0]).endswith("(chosen)"))
-    assert error == pytest.approx(chosen[4], rel=1e-6)
+    assert error == pytest.approx(results.chosen.mse["lower"]["V"], rel=1e-6)
+    signals = read_signals(folder, list(results.cases), of="lower")["V"]
+    assert np.mean(signals.error**2) == pytest.approx(error, rel=1e-6)
     assert (folder / "report" / "index.html").is_file()
     assert "From pump alone" in capsys.readouterr().out
     _is_published(folder, workspace / "reports")
@@ -70,9 +63,7 @@ def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[
     assert len(stamps) == 4
     assert run(workspace) == 0
     assert {file: file.stat().st_mtime_ns for file in folder.rglob("fit.json")} == stamps, "nothing is fitted again"
-    again = read_judgement_results(folder)
-    assert again is not None
-    assert again.judgement.tables[1] == lower
+    assert assembly_results(folder).stages == results.stages
 
 
 def _is_published(folder: Path, reports: Path) -> None:
@@ -82,7 +73,7 @@ def _is_published(folder: Path, reports: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert page == reports / "tanks" / "README.md"
     for words in (
-        f"**{results['judgement']['headline']}**",
+        f"**{headline(assembly_results(folder))}**",
         "- **Published.** lower at or below Table 1 on ",
         "- **Weakness.** Of 4 random sequences ",
         "| run | `sysid run tanks` |",
@@ -98,10 +89,8 @@ def _is_published(folder: Path, reports: Path) -> None:
 
 def test_the_chosen_stage_is_the_best_on_the_selection_traces(workspace: Path) -> None:
     run(workspace)
-    results = json.loads((workspace / "runs" / "tanks" / "results.json").read_text(encoding="utf-8"))
-    rows = [row for row in results["judgement"]["tables"][0]["rows"] if row[-1] is not None]
-    best = min(rows, key=lambda row: row[-1])
-    assert best[0].endswith("(chosen)")
+    results = assembly_results(workspace / "runs" / "tanks")
+    assert results.chosen is min(results.stages, key=lambda stage: stage.selection)
 
 
 def test_every_stage_is_tracked_once(workspace: Path, empty_store: Path) -> None:
@@ -134,8 +123,7 @@ def test_rounds_end_to_end_go_on_from_one_another_and_are_found_again(workspace:
     fits = [CascadeFit.from_dict(json.loads(file.read_text(encoding="utf-8"))) for file in files]
     assert [fit.errors["upper"] for fit in fits] == [0.1, 0.1, 0.2]
     assert all(max(fit.history["iteration"], default=0) <= most for fit, most in zip(fits, (4, 4, 2), strict=True))
-    results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
-    stages = [row[0].removesuffix(" (chosen)") for row in results["judgement"]["tables"][0]["rows"]]
+    stages = [stage.name for stage in assembly_results(folder).stages]
     rounds = ["trained end to end", "trained end to end, round 2", "trained end to end, round 3"]
     assert [name for name in stages if name in rounds] == rounds
     stamps = [file.stat().st_mtime_ns for file in files]
@@ -156,8 +144,9 @@ def test_a_whole_that_is_lost_says_so_in_its_report(workspace: Path, monkeypatch
 
     monkeypatch.setattr(JointRound, "fit", lost)
     assert run(workspace) == 0
-    results = json.loads((workspace / "runs" / "tanks" / "results.json").read_text(encoding="utf-8"))
-    assert Status.UNSTABLE.value in results["judgement"]["sentences"]
+    results = assembly_results(workspace / "runs" / "tanks")
+    assert [one.status for one in results.rounds] == ["UNSTABLE"]
+    assert Status.UNSTABLE.value in results.notes
 
 
 def test_a_round_that_was_interrupted_is_used_now_and_trained_again_next_time(
@@ -358,10 +347,9 @@ def test_the_report_says_what_was_exported_and_how_far_it_is_from_the_whole(work
     file = workspace / "pipelines" / "tanks.yaml"
     file.write_text(file.read_text().replace("export: null", "export: {formats: [torchscript], tolerance: 1.0e-6}"))
     assert run(workspace) == 0
-    results = read_judgement_results(workspace / "runs" / "tanks")
-    assert results is not None
-    exported = results.judgement.tables[-1]
+    exports = assembly_results(workspace / "runs" / "tanks").exports
     bundle = read_bundle(workspace / "runs" / "tanks" / "bundle")
-    assert exported.head[1] == ("Largest difference", "cm")
-    assert [row[0] for row in exported.rows] == [f"{one.name} (torchscript)" for one in bundle.files]
-    assert all(row[1] <= row[2] == 1e-6 for row in exported.rows)
+    assert [(one.file, one.format, one.unit) for one in exports] == [
+        (f"bundle/{one.name}", "torchscript", "cm") for one in bundle.files
+    ]
+    assert all(one.largest_difference <= one.tolerance == 1e-6 for one in exports)

@@ -79,22 +79,24 @@ class OvershootJudge:
     def document(self, options: Options, subjects: Mapping[str, Any], results: Mapping[str, Any]) -> dict[str, Any]:
         assert set(results) == set(subjects)
         x = [float(k) for k in range(10)]
-        lines = [
-            {"name": name, "x": x, "y": result["trace"], "target": name == "line"} for name, result in results.items()
-        ]
         return {
             "title": "Overshoot",
-            "headline": f"Asked for {options.level:g} kPa.",
-            "sentences": ["Higher is worse."],
-            "tables": [
-                {
-                    "caption": "Highest",
-                    "head": [["model", ""], ["pressure", "kPa"], ["remark", ""]],
-                    "rows": [[name, result["highest"], None] for name, result in results.items()],
+            "method": f"Asked for {options.level:g} kPa. Higher is worse.",
+            "scenes": ["jump, up"],
+            "quantities": {
+                "highest": {"name": "highest pressure", "unit": "kPa"},
+                "pressure": {"name": "pressure", "unit": "kPa"},
+                "nothing": {"name": "nothing"},
+            },
+            "subjects": {
+                name: {
+                    "jump, up": {
+                        "differences": {"highest": result["highest"], "nothing": result["nothing"]},
+                        "signals": {"pressure": {"time": x, "value": result["trace"]}},
+                    }
                 }
-            ],
-            "charts": [{"title": "Jump", "caption": "All models.", "x": "t", "y": "p", "lines": lines}],
-            "metrics": {name: {"highest/kPa, worst": result["highest"]} for name, result in results.items()},
+                for name, result in results.items()
+            },
         }
 
 
@@ -126,8 +128,10 @@ def test_what_a_judge_says_is_stored_and_shown(place: Path, judge: OvershootJudg
     results = judged(place)
     assert [subject["name"] for subject in results["subjects"]] == ["line", "both"]
     assert "bundle runs/first/bundle" in results["subjects"][1]["parts"][1]
-    table = results["judgement"]["tables"][0]
-    assert table["rows"][0][1] > 100.0
+    scene = results["judgement"]["subjects"]["line"]["jump, up"]
+    assert scene["differences"]["highest"] > 100.0
+    assert scene["differences"]["nothing"] is None
+    assert "tables" not in results["judgement"], "what is stored are figures"
     page = (place / "runs" / "jump" / "report" / "index.html").read_text(encoding="utf-8")
     for words in ("Asked for 400 kPa.", "Higher is worse.", "Overshoot", "sysid run jump", "<svg"):
         assert words in page
@@ -179,7 +183,7 @@ def test_figures_are_tracked_once_for_what_was_judged(place: Path, judge: Oversh
     runs = client.search_runs(experiments, filter_string="tags.pipeline = 'jump'")
     # The fits of this workspace were never tracked: a run of its own stands for each.
     assert sorted(run.data.tags["fit"] for run in runs) == ["both", "line"]
-    assert all(run.data.metrics["jump/highest/kPa_ worst"] > 100.0 for run in runs)
+    assert all(run.data.metrics["jump/highest/jump_ up"] > 100.0 for run in runs)
     assert [file.path for file in client.list_artifacts(runs[0].info.run_id, "judgements/jump")]
 
 

@@ -1,0 +1,279 @@
+"""What came of an assembly, as it stands in results.json and in the files of signals beside it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.composite.active_learning import Growth, Look
+from sysid.composite.limits_held import Holding
+from sysid.composite.monte_carlo import Stress
+from sysid.composite.round import TrainedRound
+from sysid.composite.training import TrainedComposite
+from sysid.models import Activity, Cascade
+from sysid.reporting.assembly.results import AssemblyResults
+from sysid.reporting.records import RESULTS_FILE, parse_record
+from sysid.reporting.signals import MONTE_CARLO_FILE, SIGNALS_FILE
+from sysid.traces import Trace, TraceSet
+from sysid.workbench.assembly.context import Context
+from sysid.workbench.assembly.lessons import Lesson
+from sysid.workbench.assembly.line import LineScores
+from sysid.workbench.assembly.member_scores import CandidateScores, MemberScores
+from sysid.workbench.assembly.written import written
+from sysid.workbench.runner.environment import environment
+from sysid.workbench.runner.store import strict, write_arrays
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
+
+Scores = Mapping[str, Mapping[str, float]]
+"""Mean squared error of the free run of the whole by output and case, in the output's unit squared."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """What came of a run.
+
+    Args:
+        whole: The assembly of the chosen stage.
+        stages: Scores by stage, in their order.
+        selection: Score of each stage on the selection traces.
+        chosen: The stage that was chosen.
+        timing: Seconds of a free run of the whole by case.
+        stressed: What came of the random sequences.
+        worst: The sequences that the whole did worst on, whose signals are kept.
+        unseen: By stage of growth, how it does on the random sequences.
+        line: How the places do between those that are modelled, if they were asked for.
+        exported: The bundle, if one was asked for.
+        holding: Which limits hold the outputs in free run.
+        members: The members' candidates by themselves, where there are several or they were fitted one step ahead too.
+        lessons: What the stages say of each step of modelling by parts.
+    """
+
+    whole: Cascade
+    stages: Mapping[str, Scores]
+    selection: Mapping[str, float]
+    chosen: str
+    timing: Mapping[str, float]
+    stressed: Stress | None
+    worst: Sequence[Trace] = ()
+    unseen: Mapping[str, Look] = field(default_factory=dict)
+    line: LineScores | None = None
+    exported: Bundle | None = None
+    holding: Sequence[Holding] = ()
+    members: Sequence[MemberScores] = ()
+    lessons: Sequence[Lesson] = ()
+
+
+def assembly_results(
+    context: Context, trained: TrainedComposite, found: Outcome, cases: TraceSet, notes: Sequence[str]
+) -> AssemblyResults:
+    """The contents of results.json.
+
+    Args:
+        context: The run.
+        trained: What it has trained.
+        found: What came of it.
+        cases: The scored cases.
+        notes: Sentences on how it came about.
+
+    Returns:
+        The results; what is checked is what is stored.
+    """
+    config, first = context.config, next(iter(cases))
+    document = {
+        "pipeline": config.name,
+        "description": config.description,
+        "command": context.command,
+        "created": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "environment": dict(environment()),
+        "seed": config.seed,
+        "data": {
+            "name": cases.name,
+            "digest": cases.digest,
+            "others": {name: digest for name, digest in context.digests.items() if name != cases.name},
+        },
+        "cases": {trace.name: _case(trace, cases, found) for trace in cases},
+        "outputs": {name: {"unit": first.channel(name).unit} for name in config.outputs},
+        "whole": {
+            "stage": found.chosen,
+            "inputs": list(found.whole.inputs),
+            "models": len(found.whole.models),
+            "parameters": found.whole.n_parameters,
+        },
+        "stages": _stages(context, trained, found),
+        "published": {name: one.model_dump() for name, one in config.published.items() if name in config.outputs},
+        "published_models": config.published_models,
+        "published_whole": config.published_whole,
+        "members": [_member(one) for one in found.members],
+        "rounds": [_round(one) for one in trained.rounds],
+        "active_learning": [] if trained.growth is None else [_growth(trained.growth, found.unseen)],
+        "ablation": [asdict(one) for one in found.lessons],
+        "monte_carlo": None if found.stressed is None else _stress(found.stressed),
+        "limits": [_holding(one) for one in found.holding],
+        "limit_check": asdict(trained.limits) if trained.limits.limits else None,
+        "interpolation": None if found.line is None else _line(found.line),
+        "exports": [] if found.exported is None else _exports(found.exported),
+        "notes": list(notes),
+    }
+    return parse_record(AssemblyResults, strict(document), where=context.store.path / RESULTS_FILE)
+
+
+def write_signals(folder: Path, found: Outcome, outputs: Sequence[str], cases: TraceSet) -> None:
+    """Store reference and free run of every case, and of the random sequences that the whole is worst on.
+
+    Args:
+        folder: The run folder.
+        found: What came of the run.
+        outputs: The scored outputs.
+        cases: The scored cases.
+    """
+    write_arrays(folder / SIGNALS_FILE, _signals(found.whole, tuple(cases), outputs))
+    random = folder / MONTE_CARLO_FILE
+    if found.stressed is None:
+        random.unlink(missing_ok=True)  # of an earlier run
+    else:
+        write_arrays(random, _signals(found.whole, found.worst, [found.stressed.output]))
+
+
+def _signals(whole: Cascade, traces: Sequence[Trace], outputs: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    found: dict[str, NDArray[np.float64]] = {}
+    for trace in traces:
+        run = whole.simulate_trace(trace)
+        for name in outputs:
+            signals = {"time": trace.time, "target": trace[name], "simulated": run[name]}
+            found |= {f"{name}/{trace.name}/{part}": np.asarray(values) for part, values in signals.items()}
+    return found
+
+
+def _case(trace: Trace, cases: TraceSet, found: Outcome) -> dict[str, Any]:
+    return {
+        "role": cases.roles[trace.name].value,
+        "samples": len(trace),
+        "duration_s": len(trace) * trace.sample_time,
+        "run_time_s": found.timing[trace.name],
+    }
+
+
+def _stages(context: Context, trained: TrainedComposite, found: Outcome) -> list[dict[str, Any]]:
+    networks = written(context.config.composite, trained.stages)
+    return [
+        {"name": name, "networks": networks[name], "selection": found.selection[name], "mse": found.stages[name]}
+        for name in trained.stages
+    ]
+
+
+def _member(one: MemberScores) -> dict[str, Any]:
+    candidates = [_candidate(candidate) for candidate in one.candidates]
+    return {"mapping": one.mapping, "unit": one.unit, "candidates": candidates}
+
+
+def _candidate(one: CandidateScores) -> dict[str, Any]:
+    return {
+        "structure": one.candidate.member.structure.label,
+        "seed": one.candidate.member.training.seed,
+        "best_alone": one.best,
+        "chosen": one.chosen,
+        "selection": one.candidate.error,
+        "free_run_mse": one.free_run,
+        "run_time_s": one.run_time,
+        "one_step": None if one.one_step is None else {"one_step_mse": one.one_step, "free_run_mse": one.closed},
+    }
+
+
+def _round(one: TrainedRound) -> dict[str, Any]:
+    fit = one.fit
+    return {
+        "name": one.name,
+        "trained": one.trained,
+        "all_instances": one.shared,
+        "measured": one.measured,
+        "traces": one.traces,
+        "iterations": one.iterations,
+        "train_time_s": fit.train_time_s,
+        "loss": one.loss,
+        "selection_before": one.before,
+        "selection_after": one.after,
+        "status": fit.status.name,
+        "attempts": [attempt.to_dict() for attempt in fit.attempts],
+        "notes": fit.notes,
+    }
+
+
+def _look(one: Look) -> dict[str, Any]:
+    return {"within": one.within, "median": one.median, "p99": one.rare}
+
+
+def _growth(grown: Growth, unseen: Mapping[str, Look]) -> dict[str, Any]:
+    asked = grown.asked
+    rounds = [
+        {
+            "number": one.number,
+            "stage": one.stage,
+            "added": one.added,
+            "traces": one.traces,
+            "samples": one.samples,
+            "train_time_s": one.seconds,
+            "held_out": _look(one.look),
+            "monte_carlo": _look(unseen[one.stage]) if one.stage in unseen else None,
+            "selection": one.score,
+        }
+        for one in grown.rounds
+    ]
+    return {
+        "outputs": asked.outputs,
+        "unit": grown.unit,
+        "limit": asked.within,
+        "aim": asked.until,
+        "pick": asked.pick,
+        "held_out": grown.held_out,
+        "ended": grown.ended,
+        "rounds": rounds,
+    }
+
+
+def _stress(one: Stress) -> dict[str, Any]:
+    return {**asdict(one), "worst": [{"name": name, "rmse": error} for name, error in one.worst]}
+
+
+def _holding(one: Holding) -> dict[str, Any]:
+    activities = {"cases": _activity(one.cases), "sequences": _activity(one.sequences)}
+    return {"output": one.output, "unit": one.unit, "low": one.low, "high": one.high, **activities}
+
+
+def _activity(one: Activity | None) -> dict[str, Any] | None:
+    return None if one is None else {name: getattr(one, name) for name in ("low", "high", "lost", "samples")}
+
+
+def _line(scores: LineScores) -> dict[str, Any]:
+    return {
+        "outputs": {
+            name: {
+                "positions": scores.places[name].tolist(),
+                "fitted": scores.seen[name].tolist(),
+                "mse": {case: errors.tolist() for case, errors in by_case.items()},
+            }
+            for name, by_case in scores.mse.items()
+        },
+        "run_time_s": scores.timing,
+    }
+
+
+def _exports(bundle: Bundle) -> list[dict[str, Any]]:
+    unit = ", ".join(sorted({str(output["unit"]) for output in bundle.outputs}))
+    return [
+        {
+            "format": one.format,
+            "file": f"{bundle.folder.name}/{one.name}",
+            "largest_difference": one.largest_difference,
+            "tolerance": one.tolerance,
+            "unit": unit,
+        }
+        for one in bundle.files
+    ]
