@@ -1,0 +1,40 @@
+"""The site: `make docs` builds it, with every page of the gallery run anew."""
+
+import os
+
+import sysid
+
+project = "System-identification workbench"
+author = "The system-identification workbench developers"
+release = version = sysid.__version__
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx.ext.mathjax",
+    "sphinx_copybutton",
+]
+exclude_patterns = ["receivers"]
+html_theme = "furo"
+html_title = "sysid"
+html_static_path = ["_static"]
+html_theme_options = {"navigation_with_keys": True}
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+# Links from a page to files of the repository (reports, YAML) are checked by the tests, not here.
+suppress_warnings = ["myst.xref_missing", "mystnb.unknown_mime_type"]
+
+# A notebook that fails fails the build. The cache spares those that did not change.
+nb_execution_mode = os.environ.get("SYSID_NOTEBOOKS", "cache")
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120
+nb_merge_streams = True
+
+autodoc_typehints = "none"  # they stand in the signatures, and their meaning in the text
+autodoc_member_order = "bysource"
+autoclass_content = "class"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_rtype = False
