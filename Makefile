@@ -34,8 +34,8 @@ types: setup
 bench: setup  ## the benchmarks, not part of the tests
 	$(BIN)/python -m tests.benchmarks
 
-docs: setup  ## the API reference, from the docstrings
-	$(BIN)/python -m pdoc --docformat google --output-directory build/docs sysid '!sysid.testing'
+docs: setup  ## the documentation site; every notebook of its gallery is run
+	$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doctrees docs build/docs
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache

@@ -24,13 +24,14 @@ html_theme_options = {"navigation_with_keys": True}
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 # Links from a page to files of the repository (reports, YAML) are checked by the tests, not here.
-suppress_warnings = ["myst.xref_missing", "mystnb.unknown_mime_type"]
+suppress_warnings = ["myst.xref_missing", "mystnb.unknown_mime_type", "mystnb.lexer", "myst-nb.lexer"]
 
 # A notebook that fails fails the build. The cache spares those that did not change.
 nb_execution_mode = os.environ.get("SYSID_NOTEBOOKS", "cache")
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_merge_streams = True
+nb_render_markdown_format = "myst"
 
 autodoc_typehints = "none"  # they stand in the signatures, and their meaning in the text
 autodoc_member_order = "bysource"

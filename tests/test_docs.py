@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import ast
 import importlib
+import os
 import re
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted([*ROOT.glob("docs/*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
+PAGES = sorted([*ROOT.glob("docs/**/*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
 BLOCK = re.compile(r"^```python[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NAMED = re.compile(r"^```python (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+CELL = re.compile(r"^```\{code-cell\} ipython3\n(?::\w[^\n]*\n)*(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]+)\)")
 NAME = re.compile(r"`(sysid(?:\.\w+)+)")
 
@@ -54,6 +60,39 @@ def test_matlab_s_workflow_runs_as_the_page_tells_it(
     told = capsys.readouterr().out
     assert told.splitlines()[0].split() == ["free", "run,", "fit", "in", "percent", "record"]
     assert float(told.splitlines()[-1].split()[-1]) == 100.0
+
+
+@pytest.mark.parametrize("page", sorted(ROOT.glob("docs/gallery/*.md")), ids=name_of)
+def test_a_notebook_of_the_gallery_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.chdir(page.parent)
+    names: dict[str, object] = {}
+    for cell in CELL.findall(page.read_text(encoding="utf-8")):
+        exec(compile(cell, page.name, "exec"), names)  # noqa: S102 - our own page
+
+
+def blocks_of(page: str) -> list[tuple[str, str]]:
+    return NAMED.findall((ROOT / "docs" / page).read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(("name", "block"), blocks_of("python.md"), ids=[name for name, _ in blocks_of("python.md")])
+def test_an_example_of_the_python_page_runs_in_a_few_lines(
+    name: str, block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert len([line for line in block.splitlines() if line.strip()]) <= 9, "eight lines, and what is imported"
+    exec(compile(block, name, "exec"), {})  # noqa: S102 - our own page
+    assert (tmp_path / Path(name).stem / "model.json").is_file()
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
+    command += ["-d", str(tmp_path / "trees"), str(ROOT / "docs"), str(tmp_path / "html")]
+    environment = {**os.environ, "SYSID_NOTEBOOKS": "off"}
+    done = subprocess.run(command, check=False, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "html" / "gallery" / "tanks.html").is_file()
 
 
 @pytest.mark.parametrize("word", ["narxnet", "closeloop", "trainbr", "tfest", "arx", "compare", "resid", "genFunction"])

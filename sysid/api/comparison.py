@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -95,12 +95,11 @@ class Comparison:
         for label, evaluation in self.evaluations.items():
             output, unit = self.outputs.get(label, ("output", ""))
             for case, found in evaluation.cases.items():
-                panel = panels.setdefault(
-                    (output, case),
-                    Overlay(
-                        case=case, output=output, unit=unit, time=found.time, target=found.target, runs={}, fits={}
-                    ),
-                )
+                mine = Overlay(case=case, output=output, unit=unit, time=found.time, target=found.target)
+                panel = panels.setdefault((output, case), mine)
+                if len(panel.time) < len(mine.time):
+                    # A model that needs fewer samples to begin with shows more of the measurement.
+                    panel = panels[output, case] = replace(panel, time=mine.time, target=mine.target)
                 panel.runs[label], panel.fits[label] = found.simulated, found.free_run.nrmse_fit
         return comparison_figure(list(panels.values()))
 

@@ -117,6 +117,7 @@ class Start:
     n_measured: int = 0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "kind", StartKind(self.kind))  # so that "measured" may be written
         fits = (
             self.n_measured >= 0
             if self.kind is StartKind.ESTIMATED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from contextlib import AbstractContextManager
 from typing import Any, Final
 
@@ -63,6 +64,16 @@ def styled() -> AbstractContextManager[None]:
     return mpl.rc_context(_STYLE)
 
 
+class Drawing(Figure):
+    """A figure that a notebook shows by itself: pyplot, which does that otherwise, is never imported here."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        with styled():
+            self.savefig(buffer, format="png", dpi=110)
+        return buffer.getvalue()
+
+
 def new_figure(width: float, height: float, *, fixed: bool = False) -> Figure:
     """An empty figure; call it, and everything that draws on it, inside :func:`styled`.
 
@@ -76,4 +87,4 @@ def new_figure(width: float, height: float, *, fixed: bool = False) -> Figure:
     """
     layout: Any = {"figure.constrained_layout.use": not fixed}
     with mpl.rc_context(layout):
-        return Figure(figsize=(width, height))
+        return Drawing(figsize=(width, height))
