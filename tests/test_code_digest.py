@@ -18,9 +18,9 @@ import sysid
 from sysid import code_digest as module
 from sysid.code_digest import code_digest, look_again, reached
 from sysid.estimation import Training
+from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, NARX, AbstractStructure, Mapping, NeuralStateSpace, TransferFunction
 from sysid.traces import Channel, Trace
-from sysid.workbench.fits.steps import FITTED_BY
 
 PLANT = {
     "__init__.py": '''"""A plant."""
@@ -256,7 +256,7 @@ def missed(ran: set[str], covered: set[str]) -> set[str]:
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_everything_that_a_fit_runs_is_covered(kind: str) -> None:
     structure, options = STRUCTURES[kind]
-    roots = FITTED_BY[type(structure)]
+    roots = estimator_of(structure).runs
     fit, ran = functions_run(lambda: roots[0](TRACES, MAPPING, structure, **options))
     assert len(ran) > 20
     assert missed(ran, reached(*roots)) == set()
@@ -265,7 +265,9 @@ def test_everything_that_a_fit_runs_is_covered(kind: str) -> None:
 
 def test_a_kernel_concerns_the_fits_that_run_it() -> None:
     kernel = "sysid.kernels.recursion:free_run"
-    concerned = {kind for kind, (structure, _) in STRUCTURES.items() if kernel in reached(*FITTED_BY[type(structure)])}
+    concerned = {
+        kind for kind, (structure, _) in STRUCTURES.items() if kernel in reached(*estimator_of(structure).runs)
+    }
     assert "NARX" in concerned
     assert not {"ARX", "TransferFunction"} & concerned
 

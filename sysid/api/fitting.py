@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit, SystemFit
 from sysid.errors import ConfigError
-from sysid.estimation import (
-    FitResult,
-    Training,
-    fit_arx,
-    fit_narx,
-    fit_neural_state_space,
-    fit_transfer_function,
-)
+from sysid.estimation import FitResult, StabilityOptions, estimators
+from sysid.estimation.estimators import Options
 from sysid.ingest import READERS, load_dataset, read_trace
-from sysid.models import ARX, NARX, AbstractStructure, Mapping, NeuralStateSpace, Start, TransferFunction, VectorMapping
+from sysid.models import AbstractStructure, Mapping, Start, VectorMapping
 from sysid.traces import Role, TraceSet
-
-_NETWORKS: dict[type[AbstractStructure], Callable[..., FitResult]] = {
-    NARX: fit_narx,
-    NeuralStateSpace: fit_neural_state_space,
-}
 
 
 def load(source: str | Path) -> TraceSet:
@@ -57,11 +44,12 @@ def fit(
     traces: TraceSet,
     mapping: str | Mapping,
     structure: AbstractStructure,
-    training: Training | None = None,
+    training: Options | None = None,
     *,
     start: Start = ESTIMATED,
     rest_output: float | None = None,
     initial: FitResult | None = None,
+    stability: StabilityOptions = StabilityOptions(),  # noqa: B008 - frozen
 ) -> Fit | SystemFit:
     """Fit one structure to the traces whose role is estimation; those for selection choose between starts.
 
@@ -70,45 +58,24 @@ def fit(
         mapping: Which channels go in, which come out: ``"u1+u2 -> y"``, or ``"u1+u2 -> y1+y2"``, where each output gets
             a model of the structure and all of them are run as one.
         structure: What is fitted.
-        training: How a network is trained; nothing to choose for a linear model.
+        training: How a network is trained, or a transfer function; an ARX model has nothing to choose.
         start: How each free run begins.
         rest_output: The output's value at rest, in its unit; needed where ``start`` is rest.
-        initial: A network of the same structure to begin with: an open-loop fit whose loop is to be closed.
+        initial: A fit to begin with: of the same network, whose loop is to be closed, of a smaller one, or of an ARX
+            model over its lags.
+        stability: How the free run is checked: by default over 1,000 random sequences, in some seconds;
+            ``StabilityOptions(count=0)`` asks nothing.
 
     Returns:
-        The fit: its model, how it ended, its history.
+        The fit: its model, how it ended, its history; its status is ``UNSTABLE`` where its free run is.
 
     Raises:
-        ConfigError: If no trace is for estimation, or no estimator belongs to the structure.
+        ConfigError: If no trace is for estimation, no estimator belongs to the structure, or what is given does not
+            apply to it.
         ChannelError: If a channel of the mapping is missing.
     """
     chosen = _single(VectorMapping.parse(mapping)) if isinstance(mapping, str) else (mapping,)
-    fits = {
-        one.output: Fit.of(
-            _fit(traces, one, structure, training, start=start, rest_output=rest_output, initial=initial), traces, start
-        )
-        for one in chosen
-    }
-    return SystemFit.of(fits) if len(fits) > 1 else next(iter(fits.values()))
-
-
-def _single(mapping: VectorMapping) -> tuple[Mapping, ...]:
-    """One mapping an output, all of the same inputs."""
-    return tuple(Mapping(inputs=mapping.inputs, output=output) for output in mapping.outputs)
-
-
-def _fit(
-    traces: TraceSet,
-    chosen: Mapping,
-    structure: AbstractStructure,
-    training: Training | None,
-    *,
-    start: Start,
-    rest_output: float | None,
-    initial: FitResult | None,
-) -> FitResult:
-    estimation = traces.with_role(Role.ESTIMATION)
-    common: dict[str, Any] = {"start": start, "rest_output": rest_output}
+    estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)
     if not estimation:
         raise ConfigError(
             "no trace is for estimation",
@@ -117,18 +84,23 @@ def _fit(
             got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
             remedy="give one that role",
         )
-    if isinstance(structure, ARX):
-        return fit_arx(estimation, chosen, structure, **common)
-    selection = traces.with_role(Role.SELECTION)
-    if isinstance(structure, TransferFunction):
-        return fit_transfer_function(estimation, chosen, structure, selection=selection, **common)
-    if initial is not None:
-        common["initial"] = initial
-    if type(structure) in _NETWORKS:
-        return _NETWORKS[type(structure)](estimation, chosen, structure, training, selection=selection, **common)
-    raise ConfigError(
-        "no estimator belongs to the structure",
-        expected="ARX, TransferFunction, NARX or NeuralStateSpace",
-        got=type(structure).__name__,
-        remedy="see sysid.estimation for more",
-    )
+    fits: dict[str, Fit] = {}
+    for one in chosen:
+        found = estimators.fit(
+            estimation,
+            one,
+            structure,
+            training,
+            start=start,
+            rest_output=rest_output,
+            selection=selection,
+            initial=initial,
+            stability=stability,
+        )
+        fits[one.output] = Fit.of(found, traces, start)
+    return SystemFit.of(fits) if len(fits) > 1 else next(iter(fits.values()))
+
+
+def _single(mapping: VectorMapping) -> tuple[Mapping, ...]:
+    """One mapping an output, all of the same inputs."""
+    return tuple(Mapping(inputs=mapping.inputs, output=output) for output in mapping.outputs)

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.estimation import Training
+from sysid.estimation import StabilityOptions, Training, estimators
 from sysid.models import NARX, AbstractStructure, Limit, Mapping
 
 Level = float | str
@@ -79,6 +79,8 @@ class Member(Standing):
         rest: The output at rest, in its unit.
         candidates: Fits of each structure from different seeds, among which the whole chooses.
         traces: Estimation traces that it is fitted on, the first so many; all by default.
+        stability: How its free run is checked when it is fitted alone. By default the check changes no choice, for a
+            member is chosen by the error of the whole; the fit's status says what it found.
 
     Raises:
         ConfigError: If a structure is no NARX or does not fit the mapping, or a number is too small.
@@ -90,12 +92,13 @@ class Member(Standing):
     rest: float
     candidates: int = 1
     traces: int | None = None
+    stability: StabilityOptions | None = field(default_factory=lambda: StabilityOptions(choose=False))
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "alternatives", tuple(self.alternatives))
         for structure in (self.structure, *self.alternatives):
-            _check_structure(self.mapping, structure)
+            _check_structure(self.mapping, structure, self.training)
         for name, value, least in (("candidates", self.candidates, 0), ("traces", self.traces, 1)):
             if value is not None and value < least:
                 raise ConfigError(
@@ -140,19 +143,21 @@ class Member(Standing):
             "training": {**asdict(self.training), "loop": self.training.loop.value},
             "rest": self.rest,
             "traces": self.traces,
+            "stability": None if self.stability is None else self.stability.terms,
         }
 
 
-def _check_structure(mapping: Mapping, structure: AbstractStructure) -> None:
-    if not isinstance(structure, NARX):
+def _check_structure(mapping: Mapping, structure: AbstractStructure, training: Training) -> None:
+    row = estimators.estimator_of(structure)
+    if not row.joins:
         raise ConfigError(
-            f"{mapping} is {structure.kind}",
+            f"{row.name} cannot be a member of a whole",
             where="structure",
-            expected="NARX; 0 neurons make it linear",
+            expected=f"{', '.join(estimators.JOINING)} for {mapping}; without neurons it is linear",
             got=structure.kind,
-            remedy="use the kind NARX",
+            remedy=f"use the kind {estimators.JOINING[0]}",
         )
-    structure.lags(len(mapping.inputs))
+    estimators.check(structure, len(mapping.inputs), training=training)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ from sysid.composite.members import (
 )
 from sysid.composite.plan import OneStep
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult, Training, fit_narx
+from sysid.estimation import FitResult, Training, estimators
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.warm_start import grown, widened
 from sysid.estimation.result import Loop, Status
@@ -53,7 +53,7 @@ def fit_member(
     Returns:
         The fit, over the names of its first instance.
     """
-    return fit_narx(
+    return estimators.fit(
         own_traces(member, traces[: member.traces]),
         member.mapping,
         member.structure,
@@ -61,6 +61,7 @@ def fit_member(
         rest_output=member.rest,
         selection=own_traces(member, selection),
         initial=initial,
+        stability=member.stability,
         on_progress=report,
     )
 
@@ -80,7 +81,7 @@ def one_step_of(member: Member, asked: OneStep) -> Member:
         loop=Loop.OPEN, max_iterations=asked.max_iterations, starts=asked.starts,
         workers=own.workers, stride=own.stride, seed=own.seed,
     )  # fmt: skip
-    return replace(member, training=training)
+    return replace(member, training=training, stability=None)
 
 
 def model_of(fit: FitResult) -> NARXModel:
@@ -181,7 +182,7 @@ def retrain(
         train_time_s=0.0, seed=0,
     )  # fmt: skip
     return fit_member(
-        member.trained(max_iterations=max_iterations, starts=1, prelude=0),
+        replace(member.trained(max_iterations=max_iterations, starts=1, prelude=0), stability=None),
         simulated_inputs(others, estimation[: member.traces]),
         simulated_inputs(others, selection),
         report,

@@ -15,6 +15,7 @@ from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.vector_narx import fit_vector_narx
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.estimation.result import Evidence, FitResult, Loop, Status
+from sysid.estimation.stability import StabilityOptions
 
 __all__ = [
     "Attempt",
@@ -26,6 +27,7 @@ __all__ = [
     "Loop",
     "OperatingPoint",
     "Posterior",
+    "StabilityOptions",
     "Status",
     "Training",
     "TransferFunctionTraining",

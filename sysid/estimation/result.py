@@ -92,7 +92,7 @@ class FitResult:
         posterior: Of a network's parameters, where there is one; stored beside the JSON values, as arrays.
         attempts: Every start at every look, where several were raced.
         stability: What a check of the free run over random sequences found, as JSON values; ``None`` where there was
-            none (see :mod:`sysid.validation.stability`).
+            none (see :mod:`sysid.estimation.stability.free_run`).
         notes: Sentences worth knowing: choices made, stability.
     """
 

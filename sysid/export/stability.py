@@ -6,11 +6,11 @@ from typing import Any
 
 from sysid.errors import TraceError
 from sysid.estimation.result import Status
+from sysid.estimation.stability.free_run import SEQUENCES, Stability, check_stability
+from sysid.estimation.stability.sequences import Excursions
 from sysid.export.verification import FOLDER
 from sysid.models import AbstractModel
 from sysid.traces import Role, TraceSet
-from sysid.validation.sequences import Excursions
-from sysid.validation.stability import SEQUENCES, Stability, check_stability
 
 WORST = f"{FOLDER}/worst.csv"
 """The worst sequence in a bundle."""

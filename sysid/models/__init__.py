@@ -10,7 +10,7 @@ from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.form import AbstractForm
 from sysid.models.history import History, Start, StartKind
 from sysid.models.interpolation import Line
-from sysid.models.lags import Lags
+from sysid.models.lags import Lagged, Lags
 from sysid.models.mapping import Mapping
 from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_form import NeuralForm
@@ -38,6 +38,7 @@ __all__ = [
     "Domain",
     "Ends",
     "History",
+    "Lagged",
     "Lags",
     "Limit",
     "Line",

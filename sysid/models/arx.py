@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel, AbstractStructure
-from sysid.models.lags import Lags
+from sysid.models.lags import Lagged, Lags
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
@@ -43,6 +43,7 @@ class ARX(AbstractStructure):
     intercept: bool = True
 
     kind = "ARX"
+    per_input = ("nb", "nk")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nb", _each(self.nb))
@@ -67,6 +68,11 @@ class ARX(AbstractStructure):
         """The regressors."""
         inputs = tuple(tuple(range(nk, nk + nb)) for nb, nk in zip(self.nb, self.nk, strict=True))
         return Lags(inputs=inputs, output=tuple(range(1, self.na + 1)))
+
+    def lagged(self, n_inputs: int) -> Lagged:
+        """Linear in its regressors."""
+        del n_inputs
+        return Lagged(lags=self.lags)
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
@@ -136,6 +142,11 @@ class ARXModel(AbstractModel):
     def poles(self) -> NDArray[np.complex128]:
         """Poles in the z plane, shape ``(na,)``; a free run is stable if all lie inside the unit circle."""
         return np.asarray(np.roots([1.0, *(-self.a)]), dtype=np.complex128)
+
+    @property
+    def pole_radius(self) -> float:
+        """Magnitude of the largest pole; 0 without any."""
+        return float(np.abs(self.poles).max(initial=0.0))
 
     @property
     def recursion(self) -> Recursion:

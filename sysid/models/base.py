@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import ConfigError
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
+from sysid.models.lags import Lagged
 from sysid.models.mapping import Mapping
 
 
@@ -28,6 +30,53 @@ class AbstractStructure(ABC):
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values, with ``kind``."""
+
+    per_input: tuple[str, ...] = ()
+    """Fields that hold one number per input."""
+
+    def lagged(self, n_inputs: int) -> Lagged | None:
+        """What its one-step map is made of, where that is a function of lagged samples.
+
+        Args:
+            n_inputs: Inputs of the mapping.
+
+        Returns:
+            The parts; ``None`` for a structure with hidden states.
+        """
+        del n_inputs
+        return None
+
+    def resized(self, neurons: int) -> AbstractStructure | None:
+        """The same structure with another number of neurons.
+
+        Args:
+            neurons: How many.
+
+        Returns:
+            The other one; ``None`` where neurons are not what makes it larger.
+        """
+        del neurons
+        return None
+
+    def check_inputs(self, n_inputs: int) -> None:
+        """Refuse a number of inputs that the structure is not for.
+
+        Args:
+            n_inputs: Inputs of the mapping.
+
+        Raises:
+            ConfigError: If a field does not have one entry per input.
+        """
+        for name in self.per_input:
+            given = getattr(self, name)
+            if given is not None and len(given) != n_inputs:
+                raise ConfigError(
+                    "the orders do not match the inputs",
+                    where=name,
+                    expected=f"{n_inputs} values of {name}, one for each input",
+                    got=f"{len(given)} values",
+                    remedy=f"give one {name} for each input of the mapping",
+                )
 
 
 class AbstractModel(ABC):
@@ -61,6 +110,11 @@ class AbstractModel(ABC):
     @abstractmethod
     def recursion(self) -> AbstractForm:
         """The form that is run and exported."""
+
+    @property
+    def pole_radius(self) -> float | None:
+        """Magnitude of the largest pole from sample to sample; ``None`` for a model that is not linear."""
+        return None
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:

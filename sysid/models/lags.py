@@ -98,3 +98,48 @@ class Lags:
     def output_lag(self) -> NDArray[np.int64]:
         """Lag of each output regressor, shape ``(n_output_regressors,)``."""
         return np.array(self.output, dtype=np.int64)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lagged:
+    """What a one-step map over lagged samples is made of: whether one structure contains another is read off it.
+
+    Args:
+        lags: The regressors.
+        neurons: How many, 0 for a linear map.
+        linear: Whether a linear part stands beside them.
+        gated: Whether each neuron is a gate.
+    """
+
+    lags: Lags
+    neurons: int = 0
+    linear: bool = True
+    gated: bool = False
+
+    def contains(self, other: Lagged) -> bool:
+        """Whether another map is this one with some weights of zero.
+
+        Args:
+            other: The map that is to be contained.
+
+        Returns:
+            Whether it is.
+
+        Example:
+            >>> lags = Lags(inputs=((0, 1),), output=(1,))
+            >>> Lagged(lags=lags, neurons=4).contains(Lagged(lags=Lags(inputs=((1,),), output=(1,))))
+            True
+        """
+        ours, theirs = self.lags, other.lags
+        return (
+            ours.n_inputs == theirs.n_inputs
+            and all(set(few) <= set(many) for many, few in zip(ours.inputs, theirs.inputs, strict=True))
+            and set(theirs.output) <= set(ours.output)
+            and other.neurons <= self.neurons
+            and other.linear <= self.linear
+            and other.gated <= self.gated
+        )
+
+    def __str__(self) -> str:
+        inputs, output = list(map(list, self.lags.inputs)), list(self.lags.output)
+        return f"input lags {inputs}, output lags {output}, {self.neurons}{' gated' * self.gated} neurons"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel, AbstractStructure
-from sysid.models.lags import Lags, LagSpec, parse_lags
+from sysid.models.lags import Lagged, Lags, LagSpec, parse_lags
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
@@ -119,6 +119,24 @@ class NARX(AbstractStructure):
             )
         inputs = self.input_delays * n_inputs if len(self.input_delays) == 1 else self.input_delays
         return Lags(inputs=inputs, output=self.output_delays)
+
+    def lagged(self, n_inputs: int) -> Lagged:
+        """Neurons over its regressors, with or without a linear part and gates."""
+        return Lagged(lags=self.lags(n_inputs), neurons=self.neurons, linear=self.feedthrough, gated=self.gated)
+
+    def resized(self, neurons: int) -> NARX:
+        """The same delays with another number of neurons; 0 leave the linear part."""
+        return NARX(
+            input_delays=self.input_delays,
+            output_delays=self.output_delays,
+            neurons=neurons,
+            feedthrough=self.feedthrough,
+            gated=self.gated and neurons > 0,
+        )
+
+    def check_inputs(self, n_inputs: int) -> None:
+        """Refuse as many sets of input delays as are neither one nor one per input."""
+        self.lags(n_inputs)
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""

@@ -50,6 +50,7 @@ class TransferFunction(AbstractStructure):
     intercept: bool = True
 
     kind = "TransferFunction"
+    per_input = ("poles", "zeros", "delays")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "poles", tuple(self.poles))
@@ -199,6 +200,13 @@ class TransferFunctionModel(AbstractModel):
         """
         b = self.numerator(j)
         return np.asarray(np.roots(b if self.orders.domain is Domain.DISCRETE else b[::-1]), dtype=np.complex128)
+
+    @property
+    def pole_radius(self) -> float:
+        """Magnitude of the largest pole from sample to sample; a pole ``s`` becomes ``exp(s T)``."""
+        poles = np.concatenate([self.poles(j) for j in range(len(self.sections))])
+        discrete = self.orders.domain is Domain.DISCRETE
+        return float(np.max(np.abs(poles) if discrete else np.exp(poles.real * self.sample_time), initial=0.0))
 
     @property
     def stable(self) -> bool:

@@ -1,13 +1,13 @@
 """Models and traces in, figures of merit out."""
 
+from sysid.estimation.stability.free_run import Stability, check_stability
+from sysid.estimation.stability.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
 from sysid.validation.evaluate import CaseResult, Evaluation, evaluate, evaluate_case
 from sysid.validation.evaluate_cascade import CascadeEvaluation, evaluate_cascade
 from sysid.validation.intervals import CaseIntervals, Coverage, OutputInterval, predict_interval
 from sysid.validation.linearity import Linearity, judge_linearity
 from sysid.validation.metrics import Figures, figures
 from sysid.validation.residuals import ResidualAnalysis, analyse_residuals
-from sysid.validation.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
-from sysid.validation.stability import Stability, check_stability
 
 __all__ = [
     "AbstractSequences",

@@ -7,39 +7,39 @@ import difflib
 import inspect
 import typing
 from collections.abc import Mapping as Dict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, create_model
 
 from sysid.errors import ConfigError
-from sysid.estimation import JointTraining, Training
+from sysid.estimation import JointTraining, Training, TransferFunctionTraining
+from sysid.estimation.estimators import ESTIMATORS, Estimator, estimator_of
 from sysid.export.exporters import EXPORTERS
-from sysid.models import (
-    ARX,
-    NARX,
-    AbstractStructure,
-    Mapping,
-    NeuralStateSpace,
-    Start,
-    StartKind,
-    TransferFunction,
-    structure_from_dict,
-)
+from sysid.models import AbstractStructure, Mapping, Start, StartKind, structure_from_dict
 from sysid.models.lags import LagSpec, parse_lags
 from sysid.yaml_files import FieldError
 
 STRICT = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 """A field that is not known is an error; nothing changes once it is read."""
 
-STRUCTURES: dict[str, type[AbstractStructure]] = {
-    structure.kind: structure for structure in (ARX, NARX, NeuralStateSpace, TransferFunction)
-}
+STRUCTURES: dict[str, type[AbstractStructure]] = {kind: row.structure for kind, row in ESTIMATORS.items()}
 """Structures that a pipeline can fit; their fields are those of the classes."""
 
 
-def as_field_error(error: ConfigError) -> FieldError:
-    """A ConfigError of a deeper room, so that pydantic adds where in the YAML it happened."""
-    return FieldError(error.what, expected=error.expected, got=error.got, remedy=error.remedy or "correct the value")
+def as_field_error(error: ConfigError, name: str | None = None) -> FieldError:
+    """A ConfigError of a deeper room, so that pydantic adds where in the YAML it happened.
+
+    Args:
+        error: The error.
+        name: Of the fit that it is about, where the place does not say so.
+
+    Returns:
+        The error that pydantic places.
+    """
+    where = "" if name is None else f"{name}: "
+    return FieldError(
+        f"{where}{error.what}", expected=error.expected, got=error.got, remedy=error.remedy or "correct the value"
+    )
 
 
 def _structure(value: object) -> AbstractStructure:
@@ -218,10 +218,90 @@ if TYPE_CHECKING:
     class TrainingConfig(BaseModel):
         """Options of a network's training, field by field those of :class:`sysid.estimation.Training`."""
 
+    class TransferFunctionConfig(BaseModel):
+        """Those of :class:`sysid.estimation.TransferFunctionTraining`."""
+
     class JointConfig(BaseModel):
         """Options of a cascade's training, field by field those of :class:`sysid.estimation.JointTraining`."""
 
 else:
     # The fields are read off the dataclass: an option added to the training appears in the YAML by itself.
     TrainingConfig = create_model("TrainingConfig", __config__=STRICT, **_fields_of(Training))
+    TransferFunctionConfig = create_model(
+        "TransferFunctionConfig", __config__=STRICT, **_fields_of(TransferFunctionTraining)
+    )
     JointConfig = create_model("JointConfig", __config__=STRICT, **_fields_of(JointTraining))
+
+OptionsConfig = TrainingConfig | TransferFunctionConfig
+"""Options that some structure takes, as the YAML has them."""
+
+_OPTIONS: dict[type, type[BaseModel]] = {
+    Training: TrainingConfig,
+    TransferFunctionTraining: TransferFunctionConfig,
+}
+
+
+def options_config(structure: AbstractStructure, value: object) -> Any:
+    """The options of a structure's training, checked by name, type and whether they apply to it.
+
+    Args:
+        structure: What is to be fitted.
+        value: Options by name, or such options that are read already; ``None`` for none.
+
+    Returns:
+        The options; ``None`` for none.
+
+    Raises:
+        FieldError: If the structure takes none, has no such option, or one does not apply to it.
+    """
+    if value is None:
+        return None
+    if isinstance(value, BaseModel):
+        value = given_options(value)
+    if not isinstance(value, Dict):
+        raise FieldError(
+            "not options of a training", expected="options by name", got=repr(value), remedy="write {name: value}"
+        )
+    row = estimator_of(structure)
+    if row.training is None:
+        raise as_field_error(row.takes_none(value))
+    config = options_of(row)
+    for name in value:
+        if name not in config.model_fields:
+            near = difflib.get_close_matches(str(name), config.model_fields, n=1)
+            raise FieldError(
+                f"unknown field {name!r}",
+                expected=f"one of {', '.join(config.model_fields)}",
+                got=str(name),
+                remedy=f"did you mean {near[0]}?" if near else f"remove it: {row.name} has no such option",
+            )
+    checked = config.model_validate(value)
+    try:
+        row.options(given_options(checked), seed=0)
+    except ConfigError as error:
+        raise as_field_error(error) from error
+    return checked
+
+
+def options_of(row: Estimator) -> type[BaseModel]:
+    """The options of an estimator as the YAML has them.
+
+    Args:
+        row: Its row, of one that takes options.
+
+    Returns:
+        The pydantic model.
+    """
+    return _OPTIONS[cast("type", row.training)]
+
+
+def given_options(config: BaseModel | None) -> dict[str, Any] | None:
+    """The options that the YAML names, without the defaults.
+
+    Args:
+        config: The options as read.
+
+    Returns:
+        Options by name; ``None`` for none.
+    """
+    return None if config is None else {name: getattr(config, name) for name in config.model_fields_set}

@@ -19,7 +19,11 @@ def test_a_member_writes_one_channel_for_each_of_its_instances():
 @pytest.mark.parametrize(
     ("declare", "said"),
     [
-        pytest.param(lambda: member("a -> b", structure=ARX(na=1, nb=[1], nk=[1])), "is ARX", id="no network"),
+        pytest.param(
+            lambda: member("a -> b", structure=ARX(na=1, nb=[1], nk=[1])),
+            "an ARX model cannot be a member",
+            id="no network",
+        ),
         pytest.param(
             lambda: member("a -> b", structure=NARX(input_delays=[[0], [0]], output_delays=1, neurons=1)),
             "input",

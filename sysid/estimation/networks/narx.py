@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError
+from sysid.errors import ChannelError
 from sysid.estimation.least_squares.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
@@ -27,9 +28,9 @@ from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import Experiment, RecursionProvider, experiments_of, unit_range
 from sysid.estimation.networks.raced import raced_result, raced_status
 from sysid.estimation.networks.training import FitProgress, Training
-from sysid.estimation.networks.warm_start import grown
+from sysid.estimation.networks.warm_start import check_initial, grown
 from sysid.estimation.result import FitResult, Loop
-from sysid.models import NARX, ARXModel, History, Mapping, NARXModel, Start
+from sysid.models import NARX, History, Mapping, NARXModel, Recursion, Start
 from sysid.traces import Trace
 
 
@@ -281,19 +282,12 @@ def _initial_parameters(
     """Plain parameters of the first start; what the initial fit lacks is drawn as a random start draws it."""
     if initial is None:
         return None
-    if not isinstance(initial.model, ARXModel | NARXModel):
-        raise ConfigError(
-            "the initial fit is neither a network nor an ARX model",
-            where="initial",
-            expected=f"{template.network.label}, a smaller network, or an ARX model over its lags",
-            got=initial.model.structure.label,
-            remedy="name such a fit, or leave initial out",
-        )
+    check_initial(template.network, initial.model.structure, len(template.mapping.inputs))
     if isinstance(initial.model, NARXModel) and _same(initial.model, template):
         return initial.model.theta
     centre = np.linalg.solve(to_plain, layout.centre())
     fresh = to_plain @ layout.draw(np.random.default_rng(seed), np.asarray(centre, dtype=np.float64))
-    return grown(initial.model.recursion, template.recursion, fresh)
+    return grown(cast("Recursion", initial.model.recursion), template.recursion, fresh)
 
 
 def _same(model: NARXModel, template: NARXModel) -> bool:

@@ -64,22 +64,7 @@ def fit_neural_state_space(
     """
     began = time.perf_counter()
     training, start = training or Training(), start or Start()
-    if training.loop is not Loop.CLOSED:
-        raise ConfigError(
-            "a neural state space has no open loop",
-            where="loop",
-            expected="closed",
-            got=training.loop.value,
-            remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
-        )
-    strangers = [name for name in LAGGED_ONLY if getattr(training, name) != getattr(Training(), name)]
-    if strangers:
-        raise ConfigError(
-            f"a neural state space is not trained with {', '.join(strangers)}",
-            where="training",
-            expected="options that do not concern lagged regressors",
-            remedy=f"leave out {', '.join(strangers)}",
-        )
+    check_training(training)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = experiments_of(traces, mapping, start, rest)
     template = _template(traces[0], mapping, network, experiments, rest)
@@ -103,6 +88,33 @@ def fit_neural_state_space(
     status = raced_status(choice.chosen, candidates, records, interrupted=race.stop.is_set())
     seconds = race.checkpoints.earlier_s + time.perf_counter() - began
     return raced_result(choice, candidates, training, status, seconds)
+
+
+def check_training(training: Training) -> None:
+    """Refuse what does not apply to hidden states.
+
+    Args:
+        training: How to train.
+
+    Raises:
+        ConfigError: If it is for one step ahead, or has options that are for lagged regressors alone.
+    """
+    if training.loop is not Loop.CLOSED:
+        raise ConfigError(
+            "a neural state space has no open loop",
+            where="loop",
+            expected="closed",
+            got=training.loop.value,
+            remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
+        )
+    strangers = [name for name in LAGGED_ONLY if getattr(training, name) != getattr(Training(), name)]
+    if strangers:
+        raise ConfigError(
+            f"a neural state space is not trained with {', '.join(strangers)}",
+            where="training",
+            expected="options that do not concern lagged regressors",
+            remedy=f"leave out {', '.join(strangers)}",
+        )
 
 
 def _template(

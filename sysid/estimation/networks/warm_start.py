@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.networks.initialise import Layout
-from sysid.models import NARX, Lags, NARXModel, Recursion, Scaling
+from sysid.models import NARX, AbstractStructure, Lags, NARXModel, Recursion, Scaling
 
 
 def contains(larger: Lags, smaller: Lags) -> bool:
@@ -42,6 +42,29 @@ def contains(larger: Lags, smaller: Lags) -> bool:
         larger.n_inputs == smaller.n_inputs
         and all(set(few) <= set(many) for many, few in zip(larger.inputs, smaller.inputs, strict=True))
         and set(smaller.output) <= set(larger.output)
+    )
+
+
+def check_initial(network: AbstractStructure, initial: AbstractStructure, n_inputs: int) -> None:
+    """Refuse an initial fit that a network does not contain, before any data are read.
+
+    Args:
+        network: The structure that is to start from it.
+        initial: The structure of the initial fit.
+        n_inputs: Inputs of the mapping.
+
+    Raises:
+        ConfigError: If it has hidden states, other lags, or more neurons.
+    """
+    ours, theirs = network.lagged(n_inputs), initial.lagged(n_inputs)
+    if ours is not None and theirs is not None and ours.contains(theirs):
+        return
+    raise ConfigError(
+        "the initial fit is not contained in the network that is to start from it",
+        where="initial",
+        expected=f"{network.label}, a smaller network over some of its lags, or an ARX model over them",
+        got=initial.label if theirs is None else f"{initial.label}: {theirs}",
+        remedy="start from such a fit, or leave initial out",
     )
 
 

@@ -22,6 +22,7 @@ from sysid.workbench.assembly.stage_config import (
 )
 from sysid.workbench.fields import STRICT
 from sysid.workbench.fits.config import ExportConfig
+from sysid.workbench.stability import ExcursionConfig
 from sysid.yaml_files import FieldError
 
 
@@ -56,6 +57,8 @@ class AssemblyConfig(BaseModel):
             members would be fitted, and ``together`` trains them on, and ``grow``.
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
         limits: Limits of outputs; in its other places a member has those of its first, unless they have their own.
+        stability: How the free run of each candidate is checked by itself. It says so in the candidate's status; by
+            default it changes no choice, for a member is chosen by the error of the whole.
         one_step: Each candidate fitted one step ahead as well, to see what becomes of it in free run.
         retrain: Members to train again on what the others put out.
         together: Training end to end.
@@ -89,6 +92,7 @@ class AssemblyConfig(BaseModel):
     begin: str | None = None
     rest: dict[str, float | str] = Field(default_factory=dict)
     limits: dict[str, LimitConfig] = Field(default_factory=dict)
+    stability: ExcursionConfig = ExcursionConfig(choose=False)
     one_step: OneStepConfig | None = None
     retrain: RetrainConfig | None = None
     together: TogetherConfig | None = None
@@ -106,7 +110,7 @@ class AssemblyConfig(BaseModel):
     def composite(self) -> Composite:
         """What stands in the whole, as it is trained."""
         return Composite(
-            members=tuple(one.member(self.seed) for one in self.members),
+            members=tuple(one.member(self.seed, self.stability.options()) for one in self.members),
             fixed=tuple(one.fixed() for one in self.known),
             rest=self.rest,
             limits={name: Limit(low=one.low, high=one.high) for name, one in self.limits.items()},

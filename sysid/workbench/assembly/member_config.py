@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated, Any, cast
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Field, ValidationInfo, ValidatorFunctionWrapHandler, field_validator, model_validator
 
 from sysid.composite import FixedMember, Member
 from sysid.errors import ConfigError
-from sysid.estimation import Training
+from sysid.estimation import StabilityOptions, Training
 from sysid.models import NARX
-from sysid.workbench.fields import STRICT, MappingField, StructureField, TrainingConfig, as_field_error
+from sysid.workbench.fields import (
+    STRICT,
+    MappingField,
+    StructureField,
+    TrainingConfig,
+    as_field_error,
+    given_options,
+    options_config,
+)
 from sysid.yaml_files import FieldError
 
 
@@ -70,6 +78,12 @@ class MemberConfig(StandingConfig):
     sweep: SweepSource | None = None
     traces: int | None = Field(default=None, ge=1)
 
+    @field_validator("training", mode="wrap")
+    @classmethod
+    def _for_the_structure(cls, value: object, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        structure = info.data.get("structure")  # absent where it is wrong itself, which is told
+        return handler(value) if structure is None else options_config(structure, value)
+
     @model_validator(mode="after")
     def _check(self) -> MemberConfig:
         try:
@@ -85,11 +99,12 @@ class MemberConfig(StandingConfig):
             )
         return self
 
-    def member(self, seed: int) -> Member:
+    def member(self, seed: int, stability: StabilityOptions | None = None) -> Member:
         """The member, as it is trained.
 
         Args:
             seed: Of its first candidate, where its training names none.
+            stability: How its free run is checked.
 
         Returns:
             The member.
@@ -97,15 +112,15 @@ class MemberConfig(StandingConfig):
         Raises:
             ConfigError: If it cannot be trained.
         """
-        given = {} if self.training is None else {n: getattr(self.training, n) for n in self.training.model_fields_set}
         return Member(
             **self.standing(),
             structure=cast("NARX", self.structure),  # the member refuses any other kind
             alternatives=cast("tuple[NARX, ...]", self.alternatives),
-            training=Training(**{"seed": seed, **given}),
+            training=Training(**{"seed": seed, **(given_options(self.training) or {})}),
             rest=self.rest,
             candidates=self.candidates,
             traces=self.traces,
+            stability=stability,
         )
 
 

@@ -7,21 +7,32 @@ import difflib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_validator,
+    model_validator,
+)
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
-from sysid.estimation import Training
-from sysid.models import ARX, NARX, NeuralStateSpace, Start, StartKind, TransferFunction
+from sysid.estimation.estimators import Options, estimator_of
+from sysid.estimation.estimators import check as check_request
+from sysid.models import Start, StartKind
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
     STRICT,
     FormatField,
     MappingField,
+    OptionsConfig,
     StartField,
     StructureField,
-    TrainingConfig,
     as_field_error,
+    given_options,
+    options_config,
 )
 from sysid.workbench.runner.naming import slug
 from sysid.workbench.stability import StabilityConfig
@@ -34,15 +45,15 @@ class FitConfig(BaseModel):
     Args:
         name: Name in tables, different for each fit.
         structure: What is fitted, with its ``kind``.
-        training: How a network is trained; a linear model has nothing to choose.
-        initial: Name of an earlier fit to start from.
+        training: Options of the structure's estimator; an ARX model has nothing to choose.
+        initial: Name of an earlier fit to start from: of the same network, a smaller one, or an ARX model.
     """
 
     model_config = STRICT
 
     name: str = Field(min_length=1)
     structure: StructureField
-    training: TrainingConfig | None = None
+    training: OptionsConfig | None = None
     initial: str | None = None
 
     @property
@@ -50,40 +61,22 @@ class FitConfig(BaseModel):
         """Name of the fit's folder."""
         return slug(self.name)
 
-    @model_validator(mode="after")
-    def _check(self) -> FitConfig:
-        linear = isinstance(self.structure, ARX | TransferFunction)
-        if linear and (self.training is not None or self.initial is not None):
-            raise FieldError(
-                f"the fit {self.name!r} has a training or an initial fit, but is {self.structure.kind}",
-                expected="neither: a linear model finds its own start",
-                remedy="remove training and initial",
-            )
-        if isinstance(self.structure, NeuralStateSpace) and self.initial is not None:
-            raise FieldError(
-                f"the fit {self.name!r} has an initial fit, but is {self.structure.kind}",
-                expected="none: a neural state space begins at the best linear one",
-                remedy="remove initial",
-            )
-        try:
-            self.training_options(seed=0)
-        except ConfigError as error:
-            raise as_field_error(error) from error
-        return self
+    @field_validator("training", mode="wrap")
+    @classmethod
+    def _for_the_structure(cls, value: object, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        structure = info.data.get("structure")  # absent where it is wrong itself, which is told
+        return handler(value) if structure is None else options_config(structure, value)
 
-    def training_options(self, seed: int) -> Training:
+    def training_options(self, seed: int) -> Options | None:
         """The options of the training, with the pipeline's seed where the fit names none.
 
         Args:
             seed: The pipeline's seed.
 
         Returns:
-            The options.
+            The options; ``None`` for a structure that takes none.
         """
-        given: dict[str, Any] = {"seed": seed}
-        if self.training is not None:
-            given |= {name: getattr(self.training, name) for name in self.training.model_fields_set}
-        return Training(**given)
+        return estimator_of(self.structure).options(given_options(self.training), seed=seed)
 
 
 class ExportConfig(BaseModel):
@@ -178,13 +171,6 @@ class PipelineConfig(BaseModel):
                     got=fit.initial,
                     remedy=f"did you mean {near[0]}?" if near else "name a fit that stands above it",
                 )
-            if fit.initial is not None and earlier[fit.initial].structure != fit.structure:
-                raise FieldError(
-                    f"the fit {fit.name!r} has another structure than {fit.initial!r}, which it starts from",
-                    expected=earlier[fit.initial].structure.label,
-                    got=fit.structure.label,
-                    remedy="use one structure for both, or remove initial",
-                )
             earlier[fit.name] = fit
             slugs.add(fit.slug)
         return fits
@@ -212,27 +198,13 @@ class PipelineConfig(BaseModel):
 
     @model_validator(mode="after")
     def _check_inputs(self) -> PipelineConfig:
-        n_inputs = len(self.mapping.inputs)
+        structures = {fit.name: fit.structure for fit in self.fits}
         for fit in self.fits:
-            if isinstance(fit.structure, ARX) and len(fit.structure.nb) != n_inputs:
-                raise FieldError(
-                    f"the orders of the fit {fit.name!r} do not match the inputs",
-                    expected=f"{n_inputs} values of nb and of nk for {self.mapping}",
-                    got=f"{len(fit.structure.nb)} values",
-                    remedy="give one nb and one nk for each input",
-                )
-            if isinstance(fit.structure, TransferFunction) and len(fit.structure.poles) != n_inputs:
-                raise FieldError(
-                    f"the orders of the fit {fit.name!r} do not match the inputs",
-                    expected=f"{n_inputs} numbers of poles and of zeros for {self.mapping}",
-                    got=f"{len(fit.structure.poles)} numbers",
-                    remedy="give one number of poles and of zeros for each input",
-                )
-            if isinstance(fit.structure, NARX):
-                try:
-                    fit.structure.lags(n_inputs)
-                except ConfigError as error:
-                    raise as_field_error(error) from error
+            initial = None if fit.initial is None else structures[fit.initial]
+            try:
+                check_request(fit.structure, len(self.mapping.inputs), initial=initial)
+            except ConfigError as error:
+                raise as_field_error(error, f"the fit {fit.name!r}") from error
         return self
 
     @property

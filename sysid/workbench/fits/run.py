@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +12,7 @@ from typing import Any
 
 from sysid.code_digest import code_digest
 from sysid.errors import ConfigError, SysidError
-from sysid.estimation import FitProgress, FitResult, Training
+from sysid.estimation import FitProgress, FitResult
 from sysid.reporting.comparing.published import read_published
 from sysid.reporting.results import Results, parse_results, read_results, write_results
 from sysid.workbench.fits import steps
@@ -186,7 +187,8 @@ class _Run:
         elif given is not None:
             result = given.make()
         else:
-            progress = _Progress(step=step, training=fit.training_options(config.seed), tell=self._tell)
+            limit = getattr(fit.training_options(config.seed), "max_time_s", math.inf)
+            progress = _Progress(step=step, limit_s=limit, tell=self._tell)
             try:
                 result = steps.fit_traces(fit, config, data, initial.ready.fit if initial else None, progress.report)
             except SysidError as error:
@@ -329,7 +331,7 @@ class _Progress:
     """Turns the iterations of several starts, told from several threads, into one share of the whole."""
 
     step: str
-    training: Training
+    limit_s: float
     tell: events.Watcher
     shares: dict[int, float] = field(default_factory=dict)
     guard: threading.Lock = field(default_factory=threading.Lock)
@@ -338,7 +340,7 @@ class _Progress:
     def report(self, entry: FitProgress) -> None:
         """Told after every iteration of every start."""
         share = min(entry.iteration / entry.max_iterations, 1.0)
-        spent = (time.perf_counter() - self.began) / self.training.max_time_s
+        spent = (time.perf_counter() - self.began) / self.limit_s
         with self.guard:
             # Starts are told about in any order, and some begin again: the share never falls.
             self.shares[entry.start] = max(share, self.shares.get(entry.start, 0.0))

@@ -17,35 +17,19 @@ import numpy as np
 
 from sysid.code_digest import code_digest
 from sysid.errors import ConfigError
-from sysid.estimation import (
-    FitProgress,
-    FitResult,
-    TransferFunctionTraining,
-    fit_arx,
-    fit_narx,
-    fit_neural_state_space,
-    fit_transfer_function,
-)
-from sysid.models import ARX, NARX, AbstractStructure, NeuralStateSpace, TransferFunction
+from sysid.estimation import FitProgress, FitResult, estimators
+from sysid.estimation.estimators import estimator_of
+from sysid.models import AbstractStructure
 from sysid.traces import Role
 from sysid.validation import Evaluation, evaluate, evaluate_case
 from sysid.workbench.annotation import by_state, find_annotator
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.store import digest
-from sysid.workbench.stability import StabilityCheck
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
     from sysid.export.run_times import RunTime
-
-FITTED_BY: Mapping[type[AbstractStructure], tuple[Callable[..., Any], ...]] = {
-    ARX: (fit_arx,),
-    TransferFunction: (fit_transfer_function,),
-    NARX: (fit_narx, StabilityCheck),
-    NeuralStateSpace: (fit_neural_state_space, StabilityCheck),
-}
-"""What a fit of each structure runs."""
 
 STORED_BY = "sysid.workbench.fits.record:write_fit"
 CONFIGURATION = ("sysid.workbench.fits.config", "sysid.workbench.fits.data", "sysid.workbench.fields")
@@ -61,7 +45,7 @@ def fit_code(structure: AbstractStructure) -> str:
     Returns:
         64 hexadecimal digits.
     """
-    return code_digest(*FITTED_BY[type(structure)], STORED_BY)
+    return code_digest(*estimator_of(structure).runs, STORED_BY)
 
 
 def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | None) -> str:
@@ -76,19 +60,15 @@ def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | N
     Returns:
         64 hexadecimal digits.
     """
-    is_arx = isinstance(fit.structure, ARX)
-    network = isinstance(fit.structure, NARX | NeuralStateSpace)
-    training = dataclasses.asdict(fit.training_options(config.seed)) if network else {"seed": config.seed}
+    row, training = estimator_of(fit.structure), fit.training_options(config.seed)
     terms = {
         "structure": fit.structure.to_dict(),
-        "training": None if is_arx else training,
+        "training": None if training is None else dataclasses.asdict(training),
         "initial": initial,
         "traces": [trace.digest for trace in data.estimation],
-        # Least squares has nothing to choose, so that other selection traces do not concern it.
-        "selection": None if is_arx else [trace.digest for trace in data.selection],
-        "stability": {**config.stability.model_dump(), "sequences": [trace.digest for trace in data.sequences]}
-        if network
-        else None,
+        # Where nothing is chosen on them, other selection traces do not concern a fit.
+        "selection": [trace.digest for trace in data.selection] if row.selects else None,
+        "stability": None if row.stability.by_poles else config.stability.options(data.sequences).terms,
         "code": fit_code(fit.structure),
     }
     return digest(_plain(terms | _common(config)))
@@ -128,45 +108,20 @@ def fit_traces(
         The fit.
 
     Raises:
-        ConfigError: If no estimator belongs to the structure.
+        ConfigError: If what is asked does not go together.
     """
-    structure, training_options = fit.structure, fit.training_options(config.seed)
-    common: dict[str, Any] = {"start": config.start, "rest_output": config.rest_output}
-    if isinstance(structure, ARX):
-        return fit_arx(data.estimation, config.mapping, structure, **common)
-    if isinstance(structure, TransferFunction):
-        training = TransferFunctionTraining(seed=config.seed)
-        return fit_transfer_function(
-            data.estimation, config.mapping, structure, training, selection=data.selection, **common
-        )
-    if isinstance(structure, NARX):
-        check = StabilityCheck.of(config.stability, config.mapping, data.estimation, data.sequences)
-        found = fit_narx(
-            data.estimation,
-            config.mapping,
-            structure,
-            training_options,
-            selection=data.selection,
-            initial=initial,
-            vet=check.vet(training_options.loop),
-            on_progress=on_progress,
-            **common,
-        )
-        return check.applied(found)
-    if isinstance(structure, NeuralStateSpace):
-        check = StabilityCheck.of(config.stability, config.mapping, data.estimation, data.sequences)
-        found = fit_neural_state_space(
-            data.estimation,
-            config.mapping,
-            structure,
-            training_options,
-            selection=data.selection,
-            vet=check.vet(training_options.loop),
-            on_progress=on_progress,
-            **common,
-        )
-        return check.applied(found)
-    raise ConfigError(f"no estimator for the structure {structure.kind}", where=f"fit {fit.name}")
+    return estimators.fit(
+        data.estimation,
+        config.mapping,
+        fit.structure,
+        fit.training_options(config.seed),
+        start=config.start,
+        rest_output=config.rest_output,
+        selection=data.selection,
+        initial=initial,
+        stability=config.stability.options(data.sequences),
+        on_progress=on_progress,
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -197,7 +152,7 @@ def scores_key(fit: str, structure: AbstractStructure, data: Data, config: Pipel
     here = ("steps:score", "evidence:residuals", "record:write_scores")
     # What fits a structure names the class of its models, whose methods are run.
     made_by = [f"sysid.workbench.fits.{one}" for one in here]
-    code = code_digest(*made_by, *FITTED_BY[type(structure)], without=CONFIGURATION)
+    code = code_digest(*made_by, *estimator_of(structure).runs, without=CONFIGURATION)
     terms = {
         "fit": fit,
         "traces": data.traces.digest,

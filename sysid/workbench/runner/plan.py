@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from sysid.errors import ConfigError, SysidError
-from sysid.estimation import FitProgress
+from sysid.estimation import FitProgress, Training
+from sysid.estimation.estimators import seedless
 from sysid.estimation.networks.multistart import planned_iterations
-from sysid.models import NARX
 from sysid.reporting.results import Results, read_results
 from sysid.traces import Trace, TraceSet
-from sysid.workbench.fields import TrainingConfig
+from sysid.workbench.fields import TrainingConfig, given_options
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig, read_pipeline
 from sysid.workbench.fits.data import Data, load_data
@@ -103,10 +103,10 @@ def _fit(step: str, fit: FitConfig, config: PipelineConfig, data: Data, store: R
     seconds = _last_time(fit, data, store)
     if seconds is not None:
         return PlannedStep(step=step, stored=False, seconds=seconds, basis="as last time")
-    if not isinstance(fit.structure, NARX):
+    training = fit.training_options(config.seed)
+    if not isinstance(training, Training):
         seconds, basis = _linear(fit, config, data), f"measured now on 1/{SHARE} of the samples"
         return PlannedStep(step=step, stored=False, seconds=seconds, basis=basis)
-    training = fit.training_options(config.seed)
     around, iteration = _calibrate(fit, config, data)
     iterations = planned_iterations(training)
     side_by_side = min(training.workers, training.starts, os.cpu_count() or 1)
@@ -128,7 +128,7 @@ def _last_time(fit: FitConfig, data: Data, store: RunFolder) -> float | None:
     same = next((one for one in last.fits if one.name == fit.name), None)
     if same is None or (same.structure, same.initial) != (fit.structure, fit.initial):
         return None
-    asked = [dataclasses.replace(one.training_options(0), seed=0) for one in (same, fit)]
+    asked = [seedless(one.training_options(0)) for one in (same, fit)]
     lengths = {name: case.samples for name, case in results.data.cases.items()}
     if asked[0] != asked[1] or lengths != {trace.name: len(trace) for trace in data.traces}:
         return None
@@ -153,8 +153,7 @@ def _calibrate(fit: FitConfig, config: PipelineConfig, data: Data) -> tuple[floa
 
 
 def _with(fit: FitConfig, changes: dict[str, Any]) -> TrainingConfig:
-    given = {} if fit.training is None else {n: getattr(fit.training, n) for n in fit.training.model_fields_set}
-    return TrainingConfig(**{**given, **changes})
+    return TrainingConfig(**{**(given_options(fit.training) or {}), **changes})
 
 
 def _linear(fit: FitConfig, config: PipelineConfig, data: Data) -> float:

@@ -12,6 +12,7 @@ from sysid.models import Start, StartKind
 from sysid.reporting.sweep.record import FIGURES
 from sysid.workbench.fields import STRICT, MappingField, StartField, as_field_error
 from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig, ReportConfig
+from sysid.workbench.stability import StabilityConfig
 from sysid.workbench.sweep.search_space import Space, parse_space
 from sysid.yaml_files import FieldError
 
@@ -128,6 +129,8 @@ class SweepConfig(BaseModel):
         workers: Processes that train, one thread each.
         cluster: Address of a Dask scheduler, whose workers then train instead.
         storage: URL of a database that Optuna's own tools can read the trials from.
+        stability: How a network's free run is checked: that of the best trials until one is stable, and of every trial
+            that chooses among several starts.
         beside: Structures, chosen by hand, that are trained like the trials and set beside the winner.
         reproduces: Which published sweep this one repeats to the letter, if it does.
         export: What leaves the workbench; ``null`` for nothing.
@@ -158,6 +161,7 @@ class SweepConfig(BaseModel):
     workers: int = Field(default=2, ge=1)
     cluster: str | None = None
     storage: str | None = None
+    stability: StabilityConfig = StabilityConfig()
     beside: tuple[dict[str, Any], ...] = ()
     reproduces: str | None = None
     export: ExportConfig | None = ExportConfig()
@@ -241,7 +245,7 @@ class SweepConfig(BaseModel):
         Returns:
             Its configuration.
         """
-        shared = ("name", "description", "data", "selection", "mapping", "start", "rest", "seed", "report")
+        shared = ("name", "description", "data", "selection", "mapping", "start", "rest", "seed", "report", "stability")
         given = {name: getattr(self, name) for name in shared}
         export = None if self.export is None else self.export.model_copy(update={"fit": fits[0].name})
         return PipelineConfig(**given, fits=tuple(fits), export=export)

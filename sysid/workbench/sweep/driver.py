@@ -15,9 +15,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sysid.code_digest import code_digest
-from sysid.models import NARX, structure_from_dict
+from sysid.estimation import Training
+from sysid.estimation.estimators import estimator_of
+from sysid.models import structure_from_dict
 from sysid.reporting.sweep.record import FIGURES, Trial
-from sysid.workbench.fits.steps import FITTED_BY
 from sysid.workbench.runner.events import StepProgress, Watcher
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.config import SweepConfig
@@ -31,6 +32,10 @@ FORMAT = 1
 
 LINEAR = {"loop": "open", "max_iterations": 20, "regularisation": 0.0}
 """How the linear fit is made that networks with the same delays may begin from: least squares, in a few steps."""
+
+
+LINEAR_COST = 100.0
+"""Work of a linear fit, in the units of :meth:`Driver.cost`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,8 +102,6 @@ class Driver:
 
     @property
     def _full(self) -> int:
-        from sysid.estimation import Training
-
         return int(self.config.training.get("max_iterations", Training().max_iterations))
 
     def run(self, points: Sequence[Point], *, keep_all: bool = False) -> list[Trial]:
@@ -167,28 +170,46 @@ class Driver:
                 number=point.number,
                 structure=point.structure.to_dict(),
                 training=self._training(point),
-                iterations=rung.iterations if isinstance(point.structure, NARX) else None,
+                iterations=rung.iterations if estimator_of(point.structure).resumes else None,
                 record=rung.record,
                 after=after,
                 resume=resume,
-                cost=_cost(point, (rung.iterations - done) * rung.record),
+                cost=self.cost(point, (rung.iterations - done) * rung.record),
             )
         )
 
     def _training(self, point: Point) -> dict[str, Any]:
-        if not isinstance(point.structure, NARX) and not point.training:
+        if estimator_of(point.structure).training is not Training and not point.training:
             return {}
         return {"seed": point.seed(self.config.seed), **point.training}
 
     def _linear(self, point: Point, rung: Rung) -> Job | None:
         """The linear fit that a network begins from, if this sweep begins them so."""
-        network = point.structure
-        begins = self.config.warm_start == "linear" and isinstance(network, NARX) and network.feedthrough
-        if not begins or not isinstance(network, NARX) or network.neurons == 0:
+        if self.config.warm_start != "linear" or estimator_of(point.structure).initial is None:
             return None
-        linear = with_neurons(network, 0).to_dict()
+        lagged = point.structure.lagged(len(self.config.mapping.inputs))
+        linear = point.structure.resized(0) if lagged is not None and lagged.linear and lagged.neurons else None
+        if linear is None:
+            return None
         training = {**LINEAR, "seed": 0}
-        return self._keyed(Job(key="", number=0, structure=linear, training=training, record=rung.record, cost=100.0))
+        return self._keyed(
+            Job(key="", number=0, structure=linear.to_dict(), training=training, record=rung.record, cost=LINEAR_COST)
+        )
+
+    def cost(self, point: Point, iterations: float) -> float:
+        """Work of a piece of training; between linear and quadratic in the parameters, as measured on 20,000 samples.
+
+        Args:
+            point: What is trained.
+            iterations: How far.
+
+        Returns:
+            The work, in units of its own.
+        """
+        lagged = point.structure.lagged(len(self.config.mapping.inputs))
+        if lagged is None or not estimator_of(point.structure).resumes:
+            return LINEAR_COST
+        return max(1.0, iterations) * (25.0 + lagged.neurons * (lagged.lags.n_regressors + 2))
 
     def _keyed(self, job: Job) -> Job:
         terms = {
@@ -248,9 +269,10 @@ class Driver:
 
 def _code(structure: Mapping[str, Any]) -> str:
     """Digest of the code that a job runs: not of the estimators of other structures, or of how YAML is read."""
-    choices = ("sysid.workbench.fits.steps:fit_traces", "sysid.models.store:model_from_dict")
+    choices = ("sysid.estimation.estimators:ESTIMATORS", "sysid.models.store:model_from_dict")
     configuration = ("sysid.workbench.fits.config", "sysid.workbench.fits.data", "sysid.workbench.fields")
-    return code_digest(run_job, *FITTED_BY[type(structure_from_dict(structure))], without=(*choices, *configuration))
+    runs = estimator_of(structure_from_dict(structure)).runs
+    return code_digest(run_job, *runs, without=(*choices, *configuration))
 
 
 def as_trial(outcome: Mapping[str, Any]) -> Trial:
@@ -283,41 +305,19 @@ def as_trial_of(trial: Trial, point: Point, *, before: Trial | None) -> Trial:
     return trial.model_copy(update={"number": point.number, "values": dict(point.values), **added})
 
 
-def with_neurons(network: NARX, neurons: int) -> NARX:
-    """A network with another number of neurons.
-
-    Args:
-        network: The network.
-        neurons: How many.
-
-    Returns:
-        The other one.
-    """
-    return NARX(**{**{k: v for k, v in network.to_dict().items() if k != "kind"}, "neurons": neurons})
-
-
 def _next_smaller(points: Sequence[Point]) -> dict[int, Point]:
     """For each network the largest one with fewer neurons and all else equal, by the number of its point."""
     alike: dict[str, list[Point]] = {}
     for point in points:
-        if isinstance(point.structure, NARX):
-            name = digest({"delays": with_neurons(point.structure, 1).to_dict(), "training": dict(point.training)})
+        family = point.structure.resized(1) if estimator_of(point.structure).initial is not None else None
+        if family is not None:
+            name = digest({"delays": family.to_dict(), "training": dict(point.training)})
             alike.setdefault(name, []).append(point)
     found: dict[int, Point] = {}
     for group in alike.values():
         rising = sorted(group, key=lambda point: point.structure.to_dict()["neurons"])
         found |= {larger.number: smaller for smaller, larger in itertools.pairwise(rising)}
     return found
-
-
-def _cost(point: Point, iterations: float) -> float:
-    """Work of a piece of training; between linear and quadratic in the parameters, as measured on 20,000 samples."""
-    network = point.structure
-    if not isinstance(network, NARX):
-        return 100.0
-    regressors = sum(len(lags) for lags in network.input_delays) * 2 / len(network.input_delays)
-    parameters = network.neurons * (regressors + len(network.output_delays) + 2)
-    return max(1.0, iterations) * (25.0 + parameters)
 
 
 @dataclass(eq=False)
@@ -336,7 +336,8 @@ class _Progress:
 
     def expect(self, points: Sequence[Point], rungs: Sequence[Rung]) -> None:
         """Count on these points."""
-        self.mean_cost = lambda iterations: sum(_cost(p, iterations) for p in points) / max(1, len(points))
+        costs = self.driver.cost
+        self.mean_cost = lambda iterations: sum(costs(p, iterations) for p in points) / max(1, len(points))
         self._plan(len(points), rungs, 0)
 
     def dropped(self, n_left: int, rungs: Sequence[Rung]) -> None:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult
-from sysid.models import NARX
 from sysid.reporting.results import Results
 from sysid.reporting.sweep.record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
 from sysid.workbench.fits import steps
@@ -19,12 +17,13 @@ from sysid.workbench.fits.data import Data, load_data
 from sysid.workbench.fits.run import GivenFit, run_pipeline
 from sysid.workbench.runner import events
 from sysid.workbench.runner.store import RunFolder, write_bytes
+from sysid.workbench.sweep.checks import Checks
 from sysid.workbench.sweep.config import WINNER, SweepConfig
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.sampler import publish, strategy
-from sysid.workbench.sweep.search_space import Space, parse_space
+from sysid.workbench.sweep.search_space import Space, parse_space, trained_rows
 from sysid.workbench.sweep.store import TRIALS, TrialStore
-from sysid.workbench.sweep.trial import Bench, train
+from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, LocalWorkers
 from sysid.yaml_files import check, read_yaml
 
@@ -127,7 +126,7 @@ def run_sweep(
     run = _Run(sweep=sweep, store=store, command=command, fresh=fresh, watchers=watchers, find_workers=find_workers)
     with store.locked():
         found = run.trials()
-    fits = [run.fit_of(WINNER, found.winner)] + [run.fit_of(trial.label, trial) for trial in found.beside]
+    fits = [found.fit_of(WINNER, found.winner)] + [found.fit_of(trial.label, trial) for trial in found.beside]
     pipeline = Pipeline(config=sweep.config.pipeline(fits), text=sweep.text, path=sweep.path)
     given = {fit.name: found.given[trial.number] for fit, trial in zip(fits, found.shown, strict=True)}
     choice = steps.Choice(name=WINNER, chosen_by=found.record.chosen_by, cases_chose=sweep.config.choose.on == "cases")
@@ -150,6 +149,12 @@ class _Found:
     winner: Trial
     beside: list[Trial]
     given: dict[int, GivenFit]
+    options: dict[int, Mapping[str, Any]]
+
+    def fit_of(self, name: str, trial: Trial) -> FitConfig:
+        """A trial as a fit of a pipeline."""
+        training = dict(self.options[trial.number]) or None
+        return FitConfig.model_validate({"name": name, "structure": trial.structure, "training": training})
 
     @property
     def shown(self) -> list[Trial]:
@@ -178,16 +183,6 @@ class _Run:
         for watch in self.watchers:
             watch(event)
 
-    def fit_of(self, name: str, trial: Trial) -> FitConfig:
-        """A trial as a fit of a pipeline."""
-        return FitConfig.model_validate({"name": name, "structure": trial.structure, "training": self._options(trial)})
-
-    def _options(self, trial: Trial) -> dict[str, Any] | None:
-        if trial.structure["kind"] != NARX.kind:
-            return None
-        swept = {n.removeprefix("training."): v for n, v in trial.values.items() if n.startswith("training.")}
-        return {**self.config.training, **swept}
-
     def trials(self) -> _Found:
         """Try what there is to try, and choose."""
         write_bytes(self.store.path / "pipeline.yaml", self.sweep.text.encode())
@@ -197,6 +192,7 @@ class _Run:
             pipeline=self._first(space).model_dump(mode="json"),
             traces=data.traces,
             selection=data.selection,
+            sequences=data.sequences,
         )
         trials = TrialStore(path=self.store.path / TRIALS)
         if self.fresh:
@@ -262,7 +258,8 @@ class _Run:
         found: list[Trial] = []
         fixed = {name: v for name, v in self.config.training.items() if not isinstance(v, dict) and v != "range"}
         for written in self.config.beside:
-            for point in parse_space([written], fixed, len(self.config.mapping.inputs)).points():
+            options = fixed if written.get("kind") in trained_rows([*self.config.structure, written]) else {}
+            for point in parse_space([written], options, len(self.config.mapping.inputs)).points():
                 structure = point.structure.to_dict()
                 same = next((t for t in tried if t.structure == structure and t.dropped_at is None), None)
                 if same is None:
@@ -290,34 +287,37 @@ class _Run:
                 got=", ".join(sorted({trial.status for trial in tried})),
                 remedy="allow more iterations, or sweep other structures; the trials' files say how each one failed",
             )
-        winner = min(usable, key=lambda trial: (driver.rank(trial), trial.parameters, trial.number))
+        ranked = sorted(usable, key=lambda trial: (driver.rank(trial), trial.parameters, trial.number))
+        checks = Checks(driver=driver, bench=bench)
+        winner, refused = checks.first_stable(ranked)
         unit = bench.traces.traces[0].channel(self.config.mapping.output).unit
-        record = self._record(tried, beside, winner, unit=unit, n_points=n_points, wall_s=wall_s)
+        record = self._record(tried, beside, winner, unit=unit, n_points=n_points, wall_s=wall_s, refused=refused)
         write_sweep(self.store.path, record)
         others = [trial for trial in beside if trial.number != winner.number]
-        given = {trial.number: self._given(driver, bench, trial) for trial in [winner, *others]}
-        return _Found(record=record, winner=winner, beside=others, given=given)
-
-    def _given(self, driver: Driver, bench: Bench, trial: Trial) -> GivenFit:
-        """The fit of a trial; a network's is taken up where it ended, which gives what its trial did not keep."""
-        job = driver.last[trial.number]
-
-        def make() -> FitResult:
-            outcome = driver.store.read(job.key)
-            if outcome is None:
-                raise ConfigError("a trial has gone from the run folder", where=driver.store.file(job.key))
-            if outcome["checkpoint"] is None:
-                return FitResult.from_dict(outcome["fit"])
-            fit, _ = train(bench, replace(job, after=job.key, resume=True), outcome)
-            return replace(fit, train_time_s=float(trial.seconds))
-
-        return GivenFit(key=job.key, make=make)
+        shown = [winner, *others]
+        return _Found(
+            record=record,
+            winner=winner,
+            beside=others,
+            given={trial.number: checks.given(trial) for trial in shown},
+            options={trial.number: driver.last[trial.number].training for trial in shown},
+        )
 
     def _record(
-        self, tried: Sequence[Trial], beside: Sequence[Trial], winner: Trial, *, unit: str, n_points: int, wall_s: float
+        self,
+        tried: Sequence[Trial],
+        beside: Sequence[Trial],
+        winner: Trial,
+        *,
+        unit: str,
+        n_points: int,
+        wall_s: float,
+        refused: int,
     ) -> SweepRecord:
         config, choose = self.config, self.config.choose
         sentence = f"Least {FIGURES[choose.by].words} on {TRACES[choose.on]} among {len(tried)} trials."
+        if refused:
+            sentence += f" {refused} that ranked higher were passed over: their free run is not stable."
         if config.reproduces:
             sentence += f" This sweep repeats {config.reproduces}, which chose on the very cases that it reports."
         return SweepRecord(

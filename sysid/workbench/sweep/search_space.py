@@ -13,9 +13,10 @@ from pydantic import BaseModel
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training
-from sysid.models import NARX, AbstractStructure
+from sysid.estimation.estimators import ESTIMATORS, Estimator
+from sysid.models import AbstractStructure
 from sysid.models.ranges import WORD, AbstractRange, declared_ranges, parse_range
-from sysid.workbench.fields import STRICT, STRUCTURES, StructureField, TrainingConfig
+from sysid.workbench.fields import STRICT, StructureField, given_options, options_of
 from sysid.workbench.runner.store import digest
 from sysid.yaml_files import check
 
@@ -108,18 +109,14 @@ class Alternative:
             entries = [values.get(f"{name}[{i}]", entry) for i, entry in enumerate(written)] if _many(written) else None
             fields[name] = values.get(name, written if entries is None else entries)
         structure = _checked(self._for_all_inputs(fields), self.where)
-        if isinstance(structure, NARX):
-            structure.lags(self.n_inputs)
+        structure.check_inputs(self.n_inputs)
         options = {name: values.get(TRAINING + name, written) for name, written in self.training.items()}
-        network = isinstance(structure, NARX) or structure.kind not in {"ARX", "TransferFunction"}
-        return Point(number=number, structure=structure, training=options if network else {}, values=dict(values))
+        return Point(number=number, structure=structure, training=options, values=dict(values))
 
     def _for_all_inputs(self, fields: dict[str, Any]) -> dict[str, Any]:
         """One number for a field that has one per input stands for all of them."""
-        if fields.get("kind") == NARX.kind:
-            return fields  # a network's delays are read so by itself
-        hints = typing.get_type_hints(STRUCTURES[fields["kind"]]) if fields.get("kind") in STRUCTURES else {}
-        many = {name for name, hint in hints.items() if tuple in {typing.get_origin(h) for h in _members(hint)}}
+        row = ESTIMATORS.get(str(fields.get("kind")))
+        many = () if row is None else row.structure.per_input
         return {
             name: [value] * self.n_inputs if name in many and isinstance(value, int) else value
             for name, value in fields.items()
@@ -197,12 +194,15 @@ def parse_space(
     """
     options = [_dimension(TRAINING + name, value, None) for name, value in training.items()]
     swept = tuple(dimension for dimension in options if dimension is not None)
-    _check_training({n: v for n, v in training.items() if TRAINING + n not in {d.name for d in swept}}, swept)
+    trained = _trained(structures, training)
+    for row in trained.values():
+        _check_training(row, {n: v for n, v in training.items() if TRAINING + n not in {d.name for d in swept}}, swept)
     alternatives = []
     for written in structures:
+        takes = written.get("kind") in trained
         declared: dict[str, AbstractRange] = {}
-        if written.get("kind") in STRUCTURES:
-            declared = declared_ranges(STRUCTURES[written["kind"]])
+        if written.get("kind") in ESTIMATORS:
+            declared = declared_ranges(ESTIMATORS[written["kind"]].structure)
         dimensions: list[Dimension] = []
         for name, value in written.items():
             found = [_dimension(name, value, declared.get(name))]
@@ -211,7 +211,11 @@ def parse_space(
             dimensions += [dimension for dimension in found if dimension is not None]
         alternatives.append(
             Alternative(
-                written=written, training=training, dimensions=(*swept, *dimensions), n_inputs=n_inputs, where=where
+                written=written,
+                training=training if takes else {},
+                dimensions=(*(swept if takes else ()), *dimensions),
+                n_inputs=n_inputs,
+                where=where,
             )
         )
     return Space(alternatives=tuple(alternatives))
@@ -222,12 +226,36 @@ def _dimension(name: str, written: object, declared: AbstractRange | None) -> Di
     return None if found is None else Dimension(name=name, values=found.values, numeric=found.numeric)
 
 
-def _check_training(fixed: Mapping[str, Any], swept: Sequence[Dimension]) -> None:
+def trained_rows(structures: Sequence[Mapping[str, Any]]) -> dict[str, Estimator]:
+    """Those of a sweep's structures that its training is for: networks, or where there is none, what takes options.
+
+    Args:
+        structures: Fields of each structure.
+
+    Returns:
+        Rows of the table of estimators, by kind.
+    """
+    kinds = {str(one.get("kind")) for one in structures}
+    rows = {kind: row for kind, row in ESTIMATORS.items() if kind in kinds}
+    networks = {kind: row for kind, row in rows.items() if row.training is Training}
+    return networks or {kind: row for kind, row in rows.items() if row.training is not None}
+
+
+def _trained(structures: Sequence[Mapping[str, Any]], training: Mapping[str, Any]) -> dict[str, Estimator]:
+    """The same, refusing a training that is for none of them."""
+    found = trained_rows(structures)
+    first = ESTIMATORS.get(str(structures[0].get("kind"))) if structures else None
+    if training and not found and first is not None:
+        raise first.takes_none(training)
+    return found
+
+
+def _check_training(row: Estimator, fixed: Mapping[str, Any], swept: Sequence[Dimension]) -> None:
     """Every option that the training is given, and every value in a range of one, is one that it takes."""
-    tries = [fixed, *({dimension.name.removeprefix(TRAINING): v} for dimension in swept for v in dimension.values)]
-    for given in tries:
-        options = check(TrainingConfig, dict(given), where="training")
-        Training(**{name: getattr(options, name) for name in options.model_fields_set})
+    varied = [{dimension.name.removeprefix(TRAINING): value} for dimension in swept for value in dimension.values]
+    for given in [dict(fixed), *({**fixed, **one} for one in varied)]:
+        options = check(options_of(row), given, where="training")
+        row.options(given_options(options), seed=0)
 
 
 class _Wrapped(BaseModel):
@@ -244,8 +272,3 @@ def _checked(fields: Mapping[str, Any], where: str) -> AbstractStructure:
 
 def _many(value: object) -> typing.TypeGuard[list[Any]]:
     return isinstance(value, list) and any(isinstance(entry, dict) or entry == WORD for entry in value)
-
-
-def _members(hint: Any) -> tuple[Any, ...]:
-    """The types in a union, or the one type."""
-    return typing.get_args(hint) if type(None) in typing.get_args(hint) else (hint,)

@@ -6,19 +6,19 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sysid.errors import SysidError
-from sysid.estimation import FitResult, Training, fit_narx
+from sysid.estimation import FitResult, StabilityOptions, Training, estimators
+from sysid.estimation.estimators import Estimator, Options, estimator_of
 from sysid.estimation.least_squares.checkpoint import Checkpoint
-from sysid.models import NARX, AbstractModel, Start, beginning
+from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
-from sysid.workbench.fits.steps import fit_traces
 
 FAILED = "FAILED"
 """Status of a trial whose fit raised an error."""
@@ -35,11 +35,18 @@ class Bench:
         pipeline: The pipeline that the winner will go through, as JSON values.
         traces: Every case.
         selection: The traces that choose.
+        sequences: Traces over which a free run has to stay stable, where a data set of them is declared.
     """
 
     pipeline: Mapping[str, Any]
     traces: TraceSet
     selection: tuple[Trace, ...]
+    sequences: tuple[Trace, ...] = ()
+
+    @property
+    def stability(self) -> StabilityOptions:
+        """How the free run is checked."""
+        return PipelineConfig.model_validate(dict(self.pipeline)).stability.options(self.sequences)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,26 +128,28 @@ def train(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> tuple[Fit
     fit = FitConfig.model_validate({"name": "trial", "structure": dict(job.structure), "training": _options(job)})
     config = PipelineConfig.model_validate(dict(bench.pipeline))
     data = Data(traces=_shortened(bench.traces, job.record), selection=bench.selection)
-    if not isinstance(fit.structure, NARX):
-        return fit_traces(fit, config, data, None, lambda _: None), None
-    training: Training = fit.training_options(config.seed)
-    if job.iterations is not None:
-        training = replace(training, max_iterations=job.iterations)
+    training = fit.training_options(config.seed)
     kept: list[Checkpoint] = []
     usable = before is not None and before["status"] != FAILED
-    result = fit_narx(
+    result = estimators.fit(
         data.estimation,
         config.mapping,
         fit.structure,
-        training,
+        training if job.iterations is None else replace(cast("Training", training), max_iterations=job.iterations),
         start=config.start,
         rest_output=config.rest_output,
         selection=data.selection,
         initial=FitResult.from_dict(before["fit"]) if before and usable and not job.resume else None,
+        stability=_checked(bench, estimator_of(fit.structure), training),
         resume=Checkpoint(fields=before["checkpoint"]) if before and usable and job.resume else None,
         on_checkpoint=kept.append,
     )
-    return result, kept[-1]
+    return result, kept[-1] if kept else None
+
+
+def _checked(bench: Bench, row: Estimator, training: Options | None) -> StabilityOptions | None:
+    """How a trial is checked: where it costs nothing, or chooses between starts; else it is done for the best alone."""
+    return bench.stability if row.stability.by_poles or getattr(training, "starts", 1) > 1 else None
 
 
 def _options(job: Job) -> dict[str, Any] | None:

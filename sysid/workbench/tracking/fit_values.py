@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models import NARX, NeuralStateSpace
 from sysid.traces import Role
 from sysid.validation.metrics import mean_fit
 from sysid.workbench.runner.events import DataLoaded, FitReady, RunStarted
@@ -107,8 +106,8 @@ def parameters(ready: FitReady, run: RunStarted) -> dict[str, str]:
     """
     structure = ready.fit.model.structure.to_dict()
     chosen: dict[str, Any] = {"mapping": ready.fit.model.mapping, "start": run.config.start.kind.value, **structure}
-    if ready.config.training is not None or structure["kind"] in {NARX.kind, NeuralStateSpace.kind}:
-        training = ready.config.training_options(run.config.seed)
+    training = ready.config.training_options(run.config.seed)
+    if training is not None:
         chosen |= {f"training.{name}": getattr(value, "value", value) for name, value in vars(training).items()}
     return {name: str(value) for name, value in chosen.items()}
 

@@ -158,7 +158,7 @@ def test_an_alternative_that_is_no_network_is_refused(workspace: Path) -> None:
     text = SEVERAL.replace(
         "{kind: NARX, input_delays: 2, output_delays: 2, neurons: 2}", "{kind: ARX, na: 1, nb: [1], nk: [1]}"
     )
-    with pytest.raises(ConfigError, match="is ARX"):
+    with pytest.raises(ConfigError, match="an ARX model cannot be a member"):
         run(workspace, text)
 
 

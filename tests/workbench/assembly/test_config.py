@@ -40,7 +40,7 @@ def config(text: str = TWO_PLACES) -> AssemblyConfig:
         pytest.param("upper -> lower", "pump -> upper", "two members write one channel", id="a channel twice"),
         pytest.param(
             "{kind: NARX, input_delays: [0], output_delays: 1, neurons: 3}", "{kind: ARX, na: 1, nb: [1], nk: [1]}",
-            "is ARX", id="a linear kind",
+            "an ARX model takes no training", id="a linear kind",
         ),
     ],
 )  # fmt: skip

@@ -112,14 +112,19 @@ MISTAKES = [
     pytest.param(
         "initial: open", "initial: opne", ["not an earlier fit", "did you mean open?"], id="misspelt initial fit"
     ),
-    pytest.param("initial: open", "initial: ARX", ["another structure"], id="initial fit of another structure"),
+    pytest.param(NETWORK, NETWORK.replace("6", "7"), ["'closed'", "not contained"], id="initial fit that is larger"),
     pytest.param("name: closed", "name: Open", ["cannot be told from another"], id="two names for one folder"),
     pytest.param("fit: closed", "fit: close", ["export names the fit", "did you mean closed?"], id="export of no fit"),
     pytest.param("[onnx]", "[onxx]", ["export.formats", "did you mean onnx?"], id="unknown format"),
     pytest.param("tolerance: 1e-10", "tolerance: -1", ["export.tolerance"], id="negative tolerance"),
     pytest.param("name: first", "name: a/b", ["field name"], id="name that is no folder"),
     pytest.param("seed: 7", "seed: -1", ["field seed"], id="negative seed"),
-    pytest.param("nk: [1, 1]}}", "nk: [1, 1]}, training: {starts: 2}}", ["neither"], id="training of an ARX"),
+    pytest.param(
+        "nk: [1, 1]}}",
+        "nk: [1, 1]}, training: {starts: 2}}",
+        ["an ARX model takes no training"],
+        id="training of an ARX",
+    ),
     pytest.param("fits:", "fits: []\nfitz:", ["fitz"], id="no fits"),
 ]
 

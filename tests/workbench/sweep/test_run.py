@@ -69,11 +69,13 @@ def swept(folder: Path) -> Swept:
 TOLD: list[Event] = []
 
 
-def test_the_winner_is_the_best_in_full_and_goes_through_the_steps_of_any_fit(folder: Path, swept: Swept) -> None:
+def test_the_winner_is_the_best_stable_one_and_goes_through_the_steps_of_any_fit(folder: Path, swept: Swept) -> None:
     record, results = swept.record, folder / "runs" / "tries"
     assert [trial.number for trial in record.trials] == list(range(1, 9))
     assert record.winning is not None
-    assert record.choice(record.winning) == min(record.choice(trial) for trial in record.tried_in_full)
+    better = [trial for trial in record.tried_in_full if record.choice(trial) < record.choice(record.winning)]
+    assert {trial.structure["kind"] for trial in better} == {"NARX"}  # after eight iterations they run away
+    assert f"{len(better)} that ranked higher were passed over" in record.chosen_by
     first = swept.results.fits[0]
     assert (first.name, first.label) == ("sweep winner", record.winning.label)
     assert first.selection_mse == pytest.approx(record.winning.selection_free_run_mse, rel=1e-9)
@@ -81,6 +83,16 @@ def test_the_winner_is_the_best_in_full_and_goes_through_the_steps_of_any_fit(fo
     assert (results / "bundle" / "model.json").is_file()
     assert read_results(results).best is not None
     assert read_sweep(results) == record
+
+
+def test_the_best_may_be_taken_as_it_is_and_says_that_it_is_unstable(workspace: Path, swept: Swept) -> None:
+    found = run(workspace, SWEEP.replace("{formats: [onnx]}", "null") + "stability: {choose: false}\n")
+    assert found.record.winning is not None
+    assert found.record.choice(found.record.winning) == min(map(found.record.choice, found.record.tried_in_full))
+    first = found.results.fits[0]
+    assert first.stability is not None
+    assert (first.status, first.stability.stable) == ("UNSTABLE", False)
+    assert first.notes[-1] == first.stability.text
 
 
 def test_a_look_on_the_whole_record_changes_no_trial_that_goes_on(workspace: Path, swept: Swept) -> None:

@@ -98,7 +98,7 @@ def test_a_killed_workers_job_is_done_again_with_the_same_result(crew: LocalWork
 def test_a_driver_that_is_killed_takes_its_workers_along() -> None:
     code = (
         "import time, sys; sys.path.insert(0, sys.argv[1])\n"
-        "from test_sweep_workers import bench, job, LocalWorkers\n"
+        "from test_workers import bench, job, LocalWorkers\n"
         "if __name__ == '__main__':\n"
         "    crew = LocalWorkers(bench(), 1); crew.submit(job(1), None)\n"
         "    while not crew.finished(): pass\n"

@@ -1,14 +1,15 @@
-"""What a pipeline does with the check of a free run: who is asked, what is said, where the sequences come from."""
+"""The check of a free run: who is asked, what is said, where the sequences come from."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
+from sysid.estimation.stability import FreeRunCheck, PoleCheck, StabilityOptions
 from sysid.models import ARX, ARXModel, Mapping
 from sysid.traces import Channel, Trace
-from sysid.workbench.stability import StabilityCheck, StabilityConfig
 
 MAPPING = Mapping.parse("u -> y")
 
@@ -32,8 +33,8 @@ def fit(of: ARXModel, status: Status = Status.CONVERGED) -> FitResult:
     return FitResult(model=of, status=status, loop=Loop.CLOSED, history={}, train_time_s=0.0)
 
 
-def check(declared=(), **fields) -> StabilityCheck:
-    return StabilityCheck.of(StabilityConfig(count=20, **fields), MAPPING, [trace()], declared)
+def check(**fields) -> FreeRunCheck:
+    return FreeRunCheck.of(StabilityOptions(count=20, **fields), MAPPING, [trace()])
 
 
 def test_a_stable_fit_keeps_its_status_and_says_what_was_found():
@@ -66,22 +67,22 @@ def test_each_model_is_run_once():
 
 
 def test_a_count_of_zero_asks_nothing():
-    nothing = StabilityCheck.of(StabilityConfig(count=0), MAPPING, [trace()], ())
+    nothing = FreeRunCheck.of(StabilityOptions(count=0), MAPPING, [trace()])
     assert nothing.passes(model(1.05))
     assert nothing.applied(fit(model(1.05))).stability is None
 
 
 def test_declared_traces_are_run_as_they_are():
-    declared = check(declared=[trace(seed) for seed in (1, 2, 3)], sequences="random-commands")
+    declared = check(sequences=[trace(seed) for seed in (1, 2, 3)], source="The random commands.")
     found = declared.applied(fit(model()))
     assert found.stability is not None
     assert (found.stability["sequences"], found.stability["largest_plateau_error"]) == (3, pytest.approx(0.0, abs=1e-9))
-    assert "random-commands" in found.stability["source"]
+    assert found.stability["source"] == "The random commands."
 
 
 def test_traces_too_short_for_excursions_are_not_checked():
     short = replace(trace(), values=trace().values[:10])
-    nothing = StabilityCheck.of(StabilityConfig(), MAPPING, [short], ())
+    nothing = FreeRunCheck.of(StabilityOptions(), MAPPING, [short])
     assert nothing.applied(fit(model())).stability is None
 
 
@@ -90,9 +91,27 @@ def test_traces_too_short_for_excursions_are_not_checked():
     [
         pytest.param(True, Loop.CLOSED, True, id="a closed loop gives way to a stable one"),
         pytest.param(True, Loop.OPEN, False, id="an open loop is not made to run free"),
-        pytest.param(False, Loop.CLOSED, False, id="the pipeline takes the best as it is"),
+        pytest.param(False, Loop.CLOSED, False, id="the fit takes the best as it is"),
     ],
 )
 def test_who_is_asked_to_be_stable(choose: bool, loop: Loop, asked: bool) -> None:
-    check = StabilityCheck(config=StabilityConfig(choose=choose), sequences=None)
+    check = FreeRunCheck(options=StabilityOptions(choose=choose), source=None)
     assert (check.vet(loop) is not None) == asked
+
+
+@pytest.mark.parametrize(
+    ("pole", "status"),
+    [
+        pytest.param(0.9, Status.EXACT, id="inside the unit circle"),
+        pytest.param(1.0 + 1e-9, Status.EXACT, id="an integrator but for rounding"),
+        pytest.param(1.01, Status.UNSTABLE, id="outside"),
+    ],
+)
+def test_a_linear_model_is_judged_by_its_largest_pole(pole: float, status: Status) -> None:
+    assert PoleCheck().applied(fit(model(pole), Status.EXACT)).status is status
+
+
+@pytest.mark.parametrize("wrong", [{"count": -1}, {"tolerance": 0.0}, {"tolerance": float("nan")}, {"seed": -1}])
+def test_numbers_that_cannot_be_used_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        StabilityOptions(**wrong)  # type: ignore[arg-type]

@@ -1,0 +1,362 @@
+"""The table of estimators: for each kind of structure how it is fitted, what it takes, and how the fit is checked.
+
+Python, pipelines, sweeps and assemblies fit through :func:`fit` and refuse through :func:`check`, so that the same
+request has the same answer at every door. A new structure is a file in :mod:`sysid.models`, a file with its estimator,
+and a row here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from sysid.errors import ConfigError
+from sysid.estimation.least_squares.checkpoint import Checkpoint
+from sysid.estimation.linear.arx import fit_arx
+from sysid.estimation.linear.transfer_function import fit_transfer_function
+from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
+from sysid.estimation.networks.narx import fit_narx
+from sysid.estimation.networks.neural_state_space import check_training, fit_neural_state_space
+from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.networks.warm_start import check_initial
+from sysid.estimation.result import FitResult
+from sysid.estimation.stability.check import (
+    AbstractStabilityCheck,
+    FreeRunCheck,
+    NoCheck,
+    PoleCheck,
+    StabilityOptions,
+)
+from sysid.models import ARX, NARX, AbstractStructure, Mapping, NeuralStateSpace, Start, TransferFunction
+from sysid.traces import Trace
+
+Options = Training | TransferFunctionTraining
+"""What some estimator takes."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimator:
+    """One row of the table.
+
+    Args:
+        structure: The class of the structures that it fits.
+        name: What people call them, with an article.
+        fit: Fits one: a function of traces, mapping, structure and, where there are options, those; and by name of
+            ``start``, ``rest_output`` and as many of ``selection``, ``initial``, ``vet``, ``resume``,
+            ``on_checkpoint`` and ``on_progress`` as it knows.
+        training: The class of its options; ``None`` where there is nothing to choose.
+        check_training: Refuses options of that class that do not apply.
+        initial: Refuses an initial fit that it cannot start from, from the two structures and the number of inputs;
+            ``None`` where it takes none.
+        begins: Where a fit begins that takes no initial one.
+        stability: How the stability of its fits is checked.
+        joins: Whether its models can be members of a whole that are trained together.
+    """
+
+    structure: type[AbstractStructure]
+    name: str
+    fit: Callable[..., FitResult]
+    training: type[Options] | None = None
+    check_training: Callable[[Any], None] = lambda _: None
+    initial: Callable[[AbstractStructure, AbstractStructure, int], None] | None = None
+    begins: str = ""
+    stability: type[AbstractStabilityCheck] = FreeRunCheck
+    joins: bool = False
+
+    @cached_property
+    def knows(self) -> frozenset[str]:
+        """Names of the arguments that its function takes."""
+        return frozenset(inspect.signature(self.fit).parameters)
+
+    @property
+    def selects(self) -> bool:
+        """Whether selection traces have a say in the fit."""
+        return "selection" in self.knows
+
+    @property
+    def resumes(self) -> bool:
+        """Whether it goes on from a checkpoint, so that it can be trained piece by piece."""
+        return "resume" in self.knows
+
+    @property
+    def runs(self) -> tuple[Callable[..., Any], type[AbstractStabilityCheck]]:
+        """The code that a fit depends on: of all rows only this one's."""
+        return (self.fit, self.stability)
+
+    @property
+    def kind(self) -> str:
+        """The structure's kind, as files name it."""
+        return self.structure.kind
+
+    def options(self, given: Dict[str, Any] | None, *, seed: int) -> Options | None:
+        """Its options from those that are given, by name.
+
+        Args:
+            given: The options; a seed among them counts.
+            seed: The seed where none is among them.
+
+        Returns:
+            The options; ``None`` where it takes none.
+
+        Raises:
+            ConfigError: If there are options where there is nothing to choose, or one does not apply.
+        """
+        if self.training is None:
+            if given is not None:
+                raise self.takes_none(given)
+            return None
+        options = self.training(**{"seed": seed, **(given or {})})
+        self.check_training(options)
+        return options
+
+    def check(self, training: object, initial: AbstractStructure | None, structure: Any, n_inputs: int) -> None:
+        """Refuse what does not go together; see :func:`check`."""
+        structure.check_inputs(n_inputs)
+        if training is not None:
+            if self.training is None:
+                raise self.takes_none(training)
+            if not isinstance(training, self.training):
+                raise ConfigError(
+                    f"{self.name} takes other options",
+                    where="training",
+                    expected=self.training.__name__,
+                    got=type(training).__name__,
+                    remedy=f"give it a {self.training.__name__}, or leave training out",
+                )
+            self.check_training(training)
+        if initial is not None:
+            if self.initial is None:
+                raise ConfigError(
+                    f"{self.name} takes no initial fit",
+                    where="initial",
+                    expected=f"none: {self.begins}",
+                    got=initial.label,
+                    remedy="leave initial out",
+                )
+            self.initial(structure, initial, n_inputs)
+
+    def run(
+        self,
+        traces: Sequence[Trace],
+        mapping: Mapping,
+        structure: AbstractStructure,
+        training: Options | None,
+        stability: StabilityOptions | None,
+        **given: Any,
+    ) -> FitResult:
+        """Fit and check; see :func:`fit`.
+
+        Args:
+            traces: Estimation traces.
+            mapping: Which channels go in, which comes out.
+            structure: What is fitted.
+            training: Its options; ``None`` for the defaults.
+            stability: How the free run is checked; ``None`` checks nothing.
+            given: What else a fit may be given, by name.
+
+        Returns:
+            The fit.
+        """
+        options = self.options(None, seed=0) if training is None else training
+        checked = NoCheck() if stability is None else self.stability.of(stability, mapping, traces)
+        chosen = () if self.training is None else (options,)
+        known = {name: value for name, value in given.items() if name in self.knows}
+        return checked.fitted(self.fit, traces, mapping, structure, *chosen, **known)
+
+    def takes_none(self, training: object) -> ConfigError:
+        """The refusal of options where there is nothing to choose.
+
+        Args:
+            training: What was given.
+
+        Returns:
+            The error.
+        """
+        return ConfigError(
+            f"{self.name} takes no training",
+            where="training",
+            expected="none: least squares has nothing to choose",
+            got=", ".join(training) or "an empty one" if isinstance(training, Dict) else type(training).__name__,
+            remedy="leave training out",
+        )
+
+
+LINEAR_START = "a linear model finds its own start"
+
+ESTIMATORS: dict[str, Estimator] = {
+    row.kind: row
+    for row in (
+        Estimator(structure=ARX, name="an ARX model", fit=fit_arx, begins=LINEAR_START, stability=PoleCheck),
+        Estimator(
+            structure=NARX,
+            name="a NARX network",
+            fit=fit_narx,
+            training=Training,
+            initial=check_initial,
+            joins=True,
+        ),
+        Estimator(
+            structure=NeuralStateSpace,
+            name="a neural state space",
+            fit=fit_neural_state_space,
+            training=Training,
+            check_training=check_training,
+            begins="a neural state space begins at the best linear one",
+        ),
+        Estimator(
+            structure=TransferFunction,
+            name="a transfer function",
+            fit=fit_transfer_function,
+            training=TransferFunctionTraining,
+            begins=LINEAR_START,
+            stability=PoleCheck,
+        ),
+    )
+}
+"""By kind of structure how it is fitted."""
+
+JOINING = tuple(kind for kind, row in ESTIMATORS.items() if row.joins)
+"""Kinds whose models can be members of a whole."""
+
+
+def estimator_of(structure: AbstractStructure) -> Estimator:
+    """The row of a structure.
+
+    Args:
+        structure: The structure.
+
+    Returns:
+        Its row.
+
+    Raises:
+        ConfigError: If no estimator belongs to it.
+    """
+    found = ESTIMATORS.get(getattr(structure, "kind", ""))
+    if found is None or not isinstance(structure, found.structure):
+        raise ConfigError(
+            "no estimator belongs to the structure",
+            where="structure",
+            expected=", ".join(row.structure.__name__ for row in ESTIMATORS.values()),
+            got=type(structure).__name__,
+            remedy="choose one of these",
+        )
+    return found
+
+
+def check(
+    structure: AbstractStructure,
+    n_inputs: int,
+    *,
+    training: object = None,
+    initial: AbstractStructure | None = None,
+) -> None:
+    """Refuse what does not go together, before any data are read.
+
+    Args:
+        structure: What is to be fitted.
+        n_inputs: Inputs of the mapping.
+        training: Its options, if any are given.
+        initial: The structure of the fit that it is to start from, if there is one.
+
+    Raises:
+        ConfigError: If the structure is not for so many inputs, an option does not apply, or it cannot start there.
+    """
+    estimator_of(structure).check(training, initial, structure, n_inputs)
+
+
+def fit(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    structure: AbstractStructure,
+    training: Options | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    selection: Sequence[Trace] = (),
+    initial: FitResult | None = None,
+    stability: StabilityOptions | None = StabilityOptions(),  # noqa: B008 - frozen
+    resume: Checkpoint | None = None,
+    on_checkpoint: Callable[[Checkpoint], None] = lambda _: None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> FitResult:
+    """Fit any structure by its estimator, and check the fit's free run.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which comes out.
+        structure: What is fitted.
+        training: Options of the class in the structure's row.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        selection: Traces that choose between starts.
+        initial: A fit to start from: of the same structure, a smaller one, or an ARX model over its lags.
+        stability: How the free run is checked, by default over 1,000 random sequences; ``None`` checks nothing.
+        resume: Where the fit of a single start was put aside; it goes on as if it had not been.
+        on_checkpoint: Given the checkpoint from which the chosen start can go on; never called where there is none.
+        on_progress: Called after every iteration, from the threads that train.
+
+    Returns:
+        The fit; its status is ``UNSTABLE`` where its free run is.
+
+    Raises:
+        ConfigError: If what is asked does not go together.
+        ChannelError: If a trace lacks a channel of the mapping.
+    """
+    row = estimator_of(structure)
+    row.check(training, None if initial is None else initial.model.structure, structure, len(mapping.inputs))
+    if initial is not None and initial.model.mapping != mapping:
+        raise ConfigError(
+            "the initial fit is of another mapping",
+            where="initial",
+            expected=str(mapping),
+            got=str(initial.model.mapping),
+            remedy="start from a fit of this mapping, its inputs in this order, or leave initial out",
+        )
+    return row.run(
+        traces,
+        mapping,
+        structure,
+        training,
+        stability,
+        start=start or Start(),
+        rest_output=rest_output,
+        selection=selection,
+        initial=initial,
+        resume=resume,
+        on_checkpoint=on_checkpoint,
+        on_progress=on_progress,
+    )
+
+
+def with_stability(fitted: FitResult, traces: Sequence[Trace], stability: StabilityOptions | None) -> FitResult:
+    """A fit that was made without a check, with the check that :func:`fit` would have made of it.
+
+    Args:
+        fitted: The fit.
+        traces: The estimation traces.
+        stability: How its free run is checked.
+
+    Returns:
+        The fit, with what was found.
+    """
+    model = fitted.model
+    if stability is None:
+        return fitted
+    return estimator_of(model.structure).stability.of(stability, model.mapping, traces).applied(fitted)
+
+
+def seedless(options: Options | None) -> dict[str, Any] | None:
+    """Options as plain values without the seed, to see whether two fits were asked for the same.
+
+    Args:
+        options: The options.
+
+    Returns:
+        Their fields.
+    """
+    return None if options is None else {**dataclasses.asdict(options), "seed": None}

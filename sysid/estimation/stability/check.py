@@ -1,0 +1,233 @@
+"""How a fit's free run is checked: a linear model by its poles, a network over random sequences."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from sysid.errors import ConfigError, TraceError
+from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Stability, check_stability
+from sysid.estimation.stability.sequences import AbstractSequences, Excursions, TraceSequences
+from sysid.models import AbstractModel, Mapping
+from sysid.traces import Trace
+
+STILL_S = 20.0
+"""Seconds for which a declared sequence's output has to stand still before it is judged."""
+
+GROWTH = 1e-6
+"""By how much a pole's magnitude may exceed 1: an integrator that is estimated has a pole at 1 but for rounding and
+noise, and a free run of 100,000 samples is then off by a tenth at most."""
+
+Vet = Callable[[AbstractModel], bool]
+"""Whether a model's free run is stable."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StabilityOptions:
+    """Over which sequences a network's free run has to stay bounded and to settle; a linear model has its poles.
+
+    Args:
+        count: How many sequences at most; 0 checks nothing.
+        tolerance: How far from its plateau a run may settle, as a share of the output's range.
+        seed: Seed of the sequences.
+        choose: Whether the best start gives way to the best stable one. It never does in a fit of the open loop, which
+            is not made to run free.
+        sequences: Traces that are run as they are; by default excursions made from the estimation traces.
+        source: Where those traces come from, as a sentence.
+
+    Raises:
+        ConfigError: If a number cannot be used.
+    """
+
+    count: int = SEQUENCES
+    tolerance: float = TOLERANCE
+    seed: int = SEED
+    choose: bool = True
+    sequences: tuple[Trace, ...] = ()
+    source: str = "Given traces."
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sequences", tuple(self.sequences))
+        for name, wrong, expected in (
+            ("count", self.count < 0, "0 or more"),
+            ("seed", self.seed < 0, "0 or more"),
+            ("tolerance", not self.tolerance > 0.0, "above 0"),
+        ):
+            if wrong:
+                raise ConfigError(f"{name} is too small", where=name, expected=expected, got=getattr(self, name))
+
+    @property
+    def terms(self) -> dict[str, Any]:
+        """JSON values that what is found depends on, beside the model and the estimation traces."""
+        numbers = {name: getattr(self, name) for name in ("count", "tolerance", "seed", "choose", "source")}
+        return {**numbers, "sequences": [trace.digest for trace in self.sequences]}
+
+
+class AbstractStabilityCheck(ABC):
+    """Checks the candidates of one fit, and the fit."""
+
+    by_poles = False
+    """Whether it costs nothing, for it runs nothing."""
+
+    @classmethod
+    @abstractmethod
+    def of(cls, options: StabilityOptions, mapping: Mapping, estimation: Sequence[Trace]) -> AbstractStabilityCheck:
+        """The check of a fit.
+
+        Args:
+            options: What is asked.
+            mapping: Inputs and output.
+            estimation: The estimation traces.
+
+        Returns:
+            The check; it asks nothing where the traces are too short to make sequences from.
+        """
+
+    def vet(self, loop: Loop) -> Vet | None:
+        """What a fit asks of its candidates; ``None`` where it takes the best as it is.
+
+        Args:
+            loop: In which loop it is trained.
+        """
+        del loop
+        return None
+
+    def fitted(self, estimator: Callable[..., FitResult], *given: Any, **named: Any) -> FitResult:
+        """A fit whose candidates are asked for a stable free run, where its estimator has several, and that is checked.
+
+        Args:
+            estimator: Fits.
+            given: What it is given: traces, mapping, structure and options.
+            named: What it is given by name.
+
+        Returns:
+            The fit with what was found.
+        """
+        loop = getattr(given[-1], "loop", None)
+        vet = {} if loop is None else {"vet": self.vet(loop)}
+        return self.applied(estimator(*given, **named, **vet))
+
+    @abstractmethod
+    def applied(self, fit: FitResult) -> FitResult:
+        """A fit with what the check found of its model.
+
+        Args:
+            fit: The fit.
+
+        Returns:
+            The fit; its status says so where the free run is unstable.
+        """
+
+
+class NoCheck(AbstractStabilityCheck):
+    """Asks nothing."""
+
+    @classmethod
+    def of(cls, options: StabilityOptions, mapping: Mapping, estimation: Sequence[Trace]) -> NoCheck:
+        """The check that asks nothing, whatever is given."""
+        del options, mapping, estimation
+        return cls()
+
+    def applied(self, fit: FitResult) -> FitResult:
+        """The fit as it is."""
+        return fit
+
+
+class PoleCheck(AbstractStabilityCheck):
+    """The largest pole of a linear model, of which its estimator says so in a note."""
+
+    by_poles = True
+
+    @classmethod
+    def of(cls, options: StabilityOptions, mapping: Mapping, estimation: Sequence[Trace]) -> PoleCheck:
+        """The check, which needs no sequences."""
+        del options, mapping, estimation
+        return cls()
+
+    def applied(self, fit: FitResult) -> FitResult:
+        """The fit, with the status ``UNSTABLE`` where a pole lies outside the unit circle."""
+        radius = fit.model.pole_radius
+        return fit if radius is None or radius <= 1.0 + GROWTH else replace(fit, status=_unstable(fit.status))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeRunCheck(AbstractStabilityCheck):
+    """The free run over random sequences; each model is run once.
+
+    Args:
+        options: What is asked.
+        source: Where the sequences come from; ``None`` checks nothing.
+    """
+
+    options: StabilityOptions
+    source: AbstractSequences | None
+    found: dict[int, tuple[AbstractModel, Stability]] = field(default_factory=dict)
+    """What was found, by the model's identity; the model is kept so that no other takes its place."""
+
+    @classmethod
+    def of(cls, options: StabilityOptions, mapping: Mapping, estimation: Sequence[Trace]) -> FreeRunCheck:
+        """The check over the sequences that are given, or excursions of the estimation traces."""
+        inputs, outputs, given = mapping.inputs, (mapping.output,), options.sequences
+        if options.count == 0:
+            return cls(options=options, source=None)
+        if not given:
+            try:
+                return cls(options=options, source=Excursions.of(estimation, inputs, outputs))
+            except TraceError:  # too short to make sequences from, which is no reason not to fit
+                return cls(options=options, source=None)
+        sequences = TraceSequences(
+            inputs=inputs,
+            outputs=outputs,
+            sample_time=given[0].sample_time,
+            traces=given,
+            source_text=options.source,
+            still=max(1, round(STILL_S / given[0].sample_time)),
+        )
+        return cls(options=options, source=sequences)
+
+    def vet(self, loop: Loop) -> Vet | None:
+        """What a fit asks of its candidates; ``None`` where it takes the best as it is.
+
+        Args:
+            loop: In which loop it is trained.
+        """
+        return self.passes if self.options.choose and loop is Loop.CLOSED else None
+
+    def passes(self, model: AbstractModel) -> bool:
+        """Whether a model's free run is stable.
+
+        Args:
+            model: The model.
+
+        Returns:
+            The verdict; true where nothing is asked.
+        """
+        found = self._of(model)
+        return found is None or found.stable
+
+    def applied(self, fit: FitResult) -> FitResult:
+        """A fit with what the sequences found; the sentence is among its notes."""
+        found = self._of(fit.model)
+        if found is None:
+            return fit
+        status = fit.status if found.stable else _unstable(fit.status)
+        return replace(fit, status=status, stability=found.to_dict(), notes=(*fit.notes, found.sentence))
+
+    def _of(self, model: AbstractModel) -> Stability | None:
+        if self.source is None:
+            return None
+        if id(model) not in self.found:
+            asked = self.options
+            found = check_stability(
+                model, self.source, tolerance=asked.tolerance, count=asked.count, seed=asked.seed
+            )  # fmt: skip
+            self.found[id(model)] = (model, found)
+        return self.found[id(model)][1]
+
+
+def _unstable(status: Status) -> Status:
+    """An interrupted fit stays so, and is done again."""
+    return status if status is Status.INTERRUPTED else Status.UNSTABLE

@@ -1,0 +1,118 @@
+"""The best trials of a sweep as fits: with all that a fit has, and their free run checked as any fit's is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult, Loop, Status
+from sysid.estimation.estimators import with_stability
+from sysid.estimation.networks.choosing import VETTED
+from sysid.reporting.sweep.record import Trial
+from sysid.traces import Role
+from sysid.workbench.fits.run import GivenFit
+from sysid.workbench.runner.store import digest, strict
+from sysid.workbench.sweep.driver import Driver
+from sysid.workbench.sweep.store import TrialStore
+from sysid.workbench.sweep.trial import Bench, train
+
+FOLDER = "checked"
+"""Beside the trials: those whose free run was checked."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Checks:
+    """Checks trials of one sweep, each once.
+
+    Args:
+        driver: Has the trials.
+        bench: Traces and conditions.
+    """
+
+    driver: Driver
+    bench: Bench
+    found: dict[int, FitResult] = field(default_factory=dict)
+    """Fits that were checked, by the trial's number."""
+
+    def first_stable(self, ranked: Sequence[Trial]) -> tuple[Trial, int]:
+        """The best trial, or the best stable one among the best.
+
+        Args:
+            ranked: Trials that can be used, the best first.
+
+        Returns:
+            The trial, and how many that ranked higher were passed over. Of fits of the open loop the best is taken as
+            it is, and so it is where none that was looked at is stable.
+        """
+        for refused, trial in enumerate(ranked[:VETTED]):
+            fit = self._stored(trial)
+            asks = self.bench.stability.choose and fit.loop is Loop.CLOSED
+            if not asks or self._checked(trial).status is not Status.UNSTABLE:
+                return trial, refused
+        return ranked[0], 0
+
+    def given(self, trial: Trial) -> GivenFit:
+        """A trial as a fit that was made elsewhere.
+
+        Args:
+            trial: The trial.
+
+        Returns:
+            The fit.
+        """
+        job, stability = self.driver.last[trial.number], self.bench.stability
+
+        def make() -> FitResult:
+            return replace(self._whole(trial, self._checked(trial)), train_time_s=float(trial.seconds))
+
+        return GivenFit(key=digest(strict({"job": job.key, "stability": stability.terms})), make=make)
+
+    def _stored(self, trial: Trial) -> FitResult:
+        return FitResult.from_dict(self._outcome(trial)["fit"])
+
+    def _outcome(self, trial: Trial) -> dict[str, Any]:
+        key = self.driver.last[trial.number].key
+        outcome = self.driver.store.read(key)
+        if outcome is None:
+            raise ConfigError(
+                "a trial has gone from the run folder",
+                where=self.driver.store.file(key),
+                remedy="run the sweep again: the trial is done anew",
+            )
+        return outcome
+
+    def _checked(self, trial: Trial) -> FitResult:
+        """The trial's fit with what its check found, from the disk where it was made before."""
+        if trial.number not in self.found:
+            store = TrialStore(path=self.driver.store.path / FOLDER)
+            terms = {
+                "job": self.driver.last[trial.number].key,
+                "stability": self.bench.stability.terms,
+            }
+            key = digest(strict(terms))
+            outcome = store.read(key)
+            if outcome is None:
+                fit, estimation = self._stored(trial), self.bench.traces.with_role(Role.ESTIMATION)
+                # A trial that chose between starts was checked as it did.
+                fit = fit if fit.stability is not None else with_stability(fit, estimation, self.bench.stability)
+                outcome = {"key": key, "fit": fit.to_dict()}
+                store.write(outcome)
+            self.found[trial.number] = FitResult.from_dict(outcome["fit"])
+        return self.found[trial.number]
+
+    def _whole(self, trial: Trial, fit: FitResult) -> FitResult:
+        """The fit with its posterior, which is too large to be kept of every trial: made from where training ended."""
+        job, outcome = self.driver.last[trial.number], self._outcome(trial)
+        if outcome["checkpoint"] is None:
+            return fit
+        training = {**job.training, "starts": 1, "committee": 1, "leave_out": ()}
+        again, _ = train(self.bench, replace(job, after=job.key, resume=True, training=training), outcome)
+        if not np.array_equal(again.model.recursion.numbers, fit.model.recursion.numbers):
+            # An ensemble is no single start's: all of the trial is done again.
+            before = None if job.after is None else self.driver.store.read(job.after)
+            again, _ = train(self.bench, job, before)
+        return replace(fit, posterior=again.posterior)
