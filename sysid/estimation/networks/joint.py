@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -83,6 +84,40 @@ class JointTraining:
                 got=repr(self.basis),
                 remedy="write for example basis: levels and rates",
             )
+
+    def provider(
+        self,
+        cascade: Cascade,
+        traces: Sequence[Trace],
+        errors: Dict[str, float],
+        trained: Sequence[str] | None = None,
+    ) -> CascadeProvider:
+        """Residuals and Jacobians of a whole as these options have them count; every option that the provider has.
+
+        Args:
+            cascade: The whole.
+            traces: Estimation traces.
+            errors: For each target the error in its unit that counts as one.
+            trained: Outputs of the members that are trained; all by default.
+
+        Returns:
+            The provider.
+
+        Raises:
+            ChannelError: If a trace lacks an input or a target, or a name is no output of the cascade.
+            ConfigError: If a member that would have to pass on sensitivities cannot.
+        """
+        return CascadeProvider(
+            cascade=cascade,
+            traces=tuple(traces),
+            errors=errors,
+            trained=None if trained is None else tuple(trained),
+            stride=self.stride,
+            moves=self.moves,
+            leverage=self.leverage,
+            soft_margin=self.soft_margin,
+            workers=self.workers,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

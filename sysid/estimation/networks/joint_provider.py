@@ -258,23 +258,41 @@ class CascadeProvider(AbstractProvider):
         waiting: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in self.errors]
         gathered = 0
         for rows, blocks in self._blocks(program, record, passed, n):
+            roots = None if record.root_weights is None else record.root_weights[rows]
             for j, (held, block) in enumerate(zip(waiting, blocks, strict=True)):
-                weighted = block if record.root_weights is None else block * record.root_weights[rows, None]
-                moving = weighted.any(axis=1)  # a target that is held adds nothing
-                weighted = weighted[moving]
-                roots = leverage_roots(weighted, self._longest)
-                held.append((weighted * roots[:, None], residual[rows, j][moving] * roots))
+                held.append(self._counting(block, residual[rows, j], roots))
             gathered += rows.stop - rows.start
             if gathered < GATHERED and rows.stop < len(record.rows):
                 continue
             gathered = 0
             for j, held in enumerate(waiting):
-                weighted, errors = (np.concatenate(some) for some in zip(*held, strict=True))
+                weighted, errors = (
+                    np.concatenate(some) if len(some) > 1 else some[0] for some in zip(*held, strict=True)
+                )
                 reach = weighted.shape[1]
                 gradient[:reach] += weights[j] * (weighted.T @ errors)
                 matrix[:reach, :reach] += weights[j] * (weighted.T @ weighted)
                 held.clear()
         return loss, gradient, matrix, residual
+
+    def _counting(
+        self, block: NDArray[np.float64], residual: NDArray[np.float64], roots: NDArray[np.float64] | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rows of a target's Jacobian as they count, and their residuals; what counts as it is is not copied.
+
+        Args:
+            block: The rows, over their error, shape ``(n_rows, n_parameters)``.
+            residual: Weighted residuals, shape ``(n_rows,)``.
+            roots: Square roots of the samples' weights, shape ``(n_rows,)``; ``None`` where all count alike.
+        """
+        weighted = block if roots is None else block * roots[:, None]
+        moving = weighted.any(axis=1)  # a target that is held adds nothing
+        if not moving.all():
+            weighted, residual = weighted[moving], residual[moving]
+        if np.isinf(self._longest):
+            return weighted, residual
+        bounded = leverage_roots(weighted, self._longest)
+        return weighted * bounded[:, None], residual * bounded
 
     def _median_row(self) -> float:
         """Median length of the rows of the Jacobian that move, at the start."""

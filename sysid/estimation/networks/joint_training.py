@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
-from sysid.estimation.networks.joint_provider import CascadeProvider
 from sysid.estimation.networks.member_layout import JointLayout
 from sysid.estimation.networks.training import FitProgress
 from sysid.models import Cascade, Ends
@@ -53,17 +52,7 @@ def fit_cascade(
         ConfigError: If a member that is trained, or lies between trained ones and a target, has no flat parameters.
     """
     training = training or JointTraining()
-    provider = CascadeProvider(
-        cascade=cascade,
-        traces=tuple(traces),
-        errors=unit_errors(cascade, traces, targets),
-        trained=None if trained is None else tuple(trained),
-        stride=training.stride,
-        moves=training.moves,
-        leverage=training.leverage,
-        soft_margin=training.soft_margin,
-        workers=training.workers,
-    )
+    provider = training.provider(cascade, traces, unit_errors(cascade, traces, targets), trained)
     records = [_channels(cascade, trace) for trace in traces]
     layout = JointLayout.of(provider.members, records, plain=training.basis == "plain")
     joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)

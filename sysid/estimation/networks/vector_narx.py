@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
-from sysid.estimation.networks.joint_provider import CascadeProvider
 from sysid.estimation.networks.member_layout import JointLayout, MemberLayout
 from sysid.estimation.networks.trained_members import with_theta
 from sysid.estimation.networks.training import FitProgress
@@ -62,15 +61,7 @@ def fit_vector_narx(
     errors = targets or {
         name: 0.02 * scale for name, scale in zip(mapping.outputs, template.scaling.output_scale, strict=True)
     }
-    provider = CascadeProvider(
-        cascade=cascade,
-        traces=tuple(traces),
-        errors=errors,
-        stride=training.stride,
-        moves=training.moves,
-        leverage=training.leverage,
-        workers=training.workers,
-    )
+    provider = training.provider(cascade, traces, errors)
     records = [{name: trace[name] for name in (*mapping.inputs, *mapping.outputs)} for trace in traces]
     layout = JointLayout.of(provider.members, records, plain=training.basis == "plain")
     starts: list[tuple[int | None, NDArray[np.float64]]] = []

@@ -159,3 +159,13 @@ class TestUpstream:
     def test_a_stranger_is_refused(self):
         with pytest.raises(ChannelError, match="missing channel XX"):
             with_upstream_outputs(self.TRACES, TRUTH, "XX")
+
+
+@pytest.mark.parametrize(
+    "asked", [{"stride": 3}, {"moves": 2.0}, {"leverage": 9.0}, {"soft_margin": 0.5}, {"workers": 1}], ids=str
+)
+def test_every_option_that_says_what_counts_reaches_the_residuals(asked: dict[str, float]) -> None:
+    provider = JointTraining(**asked).provider(TRUTH, [measured(n=50)], {"BC": 1.0}, ["BC"])
+    ((name, value),) = asked.items()
+    assert getattr(provider, name) == value
+    assert (provider.trained, dict(provider.errors)) == (("BC",), {"BC": 1.0})

@@ -103,3 +103,18 @@ def test_the_centre_holds_every_output():
 def test_structures_that_cannot_be_are_refused(fields, n, match):
     with pytest.raises(ConfigError, match=match):
         VectorNARX(**({"input_delays": 2, "output_delays": 2, "neurons": 2} | fields)).lags(*n)
+
+
+def test_a_record_on_which_the_run_is_lost_counts_less_in_a_robust_loss():
+    shifted = coupled(seed=1)
+    lost = Trace(
+        name="shifted",
+        sample_time=0.1,
+        channels=shifted.channels,
+        values=shifted.values + np.where(np.arange(len(shifted)) > 400, 20.0, 0.0)[:, None] * [0.0, 1.0, 1.0],
+    )
+    plain, robust = (
+        fit_vector_narx([coupled(), lost], MAPPING, NETWORK, JointTraining(max_iterations=3, soft_margin=margin)).model
+        for margin in (np.inf, 1.0)
+    )
+    assert not np.array_equal(plain.models[0].theta, robust.models[0].theta)
