@@ -21,6 +21,8 @@ from sysid.ingest.timing import Timing, survey
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
 
+_MOST_POINTS, _MOST_TIMES = 10_000_000, 1000
+
 T = TypeVar("T", str, Reference)
 
 
@@ -290,6 +292,7 @@ def _onto_grid(record: Record, wanted: Wanted, grid: GridOptions, repairs: Repai
     timing = survey(stamps, longest_step=grid.longest_step)
     if len(timing.gaps) and repairs.gaps is None:
         raise _gap_error(record, timing)
+    _check_span(record, wanted)
     places = grid_places(stamps, sample_time, start=start, tolerance=grid.tolerance)
     if places is not None and np.array_equal(np.flatnonzero(places[1:] > places[:-1] + 1), timing.gaps):
         return place(stamps, record.values, places, record.marked), record
@@ -318,6 +321,22 @@ def _onto_grid(record: Record, wanted: Wanted, grid: GridOptions, repairs: Repai
     )
     told = f"resampled ({grid.method}) from a step of {timing.step:.6g} s to {sample_time:g} s"
     return gridded, record.noted(f"{told}, jitter {timing.jitter:.3g} s" if uneven else told)
+
+
+def _check_span(record: Record, wanted: Wanted) -> None:
+    """One stamp that is nonsense must not make a grid that no memory holds."""
+    points = (float(record.stamps[-1]) - float(record.stamps[0])) / wanted.sample_time
+    if points <= max(_MOST_POINTS, _MOST_TIMES * len(record.stamps)):
+        return
+    worst = int(np.argmax(np.diff(record.stamps)))
+    raise TraceError(
+        "the record is far too long for its samples",
+        where=record.where(worst),
+        expected=f"at most {_MOST_TIMES} grid points for each of {len(record.stamps)} samples",
+        got=f"{points:.3g} points of {wanted.sample_time:g} s between {record.stamps[0]:g} s and "
+        f"{record.stamps[-1]:g} s; the longest step is after this sample",
+        remedy=f"correct the time stamp, or cut the record: stop: {float(record.stamps[worst])!r} in its case",
+    )
 
 
 def _gap_error(record: Record, timing: Timing) -> TraceError:

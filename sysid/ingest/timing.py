@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.ingest.grid import grid_places
 
+_MOST_SLOTS = 1e18  # of one gap: a stamp that is nonsense shall not overflow
 _GAP_FACTOR = 1.5  # a step this many times the usual one means that a sample is missing
 
 
@@ -83,7 +84,7 @@ def survey(stamps: NDArray[np.float64], *, longest_step: float | None = None) ->
         slots = np.arange(len(rising), dtype=np.float64)
         if is_gap.any():
             # Outside gaps every step is one slot, however uneven: only a gap lacks samples.
-            slots[1:] = np.cumsum(np.where(is_gap, np.maximum(np.rint(steps / median), 1.0), 1.0))
+            slots[1:] = np.cumsum(np.where(is_gap, np.clip(np.rint(steps / median), 1.0, _MOST_SLOTS), 1.0))
         del steps
         slope, jitter = _line(slots, rising)
     return Timing(
@@ -122,7 +123,7 @@ def round_step(step: float) -> float:
         >>> round_step(0.10029), round_step(1 / 120)
         (0.1, 0.0083)
     """
-    return next(value for value in _by_digits(step) if abs(value - step) <= 5e-3 * abs(step))
+    return next((value for value in _by_digits(step) if abs(value - step) <= 5e-3 * abs(step)), step)
 
 
 def even_step(stamps: NDArray[np.float64], timing: Timing, *, tolerance: float) -> float | None:

@@ -27,6 +27,9 @@ def reference(
         if method == "hold" or last == len(stamps) - 1:
             out[row] = values[last]
         else:
+            last = max(
+                (i for i, s in enumerate(stamps) if s <= t), default=last
+            )  # between its neighbours, never beyond
             share = (t - stamps[last]) / (stamps[last + 1] - stamps[last])
             out[row] = values[last] + share * (values[last + 1] - values[last])
     return out

@@ -24,7 +24,10 @@ from sysid.ingest.table import RawTable
 from sysid.units import Reference
 
 _SINCE = re.compile(r"\s*(\w+)\s+since\s+(.+)", re.IGNORECASE | re.DOTALL)
+_POWERS = re.compile(r"(?=.*\d)[A-Za-z]+(?:-?[1-9])?(?: [A-Za-z]+(?:-?[1-9])?)*")
 _CLASSIC = b"CDF"
+_DAMAGES = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
+"""What h5py raises on damaged files."""
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
@@ -72,7 +75,7 @@ def check_claims(path: Path) -> None:
     try:
         with h5py.File(path, "r") as file:
             file.visititems(visit)
-    except (OSError, RuntimeError, ValueError) as error:
+    except _DAMAGES as error:
         raise damaged(path, "HDF5", error) from error
     check_claim(path, shapes)
 
@@ -88,9 +91,12 @@ def is_of_matlab(path: Path) -> bool:
     """
     import h5py
 
-    with h5py.File(path, "r") as file:
-        items = [item for name, item in file.items() if not name.startswith("#")]
-        return bool(items) and all("MATLAB_class" in item.attrs for item in items)
+    try:
+        with h5py.File(path, "r") as file:
+            items = [item for name, item in file.items() if not name.startswith("#")]
+            return bool(items) and all("MATLAB_class" in item.attrs for item in items)
+    except _DAMAGES as error:
+        raise damaged(path, "HDF5", error) from error
 
 
 def _hdf5_tree(path: Path) -> tuple[dict[str, Any], dict[str, str], list[str]]:
@@ -103,7 +109,7 @@ def _hdf5_tree(path: Path) -> tuple[dict[str, Any], dict[str, str], list[str]]:
             text = _text(file.attrs.get("sysid"))
             tree = _group(file, notes, seen=set())
             return _lone_table(tree) or tree, {"sysid": text} if text else {}, notes
-    except (OSError, RuntimeError, ValueError, KeyError) as error:
+    except _DAMAGES as error:
         raise damaged(path, "HDF5", error) from error
 
 
@@ -186,6 +192,7 @@ def _leaf(name: str, array: NDArray[Any], attributes: Mapping[str, Any], notes: 
     if since is not None:
         unit = since[1]
         notes.append(f"{name}: {since[1]} since {since[2].strip()}")
+    unit = _cf_unit(unit) if unit else None
     if array.size == 1:
         return Leaf(values=_unpacked(name, array, attributes, notes))
     return Leaf(
@@ -194,6 +201,13 @@ def _leaf(name: str, array: NDArray[Any], attributes: Mapping[str, Any], notes: 
         reference=Reference(reference) if reference in {item.value for item in Reference} else None,
         description=_text(attributes.get("description")) or _text(attributes.get("long_name")) or "",
     )
+
+
+def _cf_unit(unit: str) -> str:
+    """A unit in the words of CF, ``kg m-3``, as it is written elsewhere: ``kg * m**-3``."""
+    if not _POWERS.fullmatch(unit):
+        return unit
+    return " * ".join(re.sub(r"(?<=[A-Za-z])(-?\d+)$", r"**\1", part) for part in unit.split())
 
 
 def _unpacked(name: str, array: NDArray[Any], attributes: Mapping[str, Any], notes: list[str]) -> NDArray[Any]:

@@ -22,6 +22,7 @@ _MOST_BYTES = 2**30
 """Of Python objects, which JSON becomes before it is numbers."""
 _OPENING, _ITEM = 96, 40  # bytes that a list or a mapping takes, and an item in one
 _DEEPEST = 64
+_VALUES = {"values", "data", "samples", "value"}
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
@@ -78,14 +79,7 @@ def _content(text: str) -> Any:
 
 def _tree(node: Any, depth: int) -> Any:
     if isinstance(node, Mapping):
-        if isinstance(node.get("data"), list) and isinstance(node.get("columns"), list):
-            rows = node["data"]  # pandas, orient="split"
-            return {str(name): _vector([row[at] for row in rows]) for at, name in enumerate(node["columns"])}
-        if isinstance(node.get("data"), list) and isinstance(node.get("schema"), Mapping):
-            return _tree(node["data"], depth + 1)  # pandas, orient="table"
-        if _is_by_row(node):
-            return _vector(list(node.values()))
-        return {str(key): _tree(value, depth + 1) for key, value in node.items()}
+        return _mapping(node, depth)
     if not isinstance(node, list):
         return node
     if node and all(isinstance(item, Mapping) for item in node):
@@ -93,6 +87,21 @@ def _tree(node: Any, depth: int) -> Any:
     if node and all(isinstance(item, list) for item in node):
         return _matrix(node)
     return _vector(node)
+
+
+def _mapping(node: Mapping[str, Any], depth: int) -> Any:
+    data = node.get("data")
+    if isinstance(data, list) and isinstance(node.get("columns"), list):
+        names = [str(name) for name in node["columns"]]  # pandas, orient="split"
+        if not all(isinstance(row, list) and len(row) == len(names) for row in data):
+            raise ValueError("the rows of data are not as long as columns")
+        return {name: _vector([row[at] for row in data]) for at, name in enumerate(names)}
+    if isinstance(data, list) and isinstance(node.get("schema"), Mapping):
+        return _tree(data, depth + 1)  # pandas, orient="table"
+    if _is_by_row(node):
+        return _vector(list(node.values()))
+    signal = _signal(node)
+    return {str(key): _tree(value, depth + 1) for key, value in node.items()} if signal is None else signal
 
 
 def _is_by_row(node: Mapping[str, Any]) -> bool:
@@ -104,16 +113,27 @@ def _is_by_row(node: Mapping[str, Any]) -> bool:
     )
 
 
+def _signal(node: Mapping[str, Any]) -> Leaf | None:
+    """The values of one signal and what is said about them."""
+    lists = [key for key, value in node.items() if isinstance(value, list)]
+    if len(lists) != 1 or lists[0].casefold() not in _VALUES or not ({"unit", "units", "name"} & set(node)):
+        return None
+    values = _vector(node[lists[0]])
+    if not isinstance(values, np.ndarray):
+        return values if isinstance(values, Leaf) else None
+    unit, about = node.get("unit", node.get("units")), node.get("description")
+    return Leaf(
+        values=values,
+        unit=unit if isinstance(unit, str) and unit else None,
+        description=about if isinstance(about, str) else "",
+    )
+
+
 def _objects(items: list[Any], depth: int) -> Any:
     """Rows as records, signals with a name each, or several records."""
-    for key in ("values", "data", "samples"):
-        if all("name" in item and isinstance(item.get(key), list) for item in items):
-            return {
-                str(item["name"]): Leaf(
-                    values=np.asarray(_vector(item[key])), unit=item.get("unit", item.get("units")) or None
-                )
-                for item in items
-            }
+    signals = [_signal(item) if isinstance(item.get("name"), str) else None for item in items]
+    if all(signal is not None for signal in signals):
+        return {item["name"]: signal for item, signal in zip(items, signals, strict=True)}
     names = list(dict.fromkeys(str(key) for item in items for key in item))
     if any(isinstance(value, list | Mapping) for item in items for value in item.values()):
         return [_tree(item, depth + 1) for item in items]

@@ -18,7 +18,7 @@ from sysid.errors import ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers import hdf5
 from sysid.ingest.readers.bounds import MOST_BYTES, allowed, check_claim, too_large
-from sysid.ingest.readers.leaves import Leaf, refused
+from sysid.ingest.readers.leaves import Leaf, number_of, refused
 from sysid.ingest.readers.modelica import is_result, result_tree
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
@@ -194,12 +194,21 @@ def _object(value: Any, name: str, path: Path) -> Any:
         properties = properties.reshape(-1)[0]
     if isinstance(properties, Mapping):
         fields = {str(key).strip("_"): _node(item, str(key), path) for key, item in properties.items()}
-        inner = fields.get("TimeInfo")
-        if isinstance(inner, Mapping) and "Time" in inner and "Data" in fields:
-            fields.setdefault("Time", inner["Time"])
+        if "Data" in fields and isinstance(fields.get("TimeInfo"), Mapping):
+            fields.setdefault("Time", _clock(fields["TimeInfo"], fields["Data"]))
         if {"Time", "Data"} <= fields.keys() or "OutputData" in fields:
             return fields
+        if str(value.classname).startswith("tsdata."):
+            return fields
     return refused(_only_matlab(name, str(value.classname), path))
+
+
+def _clock(about: Mapping[str, Any], data: Any) -> Any:
+    """The time stamps of a timeseries, which may be said by a start and a step alone."""
+    stamps, step, start = about.get("Time"), number_of(about.get("Increment")), number_of(about.get("Start"))
+    if (isinstance(stamps, np.ndarray) and stamps.size) or step is None or not np.isfinite(step):
+        return stamps
+    return (start or 0.0) + step * np.arange(max(np.shape(data), default=0))
 
 
 def _sparse(value: Any, name: str, path: Path) -> Any:

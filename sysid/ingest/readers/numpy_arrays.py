@@ -5,7 +5,10 @@ Nothing is unpickled: an array of objects is refused.
 
 from __future__ import annotations
 
+import struct
+import tokenize
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +18,16 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_claim
+from sysid.ingest.readers.leaves import refused
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable
 
 _MARK = b"\x93NUMPY"
+_DAMAGES = (
+    ValueError, OSError, EOFError, KeyError, TypeError, SyntaxError, OverflowError, RuntimeError,
+    NotImplementedError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
@@ -34,14 +42,23 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
         else:
             _check_members(path)
             with np.load(path, allow_pickle=False) as arrays:
-                tree = {name: _node(arrays[name]) for name in arrays.files}
+                tree = {name: _member(arrays, name, path) for name in arrays.files}
     except ReaderError:
         raise
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError, SyntaxError) as error:
-        if "allow_pickle" in str(error) or "Object arrays" in str(error):
-            raise _objects(path) from error
+    except _DAMAGES as error:
+        if "allow_pickle" in str(error) or "Array can't be memory-mapped: Python objects" in str(error):
+            raise _objects(path, "the array") from error
         raise damaged(path, "NumPy", error) from error
     return table_of(tree, path=path, reader="numpy", options=options)
+
+
+def _member(arrays: Any, name: str, path: Path) -> Any:
+    try:
+        return _node(arrays[name])
+    except ValueError as error:
+        if "allow_pickle" not in str(error):
+            raise
+        return refused(_objects(path, name))
 
 
 def _check_members(path: Path) -> None:
@@ -70,9 +87,9 @@ def _node(array: NDArray[Any]) -> Any:
     return str(array) if array.ndim == 0 and array.dtype.kind in "US" else np.asarray(array)
 
 
-def _objects(path: Path) -> ReaderError:
+def _objects(path: Path, name: str) -> ReaderError:
     return ReaderError(
-        "the file holds Python objects, which are never loaded",
+        f"{name} holds Python objects, which are never loaded",
         where=path,
         expected="arrays of numbers",
         got="an array of objects (a pickle)",

@@ -7,7 +7,7 @@ word in the name for each record (``uEst``, ``uVal``).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -216,7 +216,7 @@ def _by_word(table: RawTable, found: list[Found]) -> list[RecordChoice]:
     for tag_of, needs_lengths in ((_word_tag, False), (_short_tag, True), (_number_tag, True)):
         tags: dict[str, dict[str, Found]] = {}
         for item in plain:
-            split = tag_of(item.stem)
+            split = _split(item.stem, tag_of)
             if split is not None:
                 stem, tag = split
                 tags.setdefault(tag, {})[f"{'.'.join((*item.path, ''))}{stem}"] = item
@@ -226,6 +226,13 @@ def _by_word(table: RawTable, found: list[Found]) -> list[RecordChoice]:
         if len(tags) > 1 and all(len(own) == 1 for own in lengths) and (differ or not needs_lengths):
             return [_column_record(table, tag, members) for tag, members in tags.items()]
     return []
+
+
+def _split(name: str, tag_of: Callable[[str], tuple[str, str] | None]) -> tuple[str, str] | None:
+    """The stem and the tag of a name; the number of a column of a matrix stays with the stem."""
+    matrix = re.fullmatch(r"(.+)(_\d+)", name)
+    split = tag_of(matrix[1]) if matrix else None
+    return (f"{split[0]}{matrix[2]}", split[1]) if matrix and split else tag_of(name)
 
 
 def _agreeing(tags: dict[str, dict[str, Found]]) -> dict[str, dict[str, Found]]:
