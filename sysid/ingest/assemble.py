@@ -21,7 +21,7 @@ from sysid.ingest.timing import Timing, survey
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
 
-_MOST_POINTS, _MOST_TIMES = 10_000_000, 1000
+_MOST_POINTS, _MOST_TIMES = 1_000_000, 1000
 
 T = TypeVar("T", str, Reference)
 

@@ -66,7 +66,8 @@ def clock_of(values: NDArray[np.float64], name: str, *, origin: int = 0) -> Cloc
         >>> clock_of(np.array([1.7e12, 1.7e12 + 100.0]), "stamp").told
         'ms since 1970'
     """
-    known = values[np.isfinite(values)]
+    finite = np.isfinite(values)
+    known = values if finite.all() else values[finite]
     if len(known) < 2:
         return None
     steps = np.diff(known[:10_000])

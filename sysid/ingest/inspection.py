@@ -196,7 +196,7 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
     needs: dict[str, object] = {}
     if time.step is None:
         stamps = stamps_in_seconds(table, files.model_copy(update={"time": time}))
-        known = stamps[np.isfinite(stamps)]
+        known = _finite(stamps)
         unstamped = len(stamps) - len(known)
         timing = survey(known) if len(known) else None
         if timing is not None:
@@ -347,10 +347,17 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
 def _step_in_a_column(columns: Sequence[RawColumn]) -> float | None:
     """The sample time, where it stands in a column of its own, as public benchmarks have it: ``Ts`` with one value."""
     for column in columns:
-        values = np.unique(column.values[np.isfinite(column.values)])
-        if column.name.lower() in _STEP_NAMES and len(values) == 1 and values[0] > 0.0:
-            return float(values[0])
+        if column.name.lower() in _STEP_NAMES:
+            values = np.unique(_finite(column.values))
+            if len(values) == 1 and values[0] > 0.0:
+                return float(values[0])
     return None
+
+
+def _finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The finite ones; the same array, not a copy, where all are."""
+    known = np.isfinite(values)
+    return values if known.all() else values[known]
 
 
 def _rising(columns: Sequence[RawColumn]) -> str | None:
@@ -367,11 +374,12 @@ def _rising(columns: Sequence[RawColumn]) -> str | None:
 
 def _needs(known: NDArray[np.float64], timing: Timing) -> tuple[float, dict[str, object]]:
     """Sample time, and the repairs of time that the stamps need."""
-    clean = survey(np.sort(known))
+    known = known if timing.in_order else np.sort(known)
+    clean = timing if timing.in_order else survey(known)
     if not clean.step > 0.0:
         return 1.0, {"duplicates": "drop" if len(clean.duplicates) else None}
-    rising = np.delete(np.sort(known), clean.duplicates)
-    even = even_step(rising, survey(rising), tolerance=GridOptions().tolerance)
+    rising = np.delete(known, clean.duplicates) if len(clean.duplicates) else known
+    even = even_step(rising, clean if rising is known else survey(rising), tolerance=GridOptions().tolerance)
     step = round_step(clean.step) if even is None else even
     return step, {
         "backward": "sort" if len(timing.backward) else None,
@@ -382,7 +390,7 @@ def _needs(known: NDArray[np.float64], timing: Timing) -> tuple[float, dict[str,
 
 
 def _column(column: RawColumn) -> ColumnFinding:
-    finite = column.values[np.isfinite(column.values)]
+    finite = _finite(column.values)
     problem = "" if column.problem is None else column.problem.what
     if not problem and len(finite) < min(2, len(column.values)):
         problem = f"one value only, {finite[0]:g}" if len(finite) else "no values at all"
@@ -421,7 +429,9 @@ def _unit_in_name(name: str) -> str | None:
 def _guess_reference(values: NDArray[np.float64], unit: str) -> Reference:
     if not is_pressure(unit):
         return Reference.NONE
-    pascals = convert(values, unit, "Pa")
+    if not len(values):
+        return Reference.GAUGE
     # An absolute record that is ever at rest shows the atmosphere as its smallest value.
-    near_atmosphere = len(values) and 0.8 < float(pascals.min()) / STANDARD_ATMOSPHERE_PA < 1.15
+    lowest = float(convert(values.min(keepdims=True), unit, "Pa")[0])
+    near_atmosphere = 0.8 < lowest / STANDARD_ATMOSPHERE_PA < 1.15
     return Reference.ABSOLUTE if near_atmosphere else Reference.GAUGE

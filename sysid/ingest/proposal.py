@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 from sysid.errors import ReaderError
 from sysid.ingest.inspection import ColumnFinding, FileFinding
@@ -14,14 +16,15 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_/.^-]*(?: [A-Za-z0-9_/.^-]+)*")
 _WORDS = {"true", "false", "null", "on", "off", "yes", "no", "y", "n"}
 
 
-def propose_dataset(finding: FileFinding) -> str:
+def propose_dataset(finding: FileFinding, *, folder: Path | None = None) -> str:
     """Write the description of a data set that holds one inspected file.
 
     Args:
         finding: From :func:`~sysid.ingest.inspection.inspect_file`.
+        folder: Where it will be saved; ``None`` is beside the file.
 
     Returns:
-        YAML to be saved as ``dataset.yaml`` beside the file.
+        YAML to be saved as ``dataset.yaml``.
 
     Raises:
         ReaderError: If the file has no column that can be a channel.
@@ -47,7 +50,7 @@ def propose_dataset(finding: FileFinding) -> str:
         *_grid(finding),
         *_repairs(finding),
         "cases:",
-        *_cases(finding),
+        *_cases(finding, _seen_from(finding.path, folder)),
         'provenance: ""',
         'licence: ""',
     ]
@@ -68,8 +71,16 @@ def _channel(column: ColumnFinding) -> str:
     return f"{_mapping(pairs)}  # {told}{column.minimum:g} to {column.maximum:g}"
 
 
-def _cases(finding: FileFinding) -> list[str]:
-    file = finding.path.name
+def _seen_from(path: Path, folder: Path | None) -> str:
+    if folder is None or folder.resolve() == path.parent.resolve():
+        return path.name
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # another drive
+        return path.resolve().as_posix()
+
+
+def _cases(finding: FileFinding, file: str) -> list[str]:
     if not finding.cases:
         return [f"  {_text(finding.path.stem)}: {_mapping({'role': 'estimation', 'file': file})}"]
     lines = []

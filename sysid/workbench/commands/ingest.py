@@ -73,7 +73,7 @@ def _no_such(path: Path) -> ConfigError:
 
 
 def _show_file(found: FileFinding, propose: Path | None) -> None:
-    proposal = propose_dataset(found)
+    proposal = propose_dataset(found, folder=None if propose is None else propose.parent)
     if propose is not None and propose.exists():
         raise ConfigError(
             "the file for the proposal is there already",
