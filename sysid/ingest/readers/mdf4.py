@@ -10,7 +10,7 @@ import numpy as np
 from sysid.errors import MissingExtraError, ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.joining import Signal, joined_signals
-from sysid.ingest.readers.reader import Reader, damaged
+from sysid.ingest.readers.reader import Reader, damaged, silent
 from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable
 
@@ -28,10 +28,11 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     if mark not in _MARKS:
         raise damaged(path, "MDF", ValueError(f"it begins with {mark!r}"))
     try:
-        file = MDF(path)
+        with silent():
+            file = MDF(path)
     except Exception as error:  # asammdf raises MdfException, struct.error, IndexError ... on damaged files
         raise damaged(path, "MDF", error) from error
-    with file:
+    with file, silent():
         groups = {name: signals for name, signals in _groups(file).items() if signals}
     columns, notes = joined_signals(_choose(groups, options.group, path), path)
     return table_of(columns, path=path, reader="mdf4", options=options.model_copy(update={"group": None}), notes=notes)

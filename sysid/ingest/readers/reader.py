@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -127,6 +129,17 @@ def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOpt
             got=str(error).splitlines()[0] if str(error) else type(error).__name__,
             remedy="check permissions, that the copy is complete, and that the ending tells the format",
         ) from error
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Keep a library from telling in its log what our error or note says."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def damaged(path: Path, kind: str, error: BaseException) -> ReaderError:

@@ -12,7 +12,7 @@ from sysid.errors import MissingExtraError, ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.joining import Signal, joined_signals
 from sysid.ingest.readers.leaves import Leaf
-from sysid.ingest.readers.reader import Reader, damaged
+from sysid.ingest.readers.reader import Reader, damaged, silent
 from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable
 
@@ -24,8 +24,9 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
         raise MissingExtraError("npTDMS", "tdms", f"reading {path.name}") from error
 
     try:
-        file = TdmsFile.read(path)
-        groups = {group.name: [channel for channel in group.channels() if len(channel)] for group in file.groups()}
+        with silent():
+            file = TdmsFile.read(path)
+            groups = {group.name: [channel for channel in group.channels() if len(channel)] for group in file.groups()}
     except Exception as error:  # npTDMS raises ValueError, KeyError, struct.error ... on damaged files
         raise damaged(path, "TDMS", error) from error
     notes = ["the file breaks off in its last segment"] if file.file_status.incomplete_final_segment else []
