@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_members import fixed_model
-from sysid.composite.keeper import Keeper, MakeAll, Task
-from sysid.composite.members import Members, geometric_mean, own_traces
+from sysid.composite.keeper import Decision, Keeper, MakeAll, Task
+from sysid.composite.members import Members, assembled, geometric_mean, own_traces
 from sysid.composite.plan import TrainingPlan
 from sysid.composite.stages import Choice, choose_together, fit_member, model_of, one_step_of
 from sysid.errors import ConfigError
@@ -21,6 +22,8 @@ from sysid.traces import Trace
 
 SEEDS_OF_A_CANDIDATE = 1000
 """How far the seeds of one candidate are from the next one's of the same structure."""
+
+CHOOSING, CHOOSING_TITLE = "choosing", "Choosing the members by the error of the whole"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,18 +126,22 @@ def fit_candidates(
     """
     keeper = keeper or MakeAll()
     asked = {one.output: _asked(one, (given or {}).get(one.output, ())) for one in composite.members}
+    tasks = [
+        task
+        for wanted in asked.values()
+        for index, one in enumerate(wanted)
+        for task in _tasks(one, index, plan, estimation, selection)
+    ]
+    found = iter(keeper.keep_all(tasks))
     fits = {
-        output: tuple(
-            _fitted(one, index, estimation, selection, plan=plan, keeper=keeper) for index, one in enumerate(wanted)
-        )
-        for output, wanted in asked.items()
+        output: tuple(_candidate(one, found, plan, selection) for one in wanted) for output, wanted in asked.items()
     }
     fixed = {one.output: fixed_model(one, estimation[0]) for one in composite.fixed}
     alone = {name: int(np.argmin([one.error for one in own])) for name, own in fits.items()}
-    found = Candidates(fits=fits, fixed=fixed, alone=alone, choice=None)
+    alone_best = Candidates(fits=fits, fixed=fixed, alone=alone, choice=None)
     if max(map(len, fits.values())) == 1:
-        return found
-    return replace(found, choice=_choice(composite, plan, found, selection, keeper))
+        return alone_best
+    return replace(alone_best, choice=_choice(composite, plan, alone_best, selection, keeper))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -170,26 +177,51 @@ def _asked(member: Member, given: Sequence[FitResult]) -> list[_Asked]:
     return own
 
 
-def _fitted(
-    asked: _Asked,
-    index: int,
-    estimation: Sequence[Trace],
-    selection: Sequence[Trace],
-    *,
-    plan: TrainingPlan,
-    keeper: Keeper,
-) -> Candidate:
-    """One candidate."""
-    member, fit = asked.member, asked.given
-    title = f"{member.mapping}, candidate {index + 1}, {member.structure.label}"
-    if fit is None:
-        fit = keeper.keep(_task(member, f"{member.mapping} {index}", f"Fitting {title}", estimation, selection))
-    one_step = None
+def _tasks(
+    asked: _Asked, index: int, plan: TrainingPlan, estimation: Sequence[Trace], selection: Sequence[Trace]
+) -> list[Task[FitResult]]:
+    """The fits of one candidate: in free run, unless it is given, and one step ahead, if that is asked for."""
+    member, tasks = asked.member, list[Task[FitResult]]()
+    title = candidate_title(member, index)
+    if asked.given is None:
+        tasks.append(_task(member, candidate_name(member, index), title, estimation, selection))
     if plan.one_step is not None:
-        ahead = one_step_of(member, plan.one_step)
-        name, said = f"{member.mapping} {index} one step", f"Fitting {title}, one step ahead"
-        one_step = model_of(keeper.keep(_task(ahead, name, said, estimation, selection)))
-    model = model_of(fit)
+        name = f"{candidate_name(member, index)} one step"
+        tasks.append(_task(one_step_of(member, plan.one_step), name, f"{title}, one step ahead", estimation, selection))
+    return tasks
+
+
+def candidate_name(member: Member, index: int) -> str:
+    """What a candidate's fit is stored as.
+
+    Args:
+        member: The member.
+        index: Which of its candidates, from 0 on.
+
+    Returns:
+        The name.
+    """
+    return f"{member.mapping} {index}"
+
+
+def candidate_title(member: Member, index: int) -> str:
+    """What a candidate's fit is for people.
+
+    Args:
+        member: The member, with the candidate's structure.
+        index: Which of its candidates, from 0 on.
+
+    Returns:
+        For example ``"Fitting pump -> upper, candidate 1, NARX 1/1/4"``.
+    """
+    return f"Fitting {member.mapping}, candidate {index + 1}, {member.structure.label}"
+
+
+def _candidate(asked: _Asked, found: Iterator[FitResult], plan: TrainingPlan, selection: Sequence[Trace]) -> Candidate:
+    """One candidate, its fits being those that come next."""
+    member = asked.member
+    model = model_of(next(found) if asked.given is None else asked.given)
+    one_step = None if plan.one_step is None else model_of(next(found))
     return Candidate(member=member, model=model, one_step=one_step, error=_alone(member, model, selection))
 
 
@@ -206,6 +238,12 @@ def _task(
         runs=(fit_member,),
         make=partial(fit_member, member, estimation, selection),
         kind=FitResult,
+        limit_s=member.training.max_time_s,
+        amount={
+            "structure": member.structure.to_dict(),
+            "training": str(replace(member.training, seed=0)),
+            "samples": [len(trace) for trace in own],
+        },
     )
 
 
@@ -222,16 +260,26 @@ def _choice(
     composite: Composite, plan: TrainingPlan, found: Candidates, selection: Sequence[Trace], keeper: Keeper
 ) -> Choice:
     """Which candidates the whole does best with."""
-    title = "Choosing the members by the error of the whole"
-    keeper.say(title)
     models = {name: [one.model for one in own] for name, own in found.fits.items()}
-    choice = choose_together(
-        composite,
-        {**models, **{name: [model] for name, model in found.fixed.items()}},
-        {**found.alone, **dict.fromkeys(found.fixed, 0)},
-        selection,
-        outputs=plan.outputs,
-        report=lambda text: keeper.say(title, text),
+    both: Mapping[str, Sequence[NARXModel]] = {**models, **{name: [model] for name, model in found.fixed.items()}}
+    alone = {**found.alone, **dict.fromkeys(found.fixed, 0)}
+
+    def make(say: Callable[[str], None]) -> dict[str, Any]:
+        return asdict(choose_together(composite, both, alone, selection, outputs=plan.outputs, report=say))
+
+    decided = keeper.decide(
+        Decision(
+            name=CHOOSING,
+            title=CHOOSING_TITLE,
+            terms={
+                "models": {name: [model.to_dict() for model in own] for name, own in both.items()},
+                "whole": assembled(composite, {name: own[alone[name]] for name, own in both.items()}).to_dict(),
+                "outputs": list(plan.outputs),
+                "selection": [trace.digest for trace in selection],
+            },
+            runs=(choose_together, *{type(model) for own in both.values() for model in own}),
+            make=make,
+            outcome=lambda choice: f"{choice['tried']} wholes, best {choice['score']:.3g}",
+        )
     )
-    keeper.say(title, f"{choice.tried} wholes, best {choice.score:.3g}", done=True)
-    return choice
+    return Choice(**decided)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -26,6 +26,8 @@ class Task(Generic[Fit]):
         make: Does it; given whom to tell after every iteration.
         kind: What comes of it, for who reads it back.
         put: What a stored result comes to here: the same part of a whole may stand in another whole now.
+        limit_s: Seconds after which it ends in any case.
+        amount: JSON values that say how much work it is, for who tells how long it will take.
     """
 
     name: str
@@ -35,6 +37,29 @@ class Task(Generic[Fit]):
     make: Callable[[Report], Fit]
     kind: type[Fit]
     put: Callable[[Fit], Fit] = lambda fit: fit
+    limit_s: float = float("inf")
+    amount: Any = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """Something small that takes a while to find out, and is kept as well.
+
+    Args:
+        name: What it is stored as.
+        title: What it is for people.
+        terms: JSON values of all that it depends on, beside the code.
+        runs: Functions and classes whose code it runs, or their addresses.
+        make: Finds out; given whom to tell how it goes. Gives JSON values.
+        outcome: How it came out, in words.
+    """
+
+    name: str
+    title: str
+    terms: Mapping[str, Any]
+    runs: tuple[Callable[..., Any] | str, ...]
+    make: Callable[[Callable[[str], None]], dict[str, Any]]
+    outcome: Callable[[dict[str, Any]], str]
 
 
 class Keeper(Protocol):
@@ -45,6 +70,26 @@ class Keeper(Protocol):
 
         Args:
             task: The task.
+
+        Returns:
+            What its ``make`` gives, or gave when the terms were the same.
+        """
+
+    def keep_all(self, tasks: Sequence[Task[Fit]]) -> list[Fit]:
+        """The results of tasks that do not depend on each other.
+
+        Args:
+            tasks: The tasks.
+
+        Returns:
+            What :meth:`keep` gives for each.
+        """
+
+    def decide(self, decision: Decision) -> dict[str, Any]:
+        """What a decision comes to.
+
+        Args:
+            decision: The decision.
 
         Returns:
             What its ``make`` gives, or gave when the terms were the same.
@@ -73,6 +118,14 @@ class MakeAll:
     def keep(self, task: Task[Fit]) -> Fit:
         """Make it."""
         return task.make(self.on_progress)
+
+    def keep_all(self, tasks: Sequence[Task[Fit]]) -> list[Fit]:
+        """Make each."""
+        return [self.keep(task) for task in tasks]
+
+    def decide(self, decision: Decision) -> dict[str, Any]:
+        """Find out."""
+        return decision.make(lambda _: None)
 
     def say(self, title: str, detail: str = "", *, done: bool = False) -> None:
         """Say nothing."""

@@ -310,6 +310,7 @@ class _Training:
                         estimation=data.estimation, selection=data.selection, max_iterations=asked.max_iterations,
                     ),
                     kind=FitResult,
+                    limit_s=member.training.max_time_s,
                 )  # fmt: skip
                 changed = {**models, output: model_of(self.keeper.keep(task))}
                 done = Retrained(output=output, round=number + 1, before=best, after=self._score(changed))
@@ -389,6 +390,7 @@ class _Training:
             make=lambda report: ready.put(ready.fit(report)),
             kind=CascadeFit,
             put=ready.put,
+            limit_s=ready.training.max_time_s,
         )
         fit = self.keeper.keep(task)
         self.rounds.append(TrainedRound.of(self.composite, one, ready, fit, called))

@@ -6,6 +6,7 @@ both. An entry whose digest does not fit is not trusted: the trace is made again
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
@@ -86,6 +87,52 @@ class TraceCache:
         except (KeyError, TypeError, ValueError, zipfile.BadZipFile, TraceError) as error:
             _log.warning("the cached trace %s is damaged (%s) and is made again", samples, error)
             return None
+
+    def has(self, key: str) -> bool:
+        """Whether there is a trace, damaged or not.
+
+        Args:
+            key: From :func:`content_key`.
+
+        Returns:
+            Whether its files are there.
+        """
+        return all(file.is_file() for file in self._files(key))
+
+    def note_time(self, generator: str, seconds: float) -> None:
+        """Keep how long a generator took for a trace.
+
+        Args:
+            generator: Its name.
+            seconds: How long.
+        """
+        times = self._times()
+        before = times.get(generator, {"seconds": 0.0, "traces": 0})
+        times[generator] = {"seconds": before["seconds"] + seconds, "traces": before["traces"] + 1}
+        with contextlib.suppress(OSError), replacing(self._times_file) as draft:  # told, not decided by
+            draft.write_text(json.dumps(times), encoding="utf-8")
+
+    def mean_time(self, generator: str) -> float | None:
+        """How long a generator takes for a trace on this machine.
+
+        Args:
+            generator: Its name.
+
+        Returns:
+            Seconds, the mean of those that it has made; ``None`` if it has made none.
+        """
+        known = self._times().get(generator)
+        return None if known is None else float(known["seconds"]) / float(known["traces"])
+
+    @property
+    def _times_file(self) -> Path:
+        return self.folder / "times.json"
+
+    def _times(self) -> dict[str, Any]:
+        try:
+            return dict(json.loads(self._times_file.read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):
+            return {}
 
     def store(self, key: str, trace: Trace) -> None:
         """Keep a trace; a folder that cannot be written to is reported and otherwise ignored.

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.content import content_folders, unique_folders
@@ -160,21 +162,69 @@ def _choose(description: DatasetDescription, cases: Sequence[str] | None, path: 
     return [case for case in known if case in cases]
 
 
-def _generated(description: DatasetDescription, case: str, generator: Generator, store: TraceCache | None) -> Trace:
-    recipe = description.cases[case].recipe or {}
-    key = content_key(
+@dataclass(frozen=True, kw_only=True)
+class Unmade:
+    """What a generator has yet to make before a data set can be loaded.
+
+    Args:
+        cases: How many traces.
+        generator: Its name.
+        seconds: How long that takes by what it has made on this machine; ``None`` if it has made nothing yet.
+    """
+
+    cases: int
+    generator: str
+    seconds: float | None
+
+
+def unmade(name_or_path: str | Path, *, search: Sequence[Path] | None = None) -> Unmade | None:
+    """Whether loading a data set makes traces first; nothing is made or read.
+
+    Args:
+        name_or_path: As for :func:`load_dataset`.
+        search: Folders to look in for names, instead of the usual ones.
+
+    Returns:
+        What is to be made; ``None`` for a data set of files, or one whose traces are all kept.
+
+    Raises:
+        ConfigError: If there is no such data set, or its description cannot be used.
+    """
+    path = find_dataset(name_or_path, search=search)
+    description = read_description(path)
+    if description.source.generator is None:
+        return None
+    generator, store = (
+        find_generator(description.source.generator, where=path),
+        TraceCache(folder=default_cache_folder()),
+    )
+    cases = sum(not store.has(_key(description, case, generator)) for case in description.cases)
+    mean = store.mean_time(generator.name)
+    seconds = None if mean is None else cases * mean
+    return Unmade(cases=cases, generator=generator.name, seconds=seconds) if cases else None
+
+
+def _key(description: DatasetDescription, case: str, generator: Generator) -> str:
+    """What a generated trace is kept under."""
+    return content_key(
         {
             "generator": [generator.name, generator.version],
             "case": case,
-            "recipe": recipe,
+            "recipe": description.cases[case].recipe or {},
             "options": description.source.options,
             "channels": [channel.model_dump(mode="json") for channel in description.channels],
             "sample_time": description.sample_time,
         }
     )
+
+
+def _generated(description: DatasetDescription, case: str, generator: Generator, store: TraceCache | None) -> Trace:
+    recipe = description.cases[case].recipe or {}
+    key = _key(description, case, generator)
     kept = store.load(key) if store is not None else None
     if kept is not None:
         return kept
+    began = time.perf_counter()
     trace = generator.make(
         case=case,
         recipe=recipe,
@@ -194,6 +244,7 @@ def _generated(description: DatasetDescription, case: str, generator: Generator,
     )
     if store is not None:
         store.store(key, finished)
+        store.note_time(generator.name, time.perf_counter() - began)
     return finished
 
 

@@ -1,6 +1,6 @@
-"""Kinds of pipelines: what the ``kind`` at the top of a pipeline's YAML means, and who runs it.
+"""Kinds of pipelines: what the ``kind`` at the top of a pipeline's YAML means, and which steps it has.
 
-One row a kind, in :data:`KINDS`. A row names its configuration and its runner as ``module:attribute``, so that nothing
+One row a kind, in :data:`KINDS`. A row names its configuration and its program as ``module:attribute``, so that nothing
 is imported before it is used.
 """
 
@@ -20,6 +20,8 @@ from sysid.yaml_files import Origins, read_yaml
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
+    from sysid.workbench.runner.program import Program
+
 DEFAULT = "fits"
 """The kind of a pipeline that names none."""
 
@@ -34,6 +36,7 @@ class RunRequest:
         fresh: Do everything again.
         out: The run folder; ``None`` for ``runs/<name>``.
         tracking: Whether the run is tracked in MLflow.
+        workers: Processes that train, where a sweep's YAML is not to say.
     """
 
     path: Path
@@ -41,6 +44,7 @@ class RunRequest:
     fresh: bool = False
     out: Path | None = None
     tracking: bool = True
+    workers: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,43 +53,42 @@ class Kind:
 
     Args:
         config: Its pydantic model, as ``module:attribute``.
-        runner: A function of a :class:`RunRequest` that gives the exit code, as ``module:attribute``.
+        program: A function of a :class:`RunRequest` that gives its :class:`~sysid.workbench.runner.program.Program`, as
+            ``module:attribute``.
     """
 
     config: str
-    runner: str
+    program: str
 
     def load_config(self) -> type[BaseModel]:
         """The pydantic model."""
         loaded: type[BaseModel] = _load(self.config)
         return loaded
 
-    def load_runner(self) -> Callable[[RunRequest], int]:
-        """The runner."""
-        loaded: Callable[[RunRequest], int] = _load(self.runner)
+    def load_program(self) -> Callable[[RunRequest], Program[Any]]:
+        """What turns a request into steps."""
+        loaded: Callable[[RunRequest], Program[Any]] = _load(self.program)
         return loaded
 
 
 FOUND: dict[str, Kind] = {
     "sysid.judges": Kind(
         config="sysid.workbench.judging.config:JudgementConfig",
-        runner="sysid.workbench.judging.runner:run_judgement",
+        program="sysid.workbench.judging.runner:program",
     ),
     "sysid.makers": Kind(
-        config="sysid.workbench.making.config:MakingConfig", runner="sysid.workbench.making.runner:run_making"
+        config="sysid.workbench.making.config:MakingConfig", program="sysid.workbench.making.runner:program"
     ),
 }
 """Entry-point groups whose names are kinds too: packages bring them, and what they are about is not known here."""
 
 KINDS: dict[str, Kind] = {
-    DEFAULT: Kind(config="sysid.workbench.fits.config:PipelineConfig", runner="sysid.workbench.commands.run:run_fits"),
+    DEFAULT: Kind(config="sysid.workbench.fits.config:PipelineConfig", program="sysid.workbench.fits.run:program"),
     "assembly": Kind(
         config="sysid.workbench.assembly.config:AssemblyConfig",
-        runner="sysid.workbench.assembly.runner:run_assembly",
+        program="sysid.workbench.assembly.runner:program",
     ),
-    "sweep": Kind(
-        config="sysid.workbench.sweep.config:SweepConfig", runner="sysid.workbench.commands.sweep:run_sweep_request"
-    ),
+    "sweep": Kind(config="sysid.workbench.sweep.config:SweepConfig", program="sysid.workbench.sweep.run:program"),
 }
 """The kinds by name."""
 

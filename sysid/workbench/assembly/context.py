@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from sysid.code_digest import code_digest
-from sysid.composite.keeper import Fit, Task
-from sysid.content import content_folders
-from sysid.estimation import CascadeFit, FitProgress, FitResult
+from sysid.composite.keeper import Decision, Fit, Task
+from sysid.estimation import CascadeFit, FitResult
 from sysid.traces import TraceSet
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import Joined
+from sysid.workbench.fits.data import load_named, unmade_data
 from sysid.workbench.fits.record import is_final, read_fit, write_fit
 from sysid.workbench.fits.steps import STORED_BY
 from sysid.workbench.runner import events
 from sysid.workbench.runner.naming import slug
+from sysid.workbench.runner.run import Run
+from sysid.workbench.runner.steps import NOT_KNOWN, Done, Outlined, Step, Work
 from sysid.workbench.runner.store import RunFolder, digest, read_json, strict, write_json
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -29,30 +33,20 @@ class Context:
         config: The pipeline.
         joined: Its YAML, with what that extends.
         beside: Folder of the YAML, where data sets are looked for first.
-        store: Folder of the run.
-        command: What was typed.
-        fresh: Whether everything is done again, whatever is stored.
-        watchers: Told of every event.
+        run: Does the steps.
         digests: SHA-256 of every data set that was read, by name.
     """
 
     config: AssemblyConfig
     joined: Joined
     beside: Path
-    store: RunFolder
-    command: str
-    fresh: bool
-    watchers: Sequence[events.Watcher]
+    run: Run
     digests: dict[str, str] = field(default_factory=dict)
 
-    def tell(self, event: events.Event) -> None:
-        """Tell the watchers.
-
-        Args:
-            event: What happened.
-        """
-        for watch in self.watchers:
-            watch(event)
+    @property
+    def store(self) -> RunFolder:
+        """The run folder."""
+        return self.run.store
 
     def load(self, name: str) -> TraceSet:
         """Load a data set.
@@ -63,20 +57,26 @@ class Context:
         Returns:
             Its traces.
         """
-        from sysid.ingest import load_dataset
-
-        step, local = f"Loading {name}", self.beside / name
-        self.tell(events.StepStarted(step=step))
-        loaded = load_dataset(
-            local if local.exists() else name,
-            search=(self.beside.parent / "datasets", *content_folders("datasets")),
-            progress=lambda case, index, count: self.tell(
-                events.StepProgress(step=step, fraction=index / count, detail=f"{case} ({index + 1} of {count})")
-            ),
-        )
-        self.tell(events.StepDone(step=step, stored=False, detail=f"{len(loaded)} traces"))
+        loaded = self.run.do(self._loading(name)).value
         self.digests[loaded.name] = loaded.digest
         return loaded
+
+    def _loading(self, name: str) -> Step[TraceSet]:
+        def make(work: Work) -> TraceSet:
+            return load_named(
+                name,
+                self.beside,
+                progress=lambda case, index, count: work.say(f"{case} ({index + 1} of {count})", index / count),
+            )
+
+        return Step(
+            name=f"data-{slug(name)}",
+            title=f"Loading {name}",
+            make=make,
+            outcome=lambda loaded: f"{len(loaded)} traces",
+            at_hand=lambda: unmade_data([name], beside=self.beside) is None,
+            how_long=lambda: unmade_data([name], beside=self.beside) or NOT_KNOWN,
+        )
 
     def keep(self, task: Task[Fit]) -> Fit:
         """The result of a task of the training, stored under what it depends on.
@@ -87,23 +87,72 @@ class Context:
         Returns:
             What it comes to.
         """
-        # What the YAML asks for is not code, and is among the terms.
-        code = code_digest(*task.runs, STORED_BY, without=("sysid.workbench",))
-        key = digest(strict({"code": code, "terms": dict(task.terms)}))
-        name, form = slug(task.name), _FORMS[task.kind]
+        (found,) = self.keep_all([task])
+        return found
+
+    def keep_all(self, tasks: Sequence[Task[Fit]]) -> list[Fit]:
+        """The results of tasks that do not depend on each other.
+
+        Args:
+            tasks: The tasks.
+
+        Returns:
+            What they come to, each stored before the next begins.
+        """
+        done = [self._kept(task) for task in tasks]
+        return [one.value for one in done]
+
+    def _kept(self, task: Task[Fit]) -> Done[Fit]:
+        key, form, name = _key(task.runs, task.terms), _FORMS[task.kind], slug(task.name)
         stamp, place = form.stamp.format(name=name), self.store.path / form.place.format(name=name)
-        self.tell(events.StepStarted(step=task.title))
-        before = None
-        if not self.fresh and self.store.is_done(stamp, key):
-            before = form.read(place)
-        fit = task.make(self.reporter(task.title)) if before is None else task.put(before)
-        if before is None or before.model.to_dict() != fit.model.to_dict():
-            files = form.write(place, fit)
-            if is_final(fit):
-                self.store.mark_done(stamp, key, files)
-        detail = f"{fit.train_time_s:.1f} s, {fit.status.value}"
-        self.tell(events.StepDone(step=task.title, stored=before is not None, detail=detail))
-        return fit
+        done = self.run.do(
+            Step(
+                name=stamp,
+                title=task.title,
+                make=lambda work: task.make(work.watch(task.limit_s)),
+                key=lambda: key,
+                write=lambda fit: form.write(place, fit),
+                read=lambda _: task.put(form.read(place)),
+                outcome=lambda fit: f"{fit.train_time_s:.1f} s, {fit.status.value}",
+                final=is_final,
+                amount=lambda: task.amount,
+            )
+        )
+
+        def renew() -> None:
+            # The file has the whole as it now stands, whatever else of it has changed since the round was trained.
+            if done.stored and form.read(place).model.to_dict() != done.value.model.to_dict():
+                self.store.mark_done(stamp, key, form.write(place, done.value))
+
+        self.run.then(renew)
+        return done
+
+    def decide(self, decision: Decision) -> dict[str, Any]:
+        """What a decision of the training comes to, stored under what it depends on.
+
+        Args:
+            decision: The decision.
+
+        Returns:
+            JSON values.
+        """
+        file, key = self.store.path / "steps" / f"{slug(decision.name)}.json", _key(decision.runs, decision.terms)
+
+        def write(values: dict[str, Any]) -> list[Path]:
+            write_json(file, values)
+            return [file]
+
+        return self.run.do(
+            Step(
+                name=slug(decision.name),
+                title=decision.title,
+                make=lambda work: decision.make(work.say),
+                key=lambda: key,
+                write=write,
+                read=lambda _: dict(read_json(file)),
+                outcome=decision.outcome,
+            )
+        ).value
 
     def say(self, title: str, detail: str = "", *, done: bool = False) -> None:
         """Tell of work of the training whose result is not stored.
@@ -113,28 +162,38 @@ class Context:
             detail: How it goes.
             done: Whether it has ended.
         """
+        self.run.go_on()
         if done:
-            self.tell(events.StepDone(step=title, stored=False, detail=detail))
+            self.run.tell(events.StepDone(step=title, stored=False, detail=detail))
         elif detail:
-            self.tell(events.StepProgress(step=title, fraction=None, detail=detail))
+            self.run.tell(events.StepProgress(step=title, fraction=None, detail=detail))
         else:
-            self.tell(events.StepStarted(step=title))
+            self.run.tell(events.StepStarted(step=title))
 
-    def reporter(self, step: str) -> Callable[[FitProgress], None]:
-        """Whom a training tells after every iteration.
+    def compute(
+        self,
+        step: Outlined,
+        make: Callable[[Work], T],
+        *,
+        outcome: Callable[[T], str] = lambda _: "",
+    ) -> T:
+        """Something that is done every time.
 
         Args:
-            step: Title of the step.
+            step: Its name and title.
+            make: Does it.
+            outcome: How it came out, in words.
 
         Returns:
-            The callback.
+            What came of it.
         """
+        return self.run.do(Step(name=step.name, title=step.title, make=make, outcome=outcome)).value
 
-        def report(entry: FitProgress) -> None:
-            detail = f"start {entry.start} of {entry.starts}, {entry.stage}, iteration {entry.iteration}"
-            self.tell(events.StepProgress(step=step, fraction=entry.fraction, detail=f"{detail}, mse {entry.mse:.3g}"))
 
-        return report
+def _key(runs: Iterable[Callable[..., Any] | str], terms: Mapping[str, Any]) -> str:
+    """Digest of what a result depends on; what the YAML asks for is not code, and is among the terms."""
+    code = code_digest(*runs, STORED_BY, without=("sysid.workbench",))
+    return digest(strict({"code": code, "terms": dict(terms)}))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from sysid.composite.monte_carlo import Stress, stress
 from sysid.composite.training import TrainedComposite
 from sysid.models import Cascade
 from sysid.reporting.assembly.results import AssemblyResults
-from sysid.reporting.records import RESULTS_FILE, write_record
 from sysid.traces import Trace, TraceSet
 from sysid.validation import evaluate_cascade
 from sysid.workbench.annotation import find_annotator
@@ -24,6 +23,7 @@ from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.member_scores import score_candidates
 from sysid.workbench.assembly.record import Outcome, assembly_results, write_signals
 from sysid.workbench.runner import events
+from sysid.workbench.runner.steps import Outlined, Work
 from sysid.workbench.runner.store import digest, strict, write_json
 
 if TYPE_CHECKING:
@@ -31,6 +31,12 @@ if TYPE_CHECKING:
 
 ASSEMBLY, LINE = "assembly.json", "line.json"
 """In the run folder: the chosen whole, and its line."""
+
+SCORING = Outlined(name="scoring", title="Scoring every stage")
+STRESS = Outlined(name="stress", title="Running the whole on random sequences")
+PLACES = Outlined(name="line", title="Running every place of the line")
+EXPORT = Outlined(name="export", title="Exporting the assembly")
+MEMBERS = Outlined(name="member-scores", title="Scoring the members alone")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,21 +63,14 @@ class Finish:
         Returns:
             What is stored.
         """
-        found, folder = self._outcome(cases, material), self.context.store.path
-        write_signals(folder, found, self.context.config.outputs, cases)
-        results = assembly_results(self.context, self.trained, found, cases, self.notes)
-        write_record(folder / RESULTS_FILE, results)
-        return results
+        found = self._outcome(cases, material)
+        write_signals(self.context.store.path, found, self.context.config.outputs, cases)
+        return self.context.run.results(assembly_results(self.context, self.trained, found, cases, self.notes))
 
     def _outcome(self, cases: TraceSet, material: Material) -> Outcome:
         """Every stage scored, one chosen by the selection traces, proven and exported."""
         config = self.context.config
-        scores, timing = {}, {}
-        for stage, cascade in self.trained.stages.items():
-            # What only the training looked at is no part of the surrogate, nor of its run time.
-            evaluation = evaluate_cascade(cascade.upstream_of(config.wanted), cases, outputs=config.outputs)
-            scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
-            timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
+        scores, timing = self.context.compute(SCORING, lambda work: self._scored(work, cases))
         chosen, chosen_by = self.trained.chosen, self.trained.selection
         whole = self.trained.model.upstream_of(config.wanted)
         write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
@@ -79,7 +78,9 @@ class Finish:
         line = self._line(whole)
         exported = self._export(whole, cases, evaluate_cascade(whole, cases), material)
         candidates = self.trained.candidates
-        members = [] if candidates is None else score_candidates(candidates, tuple(cases))
+        members = []
+        if candidates is not None:
+            members = self.context.compute(MEMBERS, lambda _: score_candidates(candidates, tuple(cases)))
         return Outcome(
             whole=whole, stages=scores, selection=chosen_by, chosen=chosen, timing=timing[chosen], stressed=stressed,
             worst=worst, line=line, unseen=self._unseen(sequences), exported=exported,
@@ -87,17 +88,35 @@ class Finish:
             lessons=lessons_of(scores, members, cases, config.lessons),
         )  # fmt: skip
 
+    def _scored(self, work: Work, cases: TraceSet) -> tuple[dict[str, Any], dict[str, dict[str, float]]]:
+        """Every stage's mean squared errors by output, and the seconds of a run by case."""
+        config, stages = self.context.config, self.trained.stages
+        scores, timing = {}, {}
+        for number, (stage, cascade) in enumerate(stages.items()):
+            work.say(stage, number / len(stages))
+            # What only the training looked at is no part of the surrogate, nor of its run time.
+            evaluation = evaluate_cascade(cascade.upstream_of(config.wanted), cases, outputs=config.outputs)
+            scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
+            timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
+        return scores, timing
+
     def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...], tuple[Trace, ...]]:
         """What came of the random sequences, those that the whole did worst on, and all of them."""
         asked = self.context.config.stress
         if asked is None:
             return None, (), ()
         annotator = None if asked.states is None else find_annotator(asked.states, where="stress, states")
-        step, sequences = "Running the whole on random sequences", self.context.load(asked.data)
-        self.context.tell(events.StepStarted(step=step))
-        found = stress(whole, tuple(sequences), asked.output, asked.within, annotator=annotator)
-        detail = f"{found.lost} of {found.sequences} diverged, {100 * found.within:.3g} % within"
-        self.context.tell(events.StepDone(step=step, stored=False, detail=detail))
+        sequences = self.context.load(asked.data)
+
+        def make(work: Work) -> Stress:
+            def report(done: int) -> None:
+                work.say(f"{done} of {len(sequences)}", done / len(sequences))
+
+            return stress(whole, tuple(sequences), asked.output, asked.within, report, annotator=annotator)
+
+        found = self.context.compute(
+            STRESS, make, outcome=lambda one: f"{one.lost} of {one.sequences} diverged, {100 * one.within:.3g} % within"
+        )
         return found, tuple(sequences[name] for name, _ in found.worst), tuple(sequences)
 
     def _unseen(self, sequences: Sequence[Trace]) -> dict[str, Look]:
@@ -116,58 +135,44 @@ class Finish:
         asked = self.context.config.line
         if asked is None:
             return None
-        line, cases, step = line_of(asked, whole), self.context.load(asked.data), "Running every place of the line"
+        line, cases = line_of(asked, whole), self.context.load(asked.data)
         write_json(self.context.store.path / LINE, StoredLine.of(asked, line, next(iter(cases))).to_dict())
-        self.context.tell(events.StepStarted(step=step))
-        scores = score_line(asked, line, cases)
-        slowest = max(scores.timing.values())
-        self.context.tell(
-            events.StepDone(step=step, stored=False, detail=f"all places of the longest case in {slowest:.3g} s")
+        return self.context.compute(
+            PLACES,
+            lambda _: score_line(asked, line, cases),
+            outcome=lambda scores: f"all places of the longest case in {max(scores.timing.values()):.3g} s",
         )
-        return scores
 
     def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any, material: Material) -> Bundle | None:
         from sysid.export import export_bundle
 
-        asked, step = self.context.config.export, "Exporting the assembly"
+        asked = self.context.config.export
         if asked is None:
             return None
-        self.context.tell(events.StepStarted(step=step))
         provenance = {
             "pipeline": self.context.config.name,
-            "command": self.context.command,
+            "command": self.context.run.command,
             "training": {
                 "fitted": [self._data(name) for name in material.fitted],
                 "chosen": [self._data(name) for name in material.chosen],
                 "notes": list(self.notes),
             },
         }
-        bundle = export_bundle(
-            whole, cases, self.context.store.path / "bundle", outputs=self.context.config.outputs,
-            formats=asked.formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
-        )  # fmt: skip
-        worst = max((entry.largest_difference for entry in bundle.files), default=0.0)
-        self.context.tell(
-            events.StepDone(step=step, stored=False, detail=f"{len(bundle.files)} files, at most {worst:.1e} off")
-        )
-        return bundle
+
+        def make(_: Work) -> Bundle:
+            return export_bundle(
+                whole, cases, self.context.store.path / "bundle", outputs=self.context.config.outputs,
+                formats=asked.formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
+            )  # fmt: skip
+
+        def outcome(bundle: Bundle) -> str:
+            worst = max((entry.largest_difference for entry in bundle.files), default=0.0)
+            return f"{len(bundle.files)} files, at most {worst:.1e} off"
+
+        return self.context.compute(EXPORT, make, outcome=outcome)
 
     def _data(self, name: str) -> dict[str, str]:
         return {"name": name, "sha256": self.context.digests[name]}
-
-    def report(self) -> Path:
-        """Write the report.
-
-        Returns:
-            Its page.
-        """
-        from sysid.reporting.report import write_report
-
-        step = "Writing the report"
-        self.context.tell(events.StepStarted(step=step))
-        page = write_report(self.context.store.path)
-        self.context.tell(events.StepDone(step=step, stored=False, detail=str(page)))
-        return page
 
     def track(self, results: AssemblyResults, page: Path) -> None:
         """Have each stage tracked as a run of its own, its figures beside the others'.
@@ -178,7 +183,7 @@ class Finish:
         """
         chosen = results.whole.stage
         for stage, metrics in results.metrics().items():
-            self.context.tell(
+            self.context.run.tell(
                 events.JudgementReady(
                     pipeline=self.context.config.name,
                     subject=stage,
@@ -188,7 +193,7 @@ class Finish:
                     tracked_as=(),
                     page=page,
                     document=self.context.store.results,
-                    command=self.context.command,
+                    command=self.context.run.command,
                     chosen=stage == chosen,
                 )
             )

@@ -26,7 +26,6 @@ from sysid.workbench.assembly.lessons import Lesson
 from sysid.workbench.assembly.line import LineScores
 from sysid.workbench.assembly.member_scores import CandidateScores, MemberScores
 from sysid.workbench.assembly.written import written
-from sysid.workbench.runner.environment import environment
 from sysid.workbench.runner.store import strict, write_arrays
 
 if TYPE_CHECKING:
@@ -90,9 +89,9 @@ def assembly_results(
     document = {
         "pipeline": config.name,
         "description": config.description,
-        "command": context.command,
+        "command": context.run.command,
         "created": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-        "environment": dict(environment()),
+        "environment": dict(context.run.environment),
         "seed": config.seed,
         "data": {
             "name": cases.name,

@@ -1,9 +1,9 @@
-"""A run of an assembly: every fit and every stage on disk before it is announced, and found again."""
+"""A pipeline of kind ``assembly`` as steps, and what a run of one leaves."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sysid.composite import train
 from sysid.errors import ConfigError
@@ -18,59 +18,50 @@ from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.assembly.finish import ASSEMBLY, LINE, Finish
 from sysid.workbench.assembly.line import StoredLine
 from sysid.workbench.assembly.material import Material
+from sysid.workbench.assembly.outline import outline
 from sysid.workbench.assembly.swept import swept
-from sysid.workbench.kinds import RunRequest
-from sysid.workbench.runner.environment import environment
-from sysid.workbench.runner.naming import nearby
-from sysid.workbench.runner.store import RunFolder, read_json, write_json
+from sysid.workbench.judging.runner import closing
+from sysid.workbench.runner.program import Program
+from sysid.workbench.runner.run import Run
+from sysid.workbench.runner.store import read_json
 from sysid.yaml_files import check
 
+if TYPE_CHECKING:
+    from sysid.workbench.kinds import RunRequest
 
-def run_assembly(request: RunRequest) -> int:
-    """Run a pipeline of kind ``assembly``.
+
+def program(request: RunRequest) -> Program[AssemblyResults]:
+    """What ``sysid run`` does of a pipeline of kind ``assembly``.
 
     Args:
         request: What was asked.
 
     Returns:
-        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
+        The program.
 
     Raises:
-        UserError: If the pipeline or its data cannot be used.
+        UserError: If the pipeline cannot be used.
     """
-    from sysid.workbench.runner.listeners import Audience, typed_command
-
     joined = read_joined(request.path)
     config = check(AssemblyConfig, joined.data, where=joined.origins)
-    folder = (request.out or Path("runs") / config.name).resolve()
-    command, audience = typed_command("run", request.typed, request.out), Audience.of(tracking=request.tracking)
-    audience.log.write_to(folder, command)
-    context = Context(
-        config=config,
-        joined=joined,
-        beside=request.path.parent,
-        store=RunFolder(path=folder),
-        command=command,
-        fresh=request.fresh,
-        watchers=audience.watchers,
+
+    def steps(run: Run) -> AssemblyResults:
+        return _run(Context(config=config, joined=joined, beside=request.path.parent, run=run))
+
+    return Program(
+        name=config.name,
+        keep=joined.keep,
+        steps=steps,
+        outline=lambda: outline(config, request.path.parent),
+        closing=lambda results, folder: closing(headline(results), folder),
     )
-    try:
-        with context.store.locked():
-            results, page = _run(context)
-    finally:
-        audience.screen.close()
-    audience.target.print()
-    audience.target.print(headline(results), soft_wrap=True)
-    return audience.end({"Report": nearby(page), "Results": nearby(context.store.results)})
 
 
-def _run(context: Context) -> tuple[AssemblyResults, Path]:
-    """Every step, in order; the results and the page."""
-    context.joined.keep(context.store.path)
-    write_json(context.store.path / "environment.json", environment())
-    if context.config.published_models is not None:
-        read_published(context.config.published_models)  # a wrong name is said now, not when all is trained
+def _run(context: Context) -> AssemblyResults:
+    """Every step, in order."""
     config, notes = context.config, list[str]()
+    if config.published_models is not None:
+        read_published(config.published_models)  # a wrong name is said now, not when all is trained
     cases, material, begin = context.load(config.data), Material.of(context), None
     if config.begin is not None:
         begin, said = read_whole(context.beside / config.begin)
@@ -79,9 +70,9 @@ def _run(context: Context) -> tuple[AssemblyResults, Path]:
     trained = train(config.composite, config.plan, material.data, begin=begin, given=given, keeper=context)
     finish = Finish(context=context, trained=trained, notes=(*notes, *trained.notes))
     results = finish.results(cases, material)
-    page = finish.report()
-    finish.track(results, page)
-    return results, page
+    page = context.run.report(results)
+    context.run.then(lambda: finish.track(results, page.value))
+    return results
 
 
 def read_assembly(folder: Path) -> Cascade:

@@ -1,16 +1,15 @@
-"""``sysid run``: a pipeline with everybody who listens to it."""
+"""``sysid run``: a pipeline of any kind, or what a run of it would do."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from sysid.errors import ConfigError
-from sysid.workbench.fits.config import find_pipeline, read_pipeline
-from sysid.workbench.fits.run import run_pipeline
-from sysid.workbench.kinds import DEFAULT, RunRequest, kind_of, kinds
+from sysid.workbench.fits.config import find_pipeline
+from sysid.workbench.kinds import RunRequest, kind_of, kinds
 from sysid.workbench.runner.console import console
-from sysid.workbench.runner.listeners import Audience, typed_command
-from sysid.workbench.runner.screen import duration, table_of_fits, table_of_steps
+from sysid.workbench.runner.dry_run import together
+from sysid.workbench.runner.listeners import foresee, perform
+from sysid.workbench.runner.screen import duration, table_of_steps
 
 
 def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool) -> int:
@@ -28,9 +27,24 @@ def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool)
     Raises:
         UserError: If the pipeline, its data or its options cannot be used.
     """
-    path = find_pipeline(pipeline)
-    request = RunRequest(path=path, typed=pipeline, fresh=fresh, out=out, tracking=tracking)
-    return kinds()[kind_of(path)].load_runner()(request)
+    return run_request(
+        RunRequest(path=find_pipeline(pipeline), typed=pipeline, fresh=fresh, out=out, tracking=tracking)
+    )
+
+
+def run_request(request: RunRequest) -> int:
+    """Run the pipeline of a file, of whatever kind it is.
+
+    Args:
+        request: What was asked.
+
+    Returns:
+        Exit code, as :func:`run_command`.
+
+    Raises:
+        UserError: If the pipeline, its data or its options cannot be used.
+    """
+    return perform(kinds()[kind_of(request.path)].load_program()(request), request)
 
 
 def plan_command(pipeline: str, *, fresh: bool, out: Path | None) -> None:
@@ -44,55 +58,9 @@ def plan_command(pipeline: str, *, fresh: bool, out: Path | None) -> None:
     Raises:
         UserError: If the pipeline, its data or its options cannot be used.
     """
-    from sysid.workbench.runner.plan import plan
-
-    path = find_pipeline(pipeline)
-    kind = kind_of(path)
-    if kind != DEFAULT:
-        raise ConfigError(
-            f"there is no dry run for pipelines of kind {kind}",
-            where=path,
-            expected=f"a pipeline of kind {DEFAULT}",
-            got=kind,
-            remedy="run it: what is done is stored, and Ctrl-C at any time loses nothing that is finished",
-        )
-    read = read_pipeline(path)
-    planned = plan(read, out or Path("runs") / read.config.name, fresh=fresh)
-    target = console()
+    request = RunRequest(path=find_pipeline(pipeline), typed=pipeline, fresh=fresh, out=out)
+    planned = foresee(kinds()[kind_of(request.path)].load_program()(request), request)
+    target, whole = console(), together(planned)
     target.print(table_of_steps(planned))
-    target.print(f"Together at most {duration(sum(one.seconds for one in planned))}. Nothing was run.")
-
-
-def run_fits(request: RunRequest) -> int:
-    """Run a pipeline of kind ``fits``.
-
-    Args:
-        request: What was asked.
-
-    Returns:
-        Exit code, as :func:`run_command`.
-
-    Raises:
-        UserError: If the pipeline, its data or its options cannot be used.
-    """
-    read, out = read_pipeline(request.path), request.out
-    folder, audience = out or Path("runs") / read.config.name, Audience.of(tracking=request.tracking)
-    command = typed_command("run", request.typed, out)
-    try:
-        results = run_pipeline(read, folder, command=command, fresh=request.fresh, watchers=audience.watchers)
-    finally:
-        audience.screen.close()
-    audience.target.print()
-    audience.target.print(table_of_fits(results))
-    if results.best is not None:
-        audience.target.print(f"Best: {results.best.name}. {results.best.chosen_by}")
-    code = audience.end(
-        {
-            "Report": folder / "report" / "index.html",
-            "Bundle": folder / "bundle",
-            "Results": folder / "results.json",
-        }
-    )
-    if request.tracking and code == 0:
-        audience.target.print(f"{'Compare:':<9}sysid ui")
-    return code
+    said = f"Together at most {duration(whole.seconds or 0.0)}"
+    target.print(f"{said}{f', and {whole.basis}' if whole.basis else ''}. Nothing was run.", soft_wrap=True)

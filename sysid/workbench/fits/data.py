@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from sysid.errors import ConfigError
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.annotation import annotated_set, find_annotator, weighted
 from sysid.workbench.fits.config import PipelineConfig
+from sysid.workbench.runner.steps import Estimate
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,6 +74,44 @@ def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str],
     return Data(traces=traces, selection=selection, sequences=sequences)
 
 
+def unmade_data(names: Iterable[str | None], *, beside: Path) -> Estimate | None:
+    """How long it takes to make the traces that data sets lack.
+
+    Args:
+        names: Data sets, by name or by folder beside the pipeline's file; ``None`` is none.
+        beside: Folder of the pipeline's file.
+
+    Returns:
+        The time, as far as it is known; ``None`` if all that they have is there to be loaded.
+
+    Raises:
+        ConfigError: If there is no such data set.
+    """
+    from sysid.ingest.dataset import unmade
+
+    found = []
+    for name in dict.fromkeys(name for name in names if name is not None):
+        place, search = _place(name, beside)
+        found.append(unmade(place, search=search))
+    lacking = [one for one in found if one is not None]
+    if not lacking:
+        return None
+    made = (
+        f"{sum(one.cases for one in lacking)} traces to be made by {', '.join({one.generator: 0 for one in lacking})}"
+    )
+    known = [one.seconds for one in lacking if one.seconds is not None]
+    if len(known) < len(lacking):
+        return Estimate(seconds=None, basis=f"{made}; not known before it has made one here")
+    return Estimate(seconds=sum(known), basis=f"{made}, as long as those that it has made here")
+
+
+def _place(name: str, beside: Path) -> tuple[Path | str, Sequence[Path]]:
+    """What to load, and where a name is looked for."""
+    local = beside / name
+    # A workspace is three folders side by side: its data sets are found from wherever it is run.
+    return (local if local.exists() else name), (beside.parent / "datasets", *content_folders("datasets"))
+
+
 def _annotated(traces: TraceSet, config: PipelineConfig) -> TraceSet:
     """The traces with states and weights, where the pipeline asks for them."""
     if config.annotate is None:
@@ -84,17 +123,28 @@ def _annotated(traces: TraceSet, config: PipelineConfig) -> TraceSet:
     )
 
 
-def _load(name: str, beside: Path, progress: Callable[[str], None]) -> TraceSet:
+def load_named(name: str, beside: Path, *, progress: Callable[[str, int, int], None]) -> TraceSet:
+    """Load a data set as a pipeline names it.
+
+    Args:
+        name: Its name, or its folder beside the pipeline's file.
+        beside: Folder of the pipeline's file.
+        progress: Called as ``progress(case, index, count)`` before each case.
+
+    Returns:
+        Its traces.
+    """
     from sysid.ingest import load_dataset
 
-    local = beside / name
-    # A workspace is three folders side by side: its data sets are found from wherever it is run.
-    search = (beside.parent / "datasets", *content_folders("datasets"))
-    return load_dataset(
-        local if local.exists() else name,
-        search=search,
-        progress=lambda case, index, count: progress(f"{name}: {case} ({index + 1} of {count})"),
-    )
+    place, search = _place(name, beside)
+    return load_dataset(place, search=search, progress=progress)
+
+
+def _load(name: str, beside: Path, progress: Callable[[str], None]) -> TraceSet:
+    def report(case: str, index: int, count: int) -> None:
+        progress(f"{name}: {case} ({index + 1} of {count})")
+
+    return load_named(name, beside, progress=report)
 
 
 def _selection_traces(chosen: TraceSet, traces: TraceSet, names: Sequence[str]) -> tuple[Trace, ...]:

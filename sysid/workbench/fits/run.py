@@ -1,23 +1,22 @@
-"""A pipeline from traces to report: each step's result is on disk before it is announced, and found again."""
+"""A pipeline of kind ``fits`` as steps: traces, each fit and its figures, the chosen one exported, the report."""
 
 from __future__ import annotations
 
 import math
-import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sysid.code_digest import code_digest
-from sysid.errors import ConfigError, SysidError
-from sysid.estimation import FitProgress, FitResult
+from sysid.estimation import FitResult
+from sysid.estimation.estimators import seedless
 from sysid.reporting.comparing.published import read_published
-from sysid.reporting.results import Results, parse_results, read_results, write_results
+from sysid.reporting.results import Results, parse_results
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import FitConfig, Pipeline
-from sysid.workbench.fits.data import Data, load_data
+from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig, read_pipeline
+from sysid.workbench.fits.data import Data, load_data, unmade_data
+from sysid.workbench.fits.estimates import how_long
 from sysid.workbench.fits.evidence import residuals
 from sysid.workbench.fits.record import (
     export_record,
@@ -29,10 +28,20 @@ from sysid.workbench.fits.record import (
     write_residuals,
     write_scores,
 )
+from sysid.workbench.fits.table import table_of_fits
 from sysid.workbench.runner import events
-from sysid.workbench.runner.environment import environment
-from sysid.workbench.runner.naming import nearby
-from sysid.workbench.runner.store import RunFolder, digest, strict, write_bytes, write_json
+from sysid.workbench.runner.program import Closing, Program, carry_out
+from sysid.workbench.runner.run import REPORT, Run
+from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
+from sysid.workbench.runner.store import strict, write_bytes
+
+if TYPE_CHECKING:
+    from sysid.workbench.kinds import RunRequest
+
+LOADING = Outlined(name="data", title="Loading the traces")
+EXPORT_TIME = Estimate(seconds=10.0, basis="typical")
+"""Of two formats, as measured on two cores."""
+SCORING_TIME = Estimate(seconds=1.0, basis="typical")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,24 +57,42 @@ class GivenFit:
     make: Callable[[], FitResult]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Fitted:
-    """A fit on its way through the steps.
+def program(request: RunRequest) -> Program[Results]:
+    """What ``sysid run`` does of a pipeline of kind ``fits``.
 
     Args:
-        ready: The fit and its figures.
-        fit_key: Digest of what the fit alone depends on, for those that start from it.
-        final: Whether it and the fit it started from ran to their end, so that it may be stored for good.
+        request: What was asked.
+
+    Returns:
+        The program.
+
+    Raises:
+        ConfigError: If the pipeline cannot be used.
     """
+    return program_of(read_pipeline(request.path))
 
-    ready: events.FitReady
-    fit_key: str
-    final: bool
 
-    @property
-    def scores(self) -> steps.Scores:
-        """The figures."""
-        return steps.Scores(evaluation=self.ready.evaluation, selection_mse=self.ready.selection_mse)
+def program_of(
+    pipeline: Pipeline, *, given: Mapping[str, GivenFit] | None = None, chosen: steps.Choice | None = None
+) -> Program[Results]:
+    """A pipeline as a program.
+
+    Args:
+        pipeline: What to do.
+        given: Fits that are made already, by name.
+        chosen: The fit that comes first, where it was chosen elsewhere; chosen here by default.
+
+    Returns:
+        The program.
+    """
+    work = FitSteps(pipeline=pipeline, given=given or {}, chosen=chosen)
+    return Program(
+        name=pipeline.config.name,
+        keep=lambda folder: write_bytes(folder / "pipeline.yaml", pipeline.text.encode()),
+        steps=work.run,
+        outline=work.outline,
+        closing=closing,
+    )
 
 
 def run_pipeline(
@@ -75,13 +102,11 @@ def run_pipeline(
     command: str,
     fresh: bool = False,
     watchers: Sequence[events.Watcher] = (),
-    given: Mapping[str, GivenFit] | None = None,
-    chosen: steps.Choice | None = None,
 ) -> Results:
     """Run a pipeline; what an earlier run has finished is not done again.
 
-    Ctrl-C ends the fit that is running and keeps its best model so far; that fit is used now, and done
-    again by the next run.
+    Ctrl-C ends the fit that is running and keeps its best model so far; that fit is used now, and goes on in the next
+    run.
 
     Args:
         pipeline: What to do.
@@ -89,8 +114,6 @@ def run_pipeline(
         command: The command that makes the run again, for the report.
         fresh: Do everything again.
         watchers: Told everything that happens, in order.
-        given: Fits that are made already, by name.
-        chosen: The fit that comes first, where it was chosen elsewhere; chosen here by default.
 
     Returns:
         The contents of ``results.json``.
@@ -100,174 +123,238 @@ def run_pipeline(
         UserError: If data or options cannot be used as they are.
         ParityError: If an exported file differs from its model.
     """
-    run = _Run(
-        pipeline=pipeline,
-        store=RunFolder(path=folder.resolve()),
-        command=command,
-        fresh=fresh,
-        watchers=watchers,
-        given=given or {},
-        chosen=chosen,
-    )
-    with run.store.locked():
-        return run.all()
+    return carry_out(program_of(pipeline), folder, command=command, fresh=fresh, watchers=watchers)
+
+
+def closing(results: Results, folder: Path) -> Closing:
+    """What is said at the end: the fits by case, and the best.
+
+    Args:
+        results: The contents of ``results.json``.
+        folder: The run folder.
+
+    Returns:
+        The lines and files.
+    """
+    lines: list[Any] = [table_of_fits(results)]
+    if results.best is not None:
+        lines.append(f"Best: {results.best.name}. {results.best.chosen_by}")
+    files = {
+        "Report": folder / "report" / "index.html",
+        "Bundle": folder / "bundle",
+        "Results": folder / "results.json",
+    }
+    return Closing(lines=lines, files=files, compare=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Run:
-    """One run: what its steps have in common."""
+class _Fitted:
+    """A fit and its figures, on their way."""
 
-    pipeline: Pipeline
-    store: RunFolder
-    command: str
-    fresh: bool
-    watchers: Sequence[events.Watcher]
-    given: Mapping[str, GivenFit]
-    chosen: steps.Choice | None
-    run_id: str = field(default_factory=lambda: time.strftime("%Y%m%d-%H%M%S"))
-    environment: Mapping[str, Any] = field(default_factory=environment)
+    config: FitConfig
+    fit: Done[FitResult]
+    scores: Done[steps.Scores]
 
-    def all(self) -> Results:
-        """Every step, in order."""
-        config = self.pipeline.config
-        write_bytes(self.store.path / "pipeline.yaml", self.pipeline.text.encode())
-        write_json(self.store.path / "environment.json", self.environment)
-        self._tell(events.RunStarted(config=config, folder=self.store.path, run_id=self.run_id, command=self.command))
-        data = self._load()
-        fitted: dict[str, _Fitted] = {}
-        for fit in config.fits:
-            fitted[fit.name] = self._fit(fit, data, fitted)
-            if not fitted[fit.name].ready.stored:
-                # A killed run leaves results.json with what is finished, not with what an older run had.
-                self._write_results(data, fitted, choice=None, exports=())
-        asked = config.export.fit if config.export else "best"
-        choice = self.chosen or steps.choose({name: (one.ready.fit, one.scores) for name, one in fitted.items()}, asked)
-        exports = self._export(fitted[choice.name], data) if config.export else ()
-        results = self._write_results(data, fitted, choice=choice, exports=exports)
-        self._report(fitted[choice.name], results)
-        self._tell(events.RunDone(results=results))
-        return results
+    @property
+    def pair(self) -> tuple[FitResult, steps.Scores]:
+        return self.fit.value, self.scores.value
 
-    def _tell(self, event: events.Event) -> None:
-        for watch in self.watchers:
-            watch(event)
-
-    def _done(self, step: str, key: str) -> bool:
-        return not self.fresh and self.store.is_done(step, key)
-
-    def _load(self) -> Data:
-        step = "Loading the traces"
-        self._tell(events.StepStarted(step=step))
-        if self.pipeline.config.report.published is not None:
-            # A misspelt name is told before the fits are done, not after.
-            read_published(self.pipeline.config.report.published)
-        data = load_data(
-            self.pipeline.config,
-            beside=self.pipeline.path.parent,
-            progress=lambda text: self._tell(events.StepProgress(step=step, fraction=None, detail=text)),
-        )
-        cases = f"{len(data.traces)} cases of {data.traces.name}"
-        detail = f"{cases}, {len(data.selection)} to choose by" if data.selection else cases
-        self._tell(events.StepDone(step=step, stored=False, detail=detail))
-        self._tell(events.DataLoaded(traces=data.traces, selection=tuple(trace.name for trace in data.selection)))
-        return data
-
-    def _fit(self, fit: FitConfig, data: Data, earlier: Mapping[str, _Fitted]) -> _Fitted:
-        config, folder = self.pipeline.config, self.store.fit(fit.slug)
-        initial = earlier[fit.initial] if fit.initial else None
-        given = self.given.get(fit.name)
-        key = given.key if given else steps.fit_key(fit, config, data, initial.fit_key if initial else None)
-        step = (
-            f"Fitting {fit.name}" if fit.name == fit.structure.label else f"Fitting {fit.name}, {fit.structure.label}"
-        )
-        self._tell(events.StepStarted(step=step))
-        fit_stored = self._done(f"fit-{fit.slug}", key)
-        if fit_stored:
-            result = read_fit(folder)
-        elif given is not None:
-            result = given.make()
-        else:
-            limit = getattr(fit.training_options(config.seed), "max_time_s", math.inf)
-            progress = _Progress(step=step, limit_s=limit, tell=self._tell)
-            try:
-                result = steps.fit_traces(fit, config, data, initial.ready.fit if initial else None, progress.report)
-            except SysidError as error:
-                error.add_note(f"{step[0].lower()}{step[1:]}, {config.mapping}")
-                raise
-        final = is_final(result) and (initial is None or initial.final)
-        if not fit_stored:
-            files = write_fit(folder, result)
-            if final:
-                self.store.mark_done(f"fit-{fit.slug}", key, files)
-        score_key, scores, scores_stored = self._score(fit, result, data, key, reuse=fit_stored, final=final)
-        stored = fit_stored and scores_stored
-        self._tell(events.StepDone(step=step, stored=stored, detail=_outcome(result, scores)))
-        ready = events.FitReady(
-            config=fit,
-            key=score_key,
-            fit=result,
+    def ready(self, pipeline: PipelineConfig, folder: Path) -> events.FitReady:
+        fit, scores = self.pair
+        return events.FitReady(
+            config=self.config,
+            pipeline=pipeline,
+            key=self.scores.key,
+            fit=fit,
             evaluation=scores.evaluation,
             selection_mse=scores.selection_mse,
-            stored=stored,
+            stored=self.fit.stored and self.scores.stored,
             folder=folder,
         )
-        self._tell(ready)
-        return _Fitted(ready=ready, fit_key=key, final=final)
 
-    def _score(
-        self, fit: FitConfig, result: FitResult, data: Data, fit_key: str, *, reuse: bool, final: bool
-    ) -> tuple[str, steps.Scores, bool]:
-        """The key of the figures, the figures, and whether they were stored."""
-        config, folder, step = self.pipeline.config, self.store.fit(fit.slug), f"scores-{fit.slug}"
-        key = steps.scores_key(fit_key, fit.structure, data, config)
-        if reuse and self._done(step, key):
-            return key, read_scores(folder), True
-        scores = steps.score(result, data, config)
-        files = write_scores(folder, scores) + write_residuals(folder, residuals(result, data, config))
-        if final:
-            self.store.mark_done(step, key, files)
-        return key, scores, False
 
-    def _export(self, best: _Fitted, data: Data) -> tuple[dict[str, Any], ...]:
-        config, folder = self.pipeline.config, self.store.path / "bundle"
-        step = f"Exporting {best.ready.config.name}"
-        key = steps.export_key(best.ready.key, config)
-        self._tell(events.StepStarted(step=step))
-        stored = self._done("export", key)
-        if not stored:
-            provenance = {"pipeline": config.name, "fit": best.ready.config.name, "command": self.command}
-            began = time.perf_counter()
-            bundle = steps.export(best.ready.fit, best.scores, data, config, folder=folder, provenance=provenance)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitSteps:
+    """The steps of one pipeline.
+
+    Args:
+        pipeline: What to do.
+        given: Fits that are made already, by name.
+        chosen: The fit that comes first, where it was chosen elsewhere.
+    """
+
+    pipeline: Pipeline
+    given: Mapping[str, GivenFit] = field(default_factory=dict)
+    chosen: steps.Choice | None = None
+
+    @property
+    def config(self) -> PipelineConfig:
+        """The checked fields."""
+        return self.pipeline.config
+
+    @property
+    def _names(self) -> tuple[str | None, ...]:
+        return (self.config.data, self.config.selection, self.config.stability.sequences)
+
+    def outline(self) -> list[Outlined]:
+        """All steps, as far as they are known before the traces are."""
+        found = [LOADING]
+        for fit in self.config.fits:
+            found += [
+                Outlined(name=f"fit-{fit.slug}", title=fit_title(fit)),
+                Outlined(name=f"scores-{fit.slug}", title=f"Scoring {fit.name}", estimate=SCORING_TIME),
+            ]
+        if self.config.export is not None:
+            asked = self.config.export.fit
+            name = "the best fit" if asked == "best" else asked
+            found.append(Outlined(name="export", title=self._exporting(name), estimate=EXPORT_TIME))
+        return [*found, REPORT]
+
+    def run(self, run: Run, loaded: Done[Data] | None = None) -> Results:
+        """Every step, in order.
+
+        Args:
+            run: Does them.
+            loaded: The traces, where they are loaded already.
+
+        Returns:
+            The contents of ``results.json``.
+        """
+        return self._run(run, loaded or run.do(self.loading()))
+
+    def _run(self, run: Run, loaded: Done[Data]) -> Results:
+        run.then(lambda: run.tell(_loaded(loaded.value)))
+        fitted: dict[str, _Fitted] = {}
+        for fit in self.config.fits:
+            fitted[fit.name] = self._fitted(run, fit, loaded, fitted)
+            run.then(partial(self._announce, run, loaded, fitted, fit.name))
+        asked = self.config.export.fit if self.config.export else "best"
+        choice = self.chosen or steps.choose({name: one.pair for name, one in fitted.items()}, asked)
+        best = fitted[choice.name]
+        bundle = run.do(self._export(run, best, loaded)) if self.config.export else None
+        exports = () if bundle is None else bundle.value
+        ready = best.ready(self.config, run.store.fit(best.config.slug))
+        if bundle is not None:
+            told = events.BundleReady(of=ready, folder=run.store.path / "bundle", exports=exports, stored=bundle.stored)
+            run.then(lambda: run.tell(told))
+        results = self._results(run, loaded.value, fitted, choice=choice, exports=exports)
+        page = run.report(results)
+        run.then(lambda: run.tell(events.ReportReady(page=page.value, results=run.store.results, of=ready)))
+        return results
+
+    def loading(self) -> Step[Data]:
+        """The step that loads the traces."""
+        beside = self.pipeline.path.parent
+
+        def make(work: Work) -> Data:
+            if self.config.report.published is not None:
+                # A misspelt name is told before the fits are done, not after.
+                read_published(self.config.report.published)
+            return load_data(self.config, beside=beside, progress=work.say)
+
+        return Step(
+            name=LOADING.name,
+            title=LOADING.title,
+            make=make,
+            outcome=_cases,
+            at_hand=lambda: unmade_data(self._names, beside=beside) is None,
+            how_long=lambda: unmade_data(self._names, beside=beside) or NOT_KNOWN,
+        )
+
+    def _fitted(self, run: Run, fit: FitConfig, loaded: Done[Data], earlier: Mapping[str, _Fitted]) -> _Fitted:
+        initial = earlier[fit.initial].fit if fit.initial else None
+        made = run.do(self._fit(run, fit, loaded, initial))
+        return _Fitted(config=fit, fit=made, scores=run.do(self._score(run, made, loaded, fit)))
+
+    def _fit(self, run: Run, fit: FitConfig, loaded: Done[Data], initial: Done[FitResult] | None) -> Step[FitResult]:
+        config, given, folder = self.config, self.given.get(fit.name), run.store.fit(fit.slug)
+
+        def find_key() -> str:
+            return given.key if given else steps.fit_key(fit, config, loaded.value, initial.key if initial else None)
+
+        def make(work: Work) -> FitResult:
+            if given is not None:
+                return given.make()
+            begin = initial.value if initial else None
+            watch = work.watch(getattr(fit.training_options(config.seed), "max_time_s", math.inf))
+            return steps.fit_traces(fit, config, loaded.value, begin, watch)
+
+        return Step(
+            name=f"fit-{fit.slug}",
+            title=fit_title(fit),
+            make=make,
+            key=find_key,
+            after=[initial] if initial else [],
+            write=partial(write_fit, folder),
+            read=lambda _: read_fit(folder),
+            outcome=lambda result: f"{result.train_time_s:.1f} s, {result.status.value}",
+            final=is_final,
+            amount=lambda: _amount(fit, loaded.value),
+            how_long=lambda: how_long(fit, config, loaded.value),
+        )
+
+    def _score(self, run: Run, made: Done[FitResult], loaded: Done[Data], fit: FitConfig) -> Step[steps.Scores]:
+        config, folder, found = self.config, run.store.fit(fit.slug), list[dict[str, Any]]()
+
+        def make(_: Work) -> steps.Scores:
+            scores = steps.score(made.value, loaded.value, config)
+            found.append(residuals(made.value, loaded.value, config))
+            return scores
+
+        return Step(
+            name=f"scores-{fit.slug}",
+            title=f"Scoring {fit.name}",
+            make=make,
+            key=lambda: steps.scores_key(made.key, fit.structure, loaded.value, config),
+            # A fit that was made again may differ from the stored one by what its key does not know: a time limit, or
+            # Ctrl-C. Its figures are made again with it.
+            of=made,
+            write=lambda scores: write_scores(folder, scores) + write_residuals(folder, found[-1]),
+            read=lambda _: read_scores(folder),
+            outcome=_worst,
+            typical=SCORING_TIME,
+        )
+
+    def _export(self, run: Run, best: _Fitted, loaded: Done[Data]) -> Step[tuple[dict[str, Any], ...]]:
+        config, folder, unit = self.config, run.store.path / "bundle", best.fit.value.model.output_unit
+        provenance = {"pipeline": config.name, "fit": best.config.name, "command": run.command}
+
+        def make(_: Work) -> tuple[dict[str, Any], ...]:
+            bundle = steps.export(*best.pair, loaded.value, config, folder=folder, provenance=provenance)
             timed = steps.export_run_times(bundle) if config.export and config.export.run_times else ()
-            unit = best.ready.fit.model.output_unit
-            exports = [export_record(entry, folder.name, unit, timed) for entry in bundle.files]
-            if best.final:
-                files = [file for file in sorted(folder.rglob("*")) if file.is_file()]
-                self.store.mark_done("export", key, files, exports=exports, seconds=time.perf_counter() - began)
-        else:
-            exports = self.store.facts("export")["exports"]
-        worst = max((float(entry["largest_difference"]) for entry in exports), default=0.0)
-        detail = f"{len(exports)} files, at most {worst:.1e} {best.ready.fit.model.output_unit} from the model"
-        self._tell(events.StepDone(step=step, stored=stored, detail=detail))
-        self._tell(events.BundleReady(of=best.ready, folder=folder, exports=tuple(exports), stored=stored))
-        return tuple(exports)
+            return tuple(export_record(entry, folder.name, unit, timed) for entry in bundle.files)
 
-    def _report(self, best: _Fitted, results: Results) -> None:
-        from sysid.reporting import report
+        def outcome(exports: Sequence[Mapping[str, Any]]) -> str:
+            worst = max((float(entry["largest_difference"]) for entry in exports), default=0.0)
+            return f"{len(exports)} files, at most {worst:.1e} {unit} from the model"
 
-        step, page = "Writing the report", self.store.path / "report" / "index.html"
-        key = report_key(results)
-        self._tell(events.StepStarted(step=step))
-        stored = self._done("report", key)
-        if not stored:
-            began = time.perf_counter()
-            page = report.write_report(self.store.path)
-            self.store.mark_done("report", key, [page], seconds=time.perf_counter() - began)
-        self._tell(events.StepDone(step=step, stored=stored, detail=str(nearby(page))))
-        self._tell(events.ReportReady(page=page, results=self.store.results, of=best.ready))
+        return Step(
+            name="export",
+            title=self._exporting(best.config.name),
+            make=make,
+            key=lambda: steps.export_key(best.scores.key, config),
+            of=best.scores,
+            write=lambda _: [file for file in sorted(folder.rglob("*")) if file.is_file()],
+            read=lambda facts: tuple(facts["exports"]),
+            facts=lambda exports: {"exports": list(exports)},
+            outcome=outcome,
+            typical=EXPORT_TIME,
+        )
 
-    def _write_results(
+    def _exporting(self, name: str) -> str:
+        formats = self.config.export.formats if self.config.export else ()
+        return f"Exporting {name} as {', '.join(formats)}"
+
+    def _announce(self, run: Run, loaded: Done[Data], fitted: Mapping[str, _Fitted], name: str) -> None:
+        """Tell of a fit; a killed run leaves results.json with what is finished, not with what an older run had."""
+        ready = fitted[name].ready(self.config, run.store.fit(fitted[name].config.slug))
+        run.tell(ready)
+        if not ready.stored:
+            self._results(run, loaded.value, fitted, choice=None, exports=())
+
+    def _results(
         self,
+        run: Run,
         data: Data,
         fitted: Mapping[str, _Fitted],
         *,
@@ -275,76 +362,50 @@ class _Run:
         exports: Sequence[Mapping[str, Any]],
     ) -> Results:
         document = results_document(
-            config=self.pipeline.config,
-            command=self.command,
-            environment=self.environment,
+            config=self.config,
+            command=run.command,
+            environment=run.environment,
             data=data,
-            fits=[one.ready for one in fitted.values()],
+            fits=[one.ready(self.config, run.store.fit(one.config.slug)) for one in fitted.values()],
             choice=choice,
             exports=exports,
         )
-        results = parse_results(strict(document), where=self.store.results)
-        before = self._stored_results()
-        if before is not None and _undated(before) == _undated(results):
-            # Nothing is new, so that what was made then keeps its date.
-            return before
-        write_results(self.store.path, results)
-        return results
-
-    def _stored_results(self) -> Results | None:
-        try:
-            return read_results(self.store.path)
-        except ConfigError:
-            # None yet, or damaged: either way they are written anew.
-            return None
+        new = parse_results(strict(document), where=run.store.results)
+        return run.results(new)
 
 
-def report_key(results: Results) -> str:
-    """Digest of everything that a report depends on.
+def fit_title(fit: FitConfig) -> str:
+    """The step of a fit, for people.
 
     Args:
-        results: The contents of ``results.json``.
+        fit: The fit.
 
     Returns:
-        64 hexadecimal digits.
+        For example ``"Fitting open loop, NARX 1/1/2"``.
     """
-    # As text: an infinity that was never written differs, as a number, from the nothing that is read back.
-    code = code_digest("sysid.reporting.report:write_report", files=("sysid/reporting/templates",))
-    return digest({"results": results.model_dump_json(), "code": code})
+    return f"Fitting {fit.name}" if fit.name == fit.structure.label else f"Fitting {fit.name}, {fit.structure.label}"
 
 
-def _undated(results: Results) -> str:
-    """Results without their date; as text, because NaN differs from itself as a number."""
-    return results.model_copy(update={"created": ""}).model_dump_json()
+def _loaded(data: Data) -> events.DataLoaded:
+    return events.DataLoaded(traces=data.traces, selection=tuple(trace.name for trace in data.selection))
 
 
-def _outcome(fit: FitResult, scores: steps.Scores) -> str:
+def _cases(data: Data) -> str:
+    cases = f"{len(data.traces)} cases of {data.traces.name}"
+    return f"{cases}, {len(data.selection)} to choose by" if data.selection else cases
+
+
+def _amount(fit: FitConfig, data: Data) -> dict[str, Any]:
+    """How much work a fit is: another seed is as much."""
+    return {
+        "structure": fit.structure.to_dict(),
+        "initial": fit.initial,
+        "training": str(seedless(fit.training_options(0))),
+        "samples": {trace.name: len(trace) for trace in data.traces},
+    }
+
+
+def _worst(scores: steps.Scores) -> str:
     """How a fit came out, in a line."""
-    cases = scores.evaluation.cases.values()
-    worst = max(cases, key=lambda case: case.free_run.mse)
-    unit = worst.free_run.unit
-    return f"{fit.train_time_s:.1f} s, free run at worst {worst.free_run.mse:.3g} {unit}² ({worst.case})"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Progress:
-    """Turns the iterations of several starts, told from several threads, into one share of the whole."""
-
-    step: str
-    limit_s: float
-    tell: events.Watcher
-    shares: dict[int, float] = field(default_factory=dict)
-    guard: threading.Lock = field(default_factory=threading.Lock)
-    began: float = field(default_factory=time.perf_counter)
-
-    def report(self, entry: FitProgress) -> None:
-        """Told after every iteration of every start."""
-        share = min(entry.iteration / entry.max_iterations, 1.0)
-        spent = (time.perf_counter() - self.began) / self.limit_s
-        with self.guard:
-            # Starts are told about in any order, and some begin again: the share never falls.
-            self.shares[entry.start] = max(share, self.shares.get(entry.start, 0.0))
-            fraction = min(max(sum(self.shares.values()) / entry.starts, spent), 1.0)
-            start = f"start {entry.start} of {entry.starts}, " if entry.starts > 1 else ""
-            detail = f"{start}{entry.stage}, iteration {entry.iteration}, mse {entry.mse:.3g}"
-            self.tell(events.StepProgress(step=self.step, fraction=fraction, detail=detail))
+    worst = max(scores.evaluation.cases.values(), key=lambda case: case.free_run.mse)
+    return f"free run at worst {worst.free_run.mse:.3g} {worst.free_run.unit}² ({worst.case})"

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from sysid.models import AbstractModel, Cascade
 from sysid.workbench.plugins import find_plugin
-from sysid.workbench.runner.kept_steps import Step
+from sysid.workbench.runner.kept_steps import KeptStep
 
 GROUP = "sysid.judges"
 
@@ -32,7 +32,7 @@ class Judge(Protocol):
     def version(self) -> str:
         """Digest of the code that its results depend on."""
 
-    def steps(self, options: Any, subjects: Subjects) -> Sequence[Step]:
+    def steps(self, options: Any, subjects: Subjects) -> Sequence[KeptStep]:
         """What is to be done; the steps do not depend on each other."""
 
     def document(self, options: Any, subjects: Subjects, results: Mapping[str, Any]) -> dict[str, Any]:

@@ -62,11 +62,23 @@ def find_model(part: PartConfig, *, workspace: Path, fetch: Fetch) -> Found:
     return Found(model=read_bundle(folder).model, said=address, tracked_as=run_id)
 
 
+def run_folder_of(given: str, workspace: Path) -> Path:
+    """The folder of a run, whether or not it is there.
+
+    Args:
+        given: A folder, or the name of a pipeline.
+        workspace: Folder that relative paths begin at.
+
+    Returns:
+        The folder.
+    """
+    folder = workspace / given
+    return folder if folder.is_dir() else workspace / "runs" / given
+
+
 def _of_run(part: PartConfig, workspace: Path) -> Found:
     given = str(part.run)
-    folder = workspace / given
-    if not folder.is_dir():
-        folder = workspace / "runs" / given
+    folder = run_folder_of(given, workspace)
     if not (folder / "results.json").is_file():
         raise ConfigError(
             f"the run {given} is not there",

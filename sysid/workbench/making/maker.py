@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from pydantic import BaseModel
 
 from sysid.workbench.plugins import find_plugin
-from sysid.workbench.runner.kept_steps import Step
+from sysid.workbench.runner.kept_steps import KeptStep
 
 GROUP = "sysid.makers"
 
@@ -26,7 +26,7 @@ class Maker(Protocol):
     def version(self) -> str:
         """Digest of the code that its results depend on."""
 
-    def steps(self, options: Any) -> Sequence[Step]:
+    def steps(self, options: Any) -> Sequence[KeptStep]:
         """What is to be done; the steps do not depend on each other."""
 
     def dataset(self, options: Any, results: Mapping[str, Any]) -> dict[str, Any]:

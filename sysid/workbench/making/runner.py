@@ -1,80 +1,119 @@
-"""A run of a pipeline whose product is a data set: steps done or found again, ``dataset.yaml`` written and loaded."""
+"""A pipeline whose product is a data set, as steps: each kept by its content, then ``dataset.yaml``, loaded."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from sysid.ingest import load_dataset
 from sysid.traces import TraceSet
-from sysid.workbench.kinds import RunRequest
 from sysid.workbench.making.config import MakingConfig
-from sysid.workbench.making.maker import find_maker
-from sysid.workbench.runner.environment import environment
-from sysid.workbench.runner.events import StepDone, StepProgress, StepStarted, Watcher
-from sysid.workbench.runner.kept_steps import do_steps
-from sysid.workbench.runner.store import RunFolder, write_bytes, write_json
+from sysid.workbench.making.maker import Maker, find_maker
+from sysid.workbench.runner.kept_steps import kept_steps
+from sysid.workbench.runner.program import Closing, Program
+from sysid.workbench.runner.run import Run
+from sysid.workbench.runner.steps import Outlined, Step, Work
+from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import check, read_yaml
 
+if TYPE_CHECKING:
+    from sysid.workbench.kinds import RunRequest
+
 FILE = "dataset.yaml"
+TITLE = "Playing"
+LOADING = Outlined(name="data", title="Loading the traces")
 
 
-def run_making(request: RunRequest) -> int:
-    """Make a data set.
+def program(request: RunRequest) -> Program[TraceSet]:
+    """What ``sysid run`` does of a pipeline that makes a data set.
 
     Args:
         request: What was asked.
 
     Returns:
-        Exit code 0.
+        The program.
 
     Raises:
         UserError: If the pipeline or an option cannot be used.
     """
-    from sysid.workbench.runner.listeners import Audience, typed_command
-
     config = check(MakingConfig, read_yaml(request.path), where=request.path)
-    store = RunFolder(path=(request.out or Path("runs") / config.name).resolve())
-    command, audience = typed_command("run", request.typed, request.out), Audience.of(tracking=False)
-    audience.log.write_to(store.path, command)
-    try:
-        with store.locked():
-            write_bytes(store.path / "pipeline.yaml", request.path.read_bytes())
-            write_json(store.path / "environment.json", environment())
-            file = _make(config, request, store=store, tell=audience.tell, command=command)
-            traces = _load(file, audience.tell)
-    finally:
-        audience.screen.close()
-    roles = ", ".join(f"{trace.name} ({traces.roles[trace.name].value})" for trace in traces)
-    audience.target.print(f"\n{len(traces)} traces: {roles}", soft_wrap=True)
-    audience.target.print(f"Data set: {file}\nLook at it with: sysid ingest {file}", soft_wrap=True)
-    audience.target.print(f"Fit or choose on it with data: {file}, or selection: {file}, in a pipeline", soft_wrap=True)
-    return 0
-
-
-def _make(config: MakingConfig, request: RunRequest, *, store: RunFolder, tell: Watcher, command: str) -> Path:
     maker = find_maker(config.kind, where=request.path)
     options = check(maker.options, config.options, where=f"{request.path}, options")
-    results = do_steps(
-        maker.steps(options), title="Playing", version=maker.version, store=store, fresh=request.fresh, tell=tell
+    work = _Making(config=config, maker=maker, options=options)
+    text = request.path.read_bytes()
+    return Program(
+        name=config.name,
+        keep=lambda folder: write_bytes(folder / "pipeline.yaml", text),
+        steps=work.run,
+        outline=lambda: [Outlined(name=TITLE, title=TITLE), LOADING],
+        closing=closing,
+        tracked=False,
     )
-    fields = {"name": config.name, "description": config.description, **maker.dataset(options, results)}
-    text = yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=116, default_flow_style=None)
-    file = store.path / FILE
-    write_bytes(file, f"# Made by: {command}\n\n{text}".encode())
-    return file
 
 
-def _load(file: Path, tell: Watcher) -> TraceSet:
-    """The traces, which shows that the data set can be used."""
-    step = "Loading the traces"
-    tell(StepStarted(step=step))
-    traces = load_dataset(
-        file,
-        progress=lambda case, index, count: tell(
-            StepProgress(step=step, fraction=index / count, detail=f"{case} ({index + 1} of {count})")
-        ),
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Making:
+    """The steps of one pipeline."""
+
+    config: MakingConfig
+    maker: Maker
+    options: Any
+
+    def run(self, run: Run) -> TraceSet:
+        asked = self.maker.steps(self.options)
+        done = run.do_all(TITLE, kept_steps(asked, title=TITLE, version=self.maker.version, store=run.store))
+        results = {step.name: one.value for step, one in zip(asked, done, strict=True)}
+        return run.do(self._loading(run, results)).value
+
+    def _loading(self, run: Run, results: Mapping[str, Any]) -> Step[TraceSet]:
+        """Write the data set and load its traces, which shows that it can be used."""
+
+        def make(work: Work) -> TraceSet:
+            return load_dataset(
+                self._written(run, results),
+                progress=lambda case, index, count: work.say(f"{case} ({index + 1} of {count})", index / count),
+            )
+
+        return Step(
+            name=LOADING.name,
+            title=LOADING.title,
+            make=make,
+            outcome=lambda traces: f"{len(traces)} cases of {traces.name}",
+        )
+
+    def _written(self, run: Run, results: Mapping[str, Any]) -> Path:
+        fields = {
+            "name": self.config.name,
+            "description": self.config.description,
+            **self.maker.dataset(self.options, results),
+        }
+        text = yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=116, default_flow_style=None)
+        file = run.store.path / FILE
+        write_bytes(file, f"# Made by: {run.command}\n\n{text}".encode())
+        return file
+
+
+def closing(traces: TraceSet, folder: Path) -> Closing:
+    """What is said at the end: the traces, and how they are used.
+
+    Args:
+        traces: The data set.
+        folder: The run folder.
+
+    Returns:
+        The lines.
+    """
+    file = folder.resolve() / FILE
+    roles = ", ".join(f"{trace.name} ({traces.roles[trace.name].value})" for trace in traces)
+    return Closing(
+        lines=[
+            f"{len(traces)} traces: {roles}",
+            f"Data set: {file}",
+            f"Look at it with: sysid ingest {file}",
+            f"Fit or choose on it with data: {file}, or selection: {file}, in a pipeline",
+        ]
     )
-    tell(StepDone(step=step, stored=False, detail=f"{len(traces)} cases of {traces.name}"))
-    return traces

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sysid.estimation import FitResult
-from sysid.reporting.results import Results
 from sysid.reporting.sweep.record import SweepRecord
 from sysid.traces import TraceSet
 from sysid.validation import Evaluation
-from sysid.workbench.fits.config import FitConfig, PipelineConfig
+
+if TYPE_CHECKING:
+    from sysid.workbench.fits.config import FitConfig, PipelineConfig
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,13 +26,13 @@ class RunStarted(Event):
     """A run begins, its data not yet loaded.
 
     Args:
-        config: The pipeline.
+        pipeline: Name of the pipeline.
         folder: Its run folder.
         run_id: Name of this run, different for each.
         command: The command that makes it again.
     """
 
-    config: PipelineConfig
+    pipeline: str
     folder: Path
     run_id: str
     command: str
@@ -97,6 +98,7 @@ class FitReady(Event):
 
     Args:
         config: The fit as the pipeline asks for it.
+        pipeline: The pipeline.
         key: Digest of everything the fit and its figures depend on.
         fit: The fit.
         evaluation: Its figures on every case, signals included.
@@ -106,6 +108,7 @@ class FitReady(Event):
     """
 
     config: FitConfig
+    pipeline: PipelineConfig
     key: str
     fit: FitResult
     evaluation: Evaluation
@@ -210,10 +213,10 @@ class RunDone(Event):
     """Everything is done.
 
     Args:
-        results: The contents of ``results.json``.
+        results: What the run gives: mostly the contents of ``results.json``.
     """
 
-    results: Results
+    results: Any
 
 
 Watcher = Callable[[Event], None]

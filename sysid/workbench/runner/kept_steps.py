@@ -1,16 +1,20 @@
-"""Steps whose results are kept by their content: done once, found again by any later run, whoever asks for them."""
+"""Steps whose results are JSON values kept by their content: done once, found again by any run, under any name."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any, Protocol
 
-from sysid.workbench.runner.events import Event, StepDone, StepProgress, StepStarted
+from sysid.workbench.runner.naming import slug
+from sysid.workbench.runner.steps import Step, Work
 from sysid.workbench.runner.store import RunFolder, digest, read_json, strict, write_json
 
 
-class Step(Protocol):
-    """One thing to do."""
+class KeptStep(Protocol):
+    """One thing to do, as judges and makers have it."""
 
     @property
     def name(self) -> str:
@@ -25,35 +29,41 @@ class Step(Protocol):
         """Does it; gives JSON values."""
 
 
-def do_steps(
-    steps: Sequence[Step], *, title: str, version: str, store: RunFolder, fresh: bool, tell: Callable[[Event], None]
-) -> dict[str, Any]:
-    """The result of every step; each is on disk before the next begins.
+def kept_steps(steps: Sequence[KeptStep], *, title: str, version: str, store: RunFolder) -> list[Step[Any]]:
+    """Such steps for the runner.
 
     Args:
         steps: That do not depend on each other.
         title: What they are together, for people.
         version: Digest of the code that does them.
         store: The run folder.
-        fresh: Do all of them again.
-        tell: Told what happens.
 
     Returns:
-        Results by name of the step.
+        As many steps.
     """
-    tell(StepStarted(step=title))
-    results, stored = {}, 0
-    for number, step in enumerate(steps):
-        detail = f"{step.name} ({number + 1} of {len(steps)})"
-        tell(StepProgress(step=title, fraction=number / len(steps), detail=detail))
-        key = digest(strict({"code": version, "terms": dict(step.terms)}))
-        # By its content, not its name: the same step under another name is the same step.
-        name, file = f"step-{key[:16]}", store.path / "steps" / f"{key[:16]}.json"
-        if not fresh and store.is_done(name, key):
-            stored += 1
-        else:
-            write_json(file, step.run())
-            store.mark_done(name, key, [file], does=step.name)
-        results[step.name] = read_json(file)
-    tell(StepDone(step=title, stored=stored == len(steps), detail=f"{len(steps)} steps, {stored} of them stored"))
-    return results
+    return [_kept(step, f"{title} {step.name}", version, store) for step in steps]
+
+
+def _kept(step: KeptStep, title: str, version: str, store: RunFolder) -> Step[Any]:
+    key = digest(strict({"code": version, "terms": dict(step.terms)}))
+    # By its content, not its name: the same step under another name is the same step.
+    file = store.path / "steps" / f"{key[:16]}.json"
+
+    def make(_: Work) -> Any:
+        return json.loads(json.dumps(strict(step.run())))  # the same values as when they are read again
+
+    return Step(
+        name=f"step-{key[:16]}",
+        title=title,
+        make=make,
+        key=lambda: key,
+        write=partial(_written, file),
+        read=lambda _: read_json(file),
+        facts=lambda _: {"does": step.name},
+        timed_as=f"step-{slug(title)}",
+    )
+
+
+def _written(file: Path, values: Any) -> list[Path]:
+    write_json(file, values)
+    return [file]

@@ -1,18 +1,26 @@
-"""Who is told of a run: the screen, the log in its folder and MLflow; and what is said at its end."""
+"""Who is told of a run: the screen, the log in its folder and MLflow; and what is said at its end.
+
+A run of whatever kind begins here: :func:`perform`.
+"""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from sysid.workbench.runner.console import console
-from sysid.workbench.runner.events import Event, Warned, Watcher
+from sysid.workbench.runner.dry_run import PlannedStep
+from sysid.workbench.runner.events import Warned, Watcher
+from sysid.workbench.runner.program import Closing, Program, carry_out, foretell
 from sysid.workbench.runner.screen import LogFile, Screen
 from sysid.workbench.tracking.listener import Tracker
+
+if TYPE_CHECKING:
+    from sysid.workbench.kinds import RunRequest
 
 
 def typed_command(verb: str, pipeline: str, out: Path | None) -> str:
@@ -34,7 +42,7 @@ def typed_command(verb: str, pipeline: str, out: Path | None) -> str:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Audience:
+class Listeners:
     """Who is told of a run.
 
     Args:
@@ -50,14 +58,14 @@ class Audience:
     tracker: Tracker | None
 
     @classmethod
-    def of(cls, *, tracking: bool) -> Audience:
+    def of(cls, *, tracking: bool) -> Listeners:
         """Everybody who listens.
 
         Args:
             tracking: Whether the run is tracked in MLflow.
 
         Returns:
-            The audience.
+            The listeners.
         """
         target = console()
         screen, log = Screen(target), LogFile()
@@ -74,25 +82,19 @@ class Audience:
         """All of them."""
         return [self.screen, self.log, *([self.tracker] if self.tracker else [])]
 
-    def tell(self, event: Event) -> None:
-        """Tell everybody.
+    def end(self, closing: Closing) -> int:
+        """Say how it came out, and what lies where.
 
         Args:
-            event: What has happened.
-        """
-        for watch in self.watchers:
-            watch(event)
-
-    def end(self, files: Mapping[str, Path]) -> int:
-        """Say what lies where.
-
-        Args:
-            files: By what they are; those that do not exist are left out.
+            closing: What there is to say; files that do not exist are left out.
 
         Returns:
             Exit code: 0, or 1 if something could not be tracked.
         """
-        for name, path in files.items():
+        self.target.print()
+        for line in closing.lines:
+            self.target.print(line, soft_wrap=isinstance(line, str))
+        for name, path in closing.files.items():
             if path.exists():
                 self.target.print(f"{name + ':':<9}{path}", soft_wrap=True)
         if self.tracker is not None and self.tracker.failures:
@@ -100,4 +102,47 @@ class Audience:
                 "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
             )
             return 1
+        if self.tracker is not None and closing.compare:
+            self.target.print(f"{'Compare:':<9}sysid ui")
         return 0
+
+
+def perform(program: Program[Any], request: RunRequest) -> int:
+    """Run a pipeline with everybody who listens.
+
+    Args:
+        program: What to do.
+        request: What was asked.
+
+    Returns:
+        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
+
+    Raises:
+        SysidError: What a step raises.
+    """
+    folder = request.out or Path("runs") / program.name
+    listeners = Listeners.of(tracking=request.tracking and program.tracked)
+    command = typed_command(program.verb, request.typed, request.out)
+    try:
+        results = carry_out(program, folder, command=command, fresh=request.fresh, watchers=listeners.watchers)
+    finally:
+        listeners.screen.close()
+    return listeners.end(program.closing(results, folder))
+
+
+def foresee(program: Program[Any], request: RunRequest) -> tuple[PlannedStep, ...]:
+    """What a run would do, and how long it would take; nothing is run or written.
+
+    Args:
+        program: What would be done.
+        request: What was asked.
+
+    Returns:
+        The steps in order.
+
+    Raises:
+        UserError: If the pipeline, its data or its options cannot be used: what a run would say too.
+    """
+    folder = request.out or Path("runs") / program.name
+    command = typed_command(program.verb, request.typed, request.out)
+    return foretell(program, folder, command=command, fresh=request.fresh)

@@ -12,11 +12,10 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from sysid.reporting.results import FitRecord, Results
 from sysid.workbench.runner.events import Event, RunStarted, StepDone, StepProgress, StepStarted, Warned
 
 if TYPE_CHECKING:
-    from sysid.workbench.runner.plan import PlannedStep
+    from sysid.workbench.runner.dry_run import PlannedStep
 
 
 class Screen:
@@ -93,17 +92,6 @@ class LogFile:
         self._clock = clock
         self._began = self._said = clock()
 
-    def write_to(self, folder: Path, command: str) -> None:
-        """Begin the log of a run that does not say so itself.
-
-        Args:
-            folder: The run folder.
-            command: What was typed.
-        """
-        folder.mkdir(parents=True, exist_ok=True)
-        self._path = folder / "log.txt"
-        self._write(f"run {time.strftime('%Y%m%d-%H%M%S')}: {command}")
-
     def __call__(self, event: Event) -> None:
         """Write an event down."""
         match event:
@@ -164,7 +152,7 @@ def table_of_steps(planned: Sequence[PlannedStep]) -> Table:
     """The steps that a run would take.
 
     Args:
-        planned: From :func:`sysid.workbench.runner.plan.plan`.
+        planned: The steps.
 
     Returns:
         The table.
@@ -174,38 +162,6 @@ def table_of_steps(planned: Sequence[PlannedStep]) -> Table:
     table.add_column("time", justify="right")
     table.add_column("how that is known")
     for one in planned:
-        table.add_row(escape(one.step), "-" if one.stored else duration(one.seconds), escape(one.basis))
+        seconds = "-" if one.stored else "?" if one.seconds is None else duration(one.seconds)
+        table.add_row(escape(one.step), seconds, escape(one.basis))
     return table
-
-
-def table_of_fits(results: Results) -> Table:
-    """The fits by case: mean squared error of the free run.
-
-    Args:
-        results: What the run found.
-
-    Returns:
-        The table.
-    """
-    unit = next((fit.unit for fit in results.fits), "")
-    # Shown in one power of ten, as publications print them, so that columns compare at a glance.
-    table = Table(title=f"Free run, mean squared error in {unit}²", title_justify="left", header_style="bold")
-    table.add_column("fit")
-    table.add_column("structure")
-    table.add_column("loop")
-    cases = list(results.data.cases)
-    for case in cases:
-        table.add_column(f"{case}\n[dim]{results.data.cases[case].role.value}[/]", justify="right")
-    if results.selection:
-        table.add_column("selection", justify="right")
-    table.add_column("training", justify="right")
-    for fit in results.fits:
-        best = results.best is not None and fit.name == results.best.name
-        table.add_row(*_row(fit, cases, selection=bool(results.selection)), style="bold" if best else None)
-    return table
-
-
-def _row(fit: FitRecord, cases: list[str], *, selection: bool) -> list[str]:
-    figures = [f"{fit.cases[case].free_run.mse:.3e}" for case in cases]
-    chosen = [f"{fit.selection_mse:.3e}"] if selection else []
-    return [escape(fit.name), fit.label, fit.loop.value, *figures, *chosen, f"{fit.train_time_s:.1f} s"]

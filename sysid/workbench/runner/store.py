@@ -211,6 +211,80 @@ class RunFolder:
         """What was kept with a step's stamp."""
         return dict(read_json(self._stamp(step)))
 
+    def checkpoint(self, step: str, key: str) -> dict[str, Any]:
+        """Where a step stood when it was cut off.
+
+        Args:
+            step: Name of the step.
+            key: Digest of everything it depends on.
+
+        Returns:
+            What :meth:`keep_checkpoint` was given; nothing if there is none, or it is of another key.
+        """
+        try:
+            kept = read_json(self._checkpoint(step))
+            return dict(kept["values"]) if kept["key"] == key else {}
+        except (OSError, ValueError, KeyError, TypeError):
+            # None, or none that can be read: the step begins anew.
+            return {}
+
+    def keep_checkpoint(self, step: str, key: str, values: Mapping[str, Any]) -> None:
+        """Write down where a step stands.
+
+        Args:
+            step: Name of the step.
+            key: Digest of everything it depends on.
+            values: JSON values.
+        """
+        write_json(self._checkpoint(step), {"key": key, "values": values})
+
+    def drop_checkpoint(self, step: str) -> None:
+        """Forget where a step stood: it is done."""
+        self._checkpoint(step).unlink(missing_ok=True)
+
+    def keep_time(self, step: str, seconds: float, *, amount: object = None) -> None:
+        """Write down how long a step took.
+
+        Args:
+            step: Name of the step.
+            seconds: How long.
+            amount: JSON values that say how much work it was.
+        """
+        times = self._known_times()
+        times[step] = {"seconds": seconds, "amount": None if amount is None else digest(strict(amount))}
+        write_json(self._times, times)
+
+    def last_time(self, step: str, *, amount: object = None) -> float | None:
+        """How long a step took when it was done last.
+
+        Args:
+            step: Name of the step.
+            amount: JSON values that say how much work it is; ``None`` takes any.
+
+        Returns:
+            Seconds; ``None`` if it was never done here, or was another amount of work.
+        """
+        try:
+            known = self._known_times()[step]
+            same = amount is None or known["amount"] == digest(strict(amount))
+            return float(known["seconds"]) if same else None
+        except (KeyError, ValueError, TypeError):
+            return None
+
+    @property
+    def _times(self) -> Path:
+        return self.path / ".steps" / "times.json"
+
+    def _known_times(self) -> dict[str, Any]:
+        try:
+            return dict(read_json(self._times))
+        except (OSError, ValueError, TypeError):
+            # Times are told, not decided by.
+            return {}
+
+    def _checkpoint(self, step: str) -> Path:
+        return self.path / ".steps" / f"{step}.checkpoint.json"
+
     def _stamp(self, step: str) -> Path:
         return self.path / ".steps" / f"{step}.json"
 

@@ -1,4 +1,4 @@
-"""A sweep from ranges to report: trials, a record of them, and the winner through the same steps as any fit."""
+"""A sweep as steps: its trials and a record of them, then the winner through the same steps as any fit."""
 
 from __future__ import annotations
 
@@ -6,26 +6,35 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sysid.errors import ConfigError
 from sysid.reporting.results import Results
 from sysid.reporting.sweep.record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
-from sysid.workbench.fits.data import Data, load_data
-from sysid.workbench.fits.run import GivenFit, run_pipeline
+from sysid.workbench.fits.data import Data
+from sysid.workbench.fits.estimates import how_long
+from sysid.workbench.fits.run import FitSteps, GivenFit
+from sysid.workbench.fits.table import table_of_fits
 from sysid.workbench.runner import events
-from sysid.workbench.runner.store import RunFolder, write_bytes
+from sysid.workbench.runner.program import Closing, Program, carry_out
+from sysid.workbench.runner.run import Run
+from sysid.workbench.runner.steps import Done, Estimate, Outlined, Step
+from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.sweep.checks import Checks
 from sysid.workbench.sweep.config import WINNER, SweepConfig
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.sampler import publish, strategy
 from sysid.workbench.sweep.search_space import Space, parse_space, trained_rows
 from sysid.workbench.sweep.store import TRIALS, TrialStore
+from sysid.workbench.sweep.table import table_of_trials
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, LocalWorkers
 from sysid.yaml_files import check, read_yaml
+
+if TYPE_CHECKING:
+    from sysid.workbench.kinds import RunRequest
 
 Hire = Callable[[Bench, SweepConfig], AbstractWorkers]
 """Finds workers for a sweep."""
@@ -95,6 +104,46 @@ def hire(bench: Bench, config: SweepConfig) -> AbstractWorkers:
     return DaskWorkers(bench, config.cluster)
 
 
+def program(request: RunRequest) -> Program[Swept]:
+    """What ``sysid sweep``, or ``sysid run``, does of a pipeline of kind ``sweep``.
+
+    Args:
+        request: What was asked.
+
+    Returns:
+        The program.
+
+    Raises:
+        ConfigError: If the pipeline cannot be used.
+    """
+    sweep = read_sweep_file(request.path)
+    if request.workers is not None:
+        config = sweep.config.model_copy(update={"workers": request.workers})
+        sweep = Sweep(config=config, text=sweep.text, path=sweep.path)
+    return program_of(sweep)
+
+
+def program_of(sweep: Sweep, *, find_workers: Hire = hire) -> Program[Swept]:
+    """A sweep as a program.
+
+    Args:
+        sweep: What to do.
+        find_workers: Finds who does the jobs.
+
+    Returns:
+        The program.
+    """
+    work = _SweepSteps(sweep=sweep, find_workers=find_workers)
+    return Program(
+        name=sweep.config.name,
+        keep=lambda folder: write_bytes(folder / "pipeline.yaml", sweep.text.encode()),
+        steps=work.run,
+        outline=work.outline,
+        closing=closing,
+        verb="sweep",
+    )
+
+
 def run_sweep(
     sweep: Sweep,
     folder: Path,
@@ -122,23 +171,33 @@ def run_sweep(
         UserError: If data or options cannot be used as they are, or no trial can.
         ParityError: If an exported file differs from its model.
     """
-    store = RunFolder(path=folder.resolve())
-    run = _Run(sweep=sweep, store=store, command=command, fresh=fresh, watchers=watchers, find_workers=find_workers)
-    with store.locked():
-        found = run.trials()
-    fits = [found.fit_of(WINNER, found.winner)] + [found.fit_of(trial.label, trial) for trial in found.beside]
-    pipeline = Pipeline(config=sweep.config.pipeline(fits), text=sweep.text, path=sweep.path)
-    given = {fit.name: found.given[trial.number] for fit, trial in zip(fits, found.shown, strict=True)}
-    choice = steps.Choice(name=WINNER, chosen_by=found.record.chosen_by, cases_chose=sweep.config.choose.on == "cases")
-    results = run_pipeline(
-        pipeline, folder, command=command, fresh=fresh, watchers=watchers, given=given, chosen=choice
+    done = program_of(sweep, find_workers=find_workers)
+    return carry_out(done, folder, command=command, fresh=fresh, watchers=watchers)
+
+
+def closing(swept: Swept, folder: Path) -> Closing:
+    """What is said at the end: the best trials, the fits by case, and the best.
+
+    Args:
+        swept: What came of the sweep.
+        folder: The run folder.
+
+    Returns:
+        The lines and files.
+    """
+    return Closing(
+        lines=[
+            table_of_trials(swept.record),
+            table_of_fits(swept.results),
+            f"Best: {swept.results.fits[0].label}. {swept.record.chosen_by}",
+        ],
+        files={
+            "Report": folder / "report" / "index.html",
+            "Bundle": folder / "bundle",
+            "Trials": folder / "sweep.json",
+            "Results": folder / "results.json",
+        },
     )
-    ready = events.SweepReady(
-        record=found.record, folder=store.path, command=command, data=sweep.config.data, seed=sweep.config.seed
-    )
-    for watch in watchers:
-        watch(ready)
-    return Swept(record=found.record, results=results)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,6 +209,8 @@ class _Found:
     beside: list[Trial]
     given: dict[int, GivenFit]
     options: dict[int, Mapping[str, Any]]
+    rank: float
+    done_now: int
 
     def fit_of(self, name: str, trial: Trial) -> FitConfig:
         """A trial as a fit of a pipeline."""
@@ -163,14 +224,10 @@ class _Found:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Run:
-    """One session of a sweep."""
+class _SweepSteps:
+    """The steps of a sweep: its trials, which keep themselves, and those of a pipeline of fits for what was found."""
 
     sweep: Sweep
-    store: RunFolder
-    command: str
-    fresh: bool
-    watchers: Sequence[events.Watcher]
     find_workers: Hire
 
     @property
@@ -178,15 +235,72 @@ class _Run:
         """The checked fields."""
         return self.sweep.config
 
-    def tell(self, event: events.Event) -> None:
-        """Tell everybody."""
-        for watch in self.watchers:
-            watch(event)
+    def outline(self) -> list[Outlined]:
+        """All steps, as far as they are known before a trial is."""
+        winner = Pipeline(config=self._first(self.config.space()), text=self.sweep.text, path=self.sweep.path)
+        data, *rest = FitSteps(pipeline=winner).outline()
+        # Of which structure the winner is, nobody knows.
+        named = [
+            replace(one, title=one.title.partition(",")[0]) if one.name.startswith("fit-") else one for one in rest
+        ]
+        return [data, Outlined(name=TRIALS, title=self._title()), *named]
 
-    def trials(self) -> _Found:
-        """Try what there is to try, and choose."""
-        write_bytes(self.store.path / "pipeline.yaml", self.sweep.text.encode())
-        data = self._load()
+    def run(self, run: Run) -> Swept:
+        """Every step, in order."""
+        first = Pipeline(config=self._first(self.config.space()), text=self.sweep.text, path=self.sweep.path)
+        loaded = run.do(FitSteps(pipeline=first).loading())
+        found = run.do(self._trials(run, loaded)).value
+        fits = [found.fit_of(WINNER, found.winner)] + [found.fit_of(trial.label, trial) for trial in found.beside]
+        pipeline = Pipeline(config=self.config.pipeline(fits), text=self.sweep.text, path=self.sweep.path)
+        given = {fit.name: found.given[trial.number] for fit, trial in zip(fits, found.shown, strict=True)}
+        cases_chose = self.config.choose.on == "cases"
+        choice = steps.Choice(name=WINNER, chosen_by=found.record.chosen_by, cases_chose=cases_chose)
+        results = FitSteps(pipeline=pipeline, given=given, chosen=choice).run(run, loaded)
+        ready = events.SweepReady(
+            record=found.record, folder=run.store.path, command=run.command, data=self.config.data,
+            seed=self.config.seed,
+        )  # fmt: skip
+        run.then(lambda: run.tell(ready))
+        return Swept(record=found.record, results=results)
+
+    def _title(self) -> str:
+        points = len(self.config.space().points())
+        return f"Sweeping {self.config.method.trials or points} of {points} points by {self.config.method.name}"
+
+    def _trials(self, run: Run, loaded: Done[Data]) -> Step[_Found]:
+        """Try what there is to try, and choose; trials keep themselves, each as soon as it is done."""
+        by = self.config.choose.by
+        return Step(
+            name=TRIALS,
+            title=self._title(),
+            make=lambda _: self._found(run, self._checked(loaded.value)),
+            outcome=lambda found: f"{found.winner.label}, {by} {found.rank:.3g}",
+            was_found=lambda found: found.done_now == 0,
+            how_long=lambda: self._how_long(run, loaded.value),
+        )
+
+    def _how_long(self, run: Run, data: Data) -> Estimate:
+        """From the trials that are there, or from one in the middle of the ranges."""
+        points = self.config.space().points()
+        wanted, store = self.config.method.trials or len(points), TrialStore(path=run.store.path / TRIALS)
+        there = 0 if run.fresh else store.count()
+        # With pruning a point is several trials, and warm starts are trials too: what is left is at most this.
+        left = max(wanted - there, 0)
+        if there and store.seconds > 0.0:
+            return Estimate(
+                seconds=store.seconds * left / there, basis=f"{there} trials are there, and took as long each"
+            )
+        middle = points[len(points) // 2]
+        fit = FitConfig.model_validate(
+            {"name": WINNER, "structure": middle.structure.to_dict(), "training": dict(middle.training) or None}
+        )
+        one = how_long(fit, self.config.pipeline([fit]), data)
+        if one.seconds is None:
+            return one
+        basis = f"{left} trials, each as long as {middle.structure.label}, {self.config.workers} at a time"
+        return Estimate(seconds=left * one.seconds / self.config.workers, basis=basis)
+
+    def _found(self, run: Run, data: Data) -> _Found:
         space = self.config.space()
         bench = Bench(
             pipeline=self._first(space).model_dump(mode="json"),
@@ -194,12 +308,9 @@ class _Run:
             selection=data.selection,
             sequences=data.sequences,
         )
-        trials = TrialStore(path=self.store.path / TRIALS)
-        if self.fresh:
+        trials = TrialStore(path=run.store.path / TRIALS)
+        if run.fresh:
             shutil.rmtree(trials.path, ignore_errors=True)
-        n = self.config.method.trials or len(space.points())
-        step = f"Sweeping {n} of {len(space.points())} points by {self.config.method.name}"
-        self.tell(events.StepStarted(step=step))
         workers = self.find_workers(bench, self.config)
         try:
             with trials.clock() as clock:
@@ -209,8 +320,8 @@ class _Run:
                     store=trials,
                     workers=workers,
                     clock=clock,
-                    step=step,
-                    tell=self.tell,
+                    step=self._title(),
+                    tell=run.tell,
                 )
                 plan, tried = strategy(self.config, space), []
                 while points := plan.ask():
@@ -218,29 +329,19 @@ class _Run:
                     plan.tell(batch)
                     tried += batch
                 beside = self._beside(driver, tried, len(space.points()))
-            found = self._choose(
-                driver, bench, tried=tried, beside=beside, n_points=len(space.points()), wall_s=clock.total
-            )
+            found = self._choose(run, driver, bench, tried=tried, beside=beside, wall_s=clock.total)
         finally:
             workers.close()
-        detail = f"{found.winner.label}, {self.config.choose.by} {driver.rank(found.winner)[1]:.3g}"
-        self.tell(events.StepDone(step=step, stored=driver.done_now == 0, detail=detail))
         if self.config.storage is not None:
-            self._publish(found.record, self.config.storage)
+            self._publish(run, found.record, self.config.storage)
         return found
 
     def _first(self, space: Space) -> PipelineConfig:
         """The pipeline of the first point: what all points share."""
         return self.config.pipeline([FitConfig(name=WINNER, structure=space.points()[0].structure)])
 
-    def _load(self) -> Data:
-        step = "Loading the traces"
-        self.tell(events.StepStarted(step=step))
-        data = load_data(
-            self._first(self.config.space()),
-            beside=self.sweep.path.parent,
-            progress=lambda text: self.tell(events.StepProgress(step=step, fraction=None, detail=text)),
-        )
+    def _checked(self, data: Data) -> Data:
+        """The data, if there is something to choose by."""
         if self.config.choose.on == "selection" and not data.selection:
             raise ConfigError(
                 "there are no selection traces to choose by",
@@ -249,8 +350,6 @@ class _Run:
                 got=f"selection: {self.config.selection}",
                 remedy="name one with selection: ..., or choose on estimation, which favours the largest network",
             )
-        cases = f"{len(data.traces)} cases of {data.traces.name}"
-        self.tell(events.StepDone(step=step, stored=False, detail=f"{cases}, {len(data.selection)} to choose by"))
         return data
 
     def _beside(self, driver: Driver, tried: Sequence[Trial], n_points: int) -> list[Trial]:
@@ -270,12 +369,12 @@ class _Run:
 
     def _choose(
         self,
+        run: Run,
         driver: Driver,
         bench: Bench,
         *,
         tried: Sequence[Trial],
         beside: Sequence[Trial],
-        n_points: int,
         wall_s: float,
     ) -> _Found:
         usable = [trial for trial in tried if trial.in_full]
@@ -291,8 +390,9 @@ class _Run:
         checks = Checks(driver=driver, bench=bench)
         winner, refused = checks.first_stable(ranked)
         unit = bench.traces.traces[0].channel(self.config.mapping.output).unit
+        n_points = len(self.config.space().points())
         record = self._record(tried, beside, winner, unit=unit, n_points=n_points, wall_s=wall_s, refused=refused)
-        write_sweep(self.store.path, record)
+        write_sweep(run.store.path, record)
         others = [trial for trial in beside if trial.number != winner.number]
         shown = [winner, *others]
         return _Found(
@@ -301,6 +401,8 @@ class _Run:
             beside=others,
             given={trial.number: checks.given(trial) for trial in shown},
             options={trial.number: driver.last[trial.number].training for trial in shown},
+            rank=driver.rank(winner)[1],
+            done_now=driver.done_now,
         )
 
     def _record(
@@ -343,12 +445,12 @@ class _Run:
             trials=list(tried),
         )
 
-    def _publish(self, record: SweepRecord, url: str) -> None:
+    def _publish(self, run: Run, record: SweepRecord, url: str) -> None:
         """Write the trials where Optuna's tools find them; that this fails costs nobody the sweep."""
         try:
             publish(record, url)
         except Exception as error:  # noqa: BLE001 - a database can fail in any way, and the sweep is on disk
-            self.tell(events.Warned(text=f"not written to the Optuna store ({type(error).__name__}: {error})"))
+            run.tell(events.Warned(text=f"not written to the Optuna store ({type(error).__name__}: {error})"))
 
 
 def _ranges(space: Space) -> dict[str, list[Any]]:

@@ -64,6 +64,19 @@ class TrialStore:
         """Results that are stored."""
         return sum(1 for _ in self.path.glob("*/*.json")) if self.path.is_dir() else 0
 
+    @property
+    def _clock(self) -> Path:
+        return self.path / "clock.json"
+
+    @property
+    def seconds(self) -> float:
+        """Wall time that all sessions took."""
+        try:
+            return float(read_json(self._clock)["wall_s"])
+        except (OSError, ValueError, KeyError, TypeError):
+            # No session yet, or a clock that was torn by a power cut: time is told, not decided by.
+            return 0.0
+
     @contextmanager
     def clock(self) -> Iterator[Clock]:
         """The time that this sweep takes, over all its sessions.
@@ -71,13 +84,7 @@ class TrialStore:
         Yields:
             The clock, which is running.
         """
-        file = self.path / "clock.json"
-        try:
-            before = float(read_json(file)["wall_s"])
-        except (OSError, ValueError, KeyError, TypeError):
-            # The first session, or a clock that was torn by a power cut: time is told, not decided by.
-            before = 0.0
-        clock = Clock(file=file, before=before, began=time.perf_counter())
+        clock = Clock(file=self._clock, before=self.seconds, began=time.perf_counter())
         try:
             yield clock
         finally:

@@ -80,20 +80,19 @@ def describe(
     client.set_tag(run_id, "mlflow.note.content", tracked.description(ready, run, links))
 
 
-def log_values(client: Any, run_id: str, ready: FitReady, run: RunStarted, entities: Entities) -> None:
+def log_values(client: Any, run_id: str, ready: FitReady, entities: Entities) -> None:
     """Log a fit's figures, learning curve and parameters.
 
     Args:
         client: A client of the tracking store.
         run_id: Its run.
         ready: The fit.
-        run: The pipeline's run that it belongs to.
         entities: Classes of the tracking tool.
     """
     now = int(time.time() * 1000)
     values = [entities.metric(name, value, now, 0) for name, value in tracked.metrics(ready).items()]
     values += [entities.metric("learning_curve_mse", mse, now, step) for step, mse in tracked.learning_curve(ready)]
-    params = [entities.param(name, value[:PARAM_LIMIT]) for name, value in tracked.parameters(ready, run).items()]
+    params = [entities.param(name, value[:PARAM_LIMIT]) for name, value in tracked.parameters(ready).items()]
     for number, batch in enumerate(tracked.batches(values)):
         client.log_batch(run_id, metrics=batch, params=() if number else params)
 

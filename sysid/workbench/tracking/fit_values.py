@@ -63,7 +63,7 @@ def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
         Texts by name.
     """
     return {
-        "pipeline": run.config.name,
+        "pipeline": run.pipeline,
         "pipeline_run": run.run_id,
         "fit": ready.config.name,
         "structure": ready.fit.model.structure.label,
@@ -89,24 +89,23 @@ def description(ready: FitReady, run: RunStarted, links: Mapping[str, str]) -> s
     """
     # MLflow shows the first few lines and hides the rest behind a click: what leads elsewhere stands first.
     leads = [f"[{words}]({address})" for words, address in links.items()]
-    lines = [" · ".join([f"**{ready.config.name}** of the pipeline `{run.config.name}`", *leads]), ""]
+    lines = [" · ".join([f"**{ready.config.name}** of the pipeline `{run.pipeline}`", *leads]), ""]
     lines += [ready.fit.status.value, "", *(f"* {note}" for note in ready.fit.notes)]
     return "\n".join([*lines, "", f"Made by `{run.command}`."])
 
 
-def parameters(ready: FitReady, run: RunStarted) -> dict[str, str]:
+def parameters(ready: FitReady) -> dict[str, str]:
     """What was chosen before the fit.
 
     Args:
         ready: The fit.
-        run: The run that it belongs to.
 
     Returns:
         Texts by name.
     """
     structure = ready.fit.model.structure.to_dict()
-    chosen: dict[str, Any] = {"mapping": ready.fit.model.mapping, "start": run.config.start.kind.value, **structure}
-    training = ready.config.training_options(run.config.seed)
+    chosen: dict[str, Any] = {"mapping": ready.fit.model.mapping, "start": ready.pipeline.start.kind.value, **structure}
+    training = ready.config.training_options(ready.pipeline.seed)
     if training is not None:
         chosen |= {f"training.{name}": getattr(value, "value", value) for name, value in vars(training).items()}
     return {name: str(value) for name, value in chosen.items()}

@@ -128,7 +128,7 @@ class Tracker:
         status = "FAILED"
         try:
             self._describe(experiment, run_id, ready)
-            tracked_fit.log_values(self.client, run_id, ready, self.run, tracking.entities())
+            tracked_fit.log_values(self.client, run_id, ready, tracking.entities())
             tracking.log_data(self.client, run_id, self.data.traces)
             tracked_fit.log_pictures(self.client, run_id, ready)
             views.show(self.client, experiment, [tracked.key(name) for name in ready.evaluation.cases])

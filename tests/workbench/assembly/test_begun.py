@@ -11,7 +11,8 @@ from sysid.errors import BundleError, ConfigError
 from sysid.export import export_bundle
 from sysid.ingest import load_dataset
 from sysid.reporting import publish_run
-from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.assembly.runner import read_assembly
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results
@@ -27,7 +28,7 @@ SECOND = QUICK.replace("name: tanks\n", "name: further\nbegin: ../runs/tanks/bun
 def run(workspace: Path, name: str, text: str) -> Path:
     file = workspace / "pipelines" / f"{name}.yaml"
     file.write_text(text, encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed=name, tracking=False)) == 0
+    assert run_request(RunRequest(path=file, typed=name, tracking=False)) == 0
     return workspace / "runs" / name
 
 

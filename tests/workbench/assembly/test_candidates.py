@@ -15,7 +15,7 @@ from sysid.reporting.assembly.results import MemberRecord
 from sysid.reporting.assembly.tables import stage_table
 from sysid.reporting.comparing.published import read_published
 from sysid.reporting.sweep.record import SweepRecord
-from sysid.workbench.assembly.runner import run_assembly
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.sweep.run import read_sweep_file, run_sweep
@@ -61,7 +61,7 @@ def run(workspace: Path, text: str) -> Path:
     """The run folder."""
     file = workspace / "pipelines" / "tanks.yaml"
     file.write_text(text, encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed="tanks", tracking=False)) == 0
+    assert run_request(RunRequest(path=file, typed="tanks", tracking=False)) == 0
     return workspace / "runs" / "tanks"
 
 

@@ -12,7 +12,7 @@ from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import read_joined
-from sysid.workbench.assembly.runner import run_assembly
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
 from sysid.yaml_files import check, parse_yaml, read_yaml
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results
@@ -240,7 +240,7 @@ GROWN = f"{HEAD.replace('base', 'tanks')}limits: {{lower: {{high: LH}}}}\n{KNOWN
 def run(workspace: Path, name: str, text: str, *, out: Path | None = None) -> Path:
     file = workspace / "pipelines" / f"{name}.yaml"
     file.write_text(text, encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed=name, out=out, tracking=False)) == 0
+    assert run_request(RunRequest(path=file, typed=name, out=out, tracking=False)) == 0
     return out or workspace / "runs" / name
 
 

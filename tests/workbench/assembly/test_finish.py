@@ -11,7 +11,7 @@ import pytest
 
 from sysid.export import read_bundle
 from sysid.export.manifest import schema_text
-from sysid.workbench.assembly.runner import run_assembly
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results, write_tanks
 
@@ -50,7 +50,7 @@ def test_a_bundle_names_what_it_was_trained_and_chosen_on(
         write_data(workspace / "datasets" / name, without)
     file = workspace / "pipelines" / "tanks.yaml"
     file.write_text(QUICK.replace(old, new, 1), encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed="tanks", tracking=False)) == 0
+    assert run_request(RunRequest(path=file, typed="tanks", tracking=False)) == 0
 
     folder = workspace / "runs" / "tanks"
     results = assembly_results(folder)
@@ -75,7 +75,7 @@ def test_a_bundle_says_how_its_whole_came_about(workspace: Path) -> None:
     file.write_text(QUICK, encoding="utf-8")
     further.write_text(QUICK.replace("name: tanks\n", "name: further\nbegin: ../runs/tanks/bundle\n", 1), "utf-8")
     for one in (file, further):
-        assert run_assembly(RunRequest(path=one, typed=one.stem, tracking=False)) == 0
+        assert run_request(RunRequest(path=one, typed=one.stem, tracking=False)) == 0
     bundle = workspace / "runs" / "further" / "bundle"
     (note,) = read_bundle(bundle).metadata["provenance"]["training"]["notes"]
     assert note.startswith("Begun from the networks of bundle (sysid run tanks; digest ")

@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from sysid.composite.round import JointRound
 from sysid.errors import ConfigError
-from sysid.workbench.assembly.runner import run_assembly
 from sysid.workbench.assembly.stage_config import GrowConfig
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results, write_tanks
 from tests.workbench.assembly.test_config import config
@@ -46,7 +46,7 @@ def pooled(workspace: Path) -> Path:
 def run(workspace: Path, text: str, name: str = "tanks"):
     file = workspace / "pipelines" / f"{name}.yaml"
     file.write_text(text.replace("name: tanks", f"name: {name}"), encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed=name, tracking=False)) == 0
+    assert run_request(RunRequest(path=file, typed=name, tracking=False)) == 0
     return assembly_results(workspace / "runs" / name)
 
 

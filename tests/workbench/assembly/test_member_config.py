@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 
 from sysid.errors import ConfigError
 from sysid.workbench.assembly.member_config import KnownConfig
-from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.assembly.runner import read_assembly
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
 from sysid.yaml_files import check, parse_yaml
 
@@ -59,7 +60,7 @@ def test_members_read_it_and_the_whole_runs_it(workspace: Path):
         "known: [{mapping: upper+lower -> head, gains: {upper: 1, lower: -0.3}, low: 0, high: 9, rest: 0, unit: m}]\n"
     )
     file.write_text(text.replace("retrain:", f"{declared}retrain:"), encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
+    assert run_request(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
     whole = read_assembly(workspace / "runs" / "tanks")
     ran = whole.simulate(np.full((60, 1), 1.5))
     assert_allclose(ran["head"], np.maximum(ran["upper"] - 0.3 * ran["lower"], 0.0), atol=1e-12)
@@ -71,5 +72,5 @@ def test_what_only_the_training_looked_at_is_no_part_of_the_surrogate(workspace:
     declared = "known: [{mapping: upper -> near, gains: {upper: 1}, low: 1, high: 2, rest: 1, unit: cm}]\n"
     text = file.read_text(encoding="utf-8").replace("retrain:", f"{declared}retrain:")
     file.write_text(text.replace("targets: {upper: 0.1", "targets: {near: 0.05, upper: 0.1"), encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
+    assert run_request(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
     assert set(read_assembly(workspace / "runs" / "tanks").outputs) == {"upper", "lower"}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.workbench.assembly.runner import run_assembly
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
 
 UPPER = "pump+lower -> upper\n    structure: {kind: NARX, input_delays: [[0, 1], [1]]"
@@ -38,5 +38,5 @@ def test_it_is_refused_and_nothing_is_fitted(workspace: Path, changes: dict[str,
         text = text.replace(old, new)
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=said):
-        run_assembly(RunRequest(path=file, typed="tanks", fresh=False, tracking=False))
+        run_request(RunRequest(path=file, typed="tanks", fresh=False, tracking=False))
     assert not list((workspace / "runs").glob("tanks/fits/*"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sysid.estimation import CascadeFit
-from sysid.workbench.assembly.runner import run_assembly
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results
 
@@ -25,7 +25,7 @@ TWO = (
 def test_a_round_says_what_it_trained_and_what_it_brought(workspace: Path) -> None:
     file = workspace / "pipelines" / "tanks.yaml"
     file.write_text(TWO, encoding="utf-8")
-    assert run_assembly(RunRequest(path=file, typed="tanks", tracking=False)) == 0
+    assert run_request(RunRequest(path=file, typed="tanks", tracking=False)) == 0
     folder = workspace / "runs" / "tanks"
     found = assembly_results(folder)
     told = [(one.name, one.trained, one.measured, one.traces) for one in found.rounds]

@@ -18,7 +18,8 @@ from sysid.export import read_bundle
 from sysid.reporting import publish_run
 from sysid.reporting.assembly.document import headline
 from sysid.reporting.signals import read_signals
-from sysid.workbench.assembly.runner import read_assembly, run_assembly
+from sysid.workbench.assembly.runner import read_assembly
+from sysid.workbench.commands.run import run_request
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest, kind_of
 from sysid.workbench.tracking.mlflow_store import connect, store_uri
@@ -27,7 +28,7 @@ from tests.workbench.assembly.conftest import ROLES, assembly_results, levels
 
 def run(workspace: Path, *, fresh: bool = False, tracking: bool = False) -> int:
     file = workspace / "pipelines" / "tanks.yaml"
-    return run_assembly(RunRequest(path=file, typed="tanks", fresh=fresh, tracking=tracking))
+    return run_request(RunRequest(path=file, typed="tanks", fresh=fresh, tracking=tracking))
 
 
 def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -37,7 +37,14 @@ def ready(fitted: Fitted, name: str, status: Status | None = None) -> FitReady:
     (asked,) = [one for one in config.fits if one.name == name]
     scores = steps.score(fit, data, config)
     return FitReady(
-        config=asked, key="", fit=fit, evaluation=scores.evaluation, selection_mse=1.0, stored=False, folder=Path()
+        config=asked,
+        pipeline=config,
+        key="",
+        fit=fit,
+        evaluation=scores.evaluation,
+        selection_mse=1.0,
+        stored=False,
+        folder=Path(),
     )
 
 

@@ -18,6 +18,7 @@ from sysid.models import History
 from sysid.reporting.results import read_results
 from sysid.workbench.judging import runner
 from sysid.workbench.kinds import RunRequest
+from sysid.workbench.runner.listeners import perform
 from sysid.workbench.tracking.mlflow_store import connect
 
 PIPELINE = """\
@@ -120,7 +121,7 @@ def place(finished: Path, empty_store: Path, tmp_path: Path, monkeypatch: pytest
 
 def judged(place: Path, *, tracking: bool = False, fresh: bool = False) -> dict[str, Any]:
     request = RunRequest(path=place / "pipelines" / "jump.yaml", typed="jump", tracking=tracking, fresh=fresh)
-    assert runner.run_judgement(request) == 0
+    assert perform(runner.program(request), request) == 0
     return json.loads((place / "runs" / "jump" / "results.json").read_text(encoding="utf-8"))
 
 

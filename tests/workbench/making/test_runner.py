@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict
 from sysid.ingest import load_dataset
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.making import runner
+from sysid.workbench.runner.listeners import perform
 
 PIPELINE = "kind: ramps\nname: ramp\ndescription: two of them\noptions: {heights: [1, 2]}\n"
 
@@ -66,7 +67,8 @@ def test_the_product_is_a_data_set_that_loads(tmp_path: Path, monkeypatch: pytes
     file.write_text(PIPELINE, encoding="utf-8")
     monkeypatch.setattr(runner, "find_maker", lambda *_, **__: maker)
     for _ in range(2):
-        assert runner.run_making(RunRequest(path=file, typed="ramp.yaml", out=tmp_path / "made")) == 0
+        request = RunRequest(path=file, typed="ramp.yaml", out=tmp_path / "made")
+        assert perform(runner.program(request), request) == 0
     assert maker.done == 2
     made = tmp_path / "made" / "dataset.yaml"
     assert made.read_text(encoding="utf-8").startswith("# Made by: sysid run ramp.yaml")

@@ -1,0 +1,88 @@
+"""What is known of an assembly's steps before any is done: what a dry run says of those that it cannot come to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name, candidate_title
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.finish import EXPORT, MEMBERS, PLACES, SCORING, STRESS
+from sysid.workbench.fits.data import unmade_data
+from sysid.workbench.runner.naming import slug
+from sysid.workbench.runner.run import REPORT
+from sysid.workbench.runner.steps import Estimate, Outlined
+
+
+def outline(config: AssemblyConfig, beside: Path) -> list[Outlined]:
+    """All steps of an assembly, as far as its pipeline says.
+
+    Args:
+        config: The pipeline.
+        beside: Folder of its file.
+
+    Returns:
+        The steps in order; rounds that end the growth of the training data may come earlier.
+    """
+    return [*_data(config, beside), *_training(config), *_proof(config, beside), REPORT]
+
+
+def _data(config: AssemblyConfig, beside: Path) -> list[Outlined]:
+    training = (config.training,) if isinstance(config.training, str) else config.training
+    names = [config.data, *training, config.selection, *(config.together.data if config.together else ())]
+    names += [] if config.grow is None else [config.grow.data]
+    return [_loading(name, beside) for name in dict.fromkeys(names) if name is not None]
+
+
+def _loading(name: str, beside: Path) -> Outlined:
+    estimate = unmade_data([name], beside=beside) or Estimate(seconds=1.0, basis="typical: its traces are there")
+    return Outlined(name=f"data-{slug(name)}", title=f"Loading {name}", estimate=estimate)
+
+
+def _training(config: AssemblyConfig) -> Iterator[Outlined]:
+    plan = config.plan
+    if config.begin is None:
+        yield from _members(config)
+    for number in range(1, len(plan.rounds) + 1):
+        name = "together" if number == 1 else f"together-{number}"
+        yield Outlined(name=name, title=f"Training end to end{'' if number == 1 else f', round {number}'}")
+    if plan.active_learning is not None:
+        parts = len(plan.active_learning.rounds)
+        for number in range(1, len(plan.active_learning.additions) + 1):
+            for part in range(1, parts + 1):
+                suffix = f".{part}" if parts > 1 else ""
+                name = f"grown-{number}{suffix.replace('.', '-')}"
+                yield Outlined(name=name, title=f"Growing, round {number}{suffix} at most")
+
+
+def _members(config: AssemblyConfig) -> Iterator[Outlined]:
+    plan, many = config.plan, False
+    swept = {member.mapping.output for member in config.members if member.sweep is not None}
+    for member in config.composite.members:
+        variants = [variant for variant in member.variants for _ in range(member.candidates)]
+        many = many or len(variants) > 1 or member.output in swept
+        for index, variant in enumerate(variants):
+            name, title = candidate_name(variant, index), candidate_title(variant, index)
+            yield Outlined(name=f"fit-{slug(name)}", title=title)
+            if plan.one_step is not None:
+                yield Outlined(name=f"fit-{slug(f'{name} one step')}", title=f"{title}, one step ahead")
+    if many:
+        yield Outlined(name=CHOOSING, title=CHOOSING_TITLE)
+    if plan.retrain is not None:
+        for number in range(plan.retrain.rounds):
+            for output in plan.retrain.members:
+                mapping = config.composite.member(output).mapping
+                title = f"Retraining {mapping} on what the others put out, round {number + 1}"
+                yield Outlined(name=f"fit-{slug(f'{mapping} retrained {number}')}", title=title)
+
+
+def _proof(config: AssemblyConfig, beside: Path) -> Iterator[Outlined]:
+    yield SCORING
+    if config.stress is not None:
+        yield from (_loading(config.stress.data, beside), STRESS)
+    if config.line is not None:
+        yield from (_loading(config.line.data, beside), PLACES)
+    if config.export is not None:
+        yield EXPORT
+    if config.begin is None:
+        yield MEMBERS
