@@ -287,7 +287,7 @@ class FitSteps:
             after=[initial] if initial else [],
             write=partial(write_fit, folder),
             read=lambda _: read_fit(folder),
-            outcome=lambda result: f"{result.train_time_s:.1f} s, {result.status.value}",
+            outcome=_ended,
             final=is_final,
             amount=lambda: _amount(fit, loaded.value),
             how_long=lambda: how_long(fit, config, loaded.value),
@@ -403,6 +403,12 @@ def _amount(fit: FitConfig, data: Data) -> dict[str, Any]:
         "training": str(seedless(fit.training_options(0))),
         "samples": {trace.name: len(trace) for trace in data.traces},
     }
+
+
+def _ended(fit: FitResult) -> str:
+    """How long a fit took; how it ended, where it is not what it should be."""
+    said = "" if fit.status.usable and is_final(fit) else f", {fit.status.value}"
+    return f"{fit.train_time_s:.1f} s{said}"
 
 
 def _worst(scores: steps.Scores) -> str:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sysid.workbench.runner.events import Event, StepDone, StepProgress, StepStarted
+from sysid.workbench.runner.events import Event, RunStarted, StepDone, StepProgress, StepStarted
 from sysid.workbench.runner.screen import SILENCE_S, LogFile
 
 STEP = "Training end to end"
@@ -28,7 +28,7 @@ def clock() -> Clock:
 @pytest.fixture
 def log(clock: Clock, tmp_path: Path) -> LogFile:
     log = LogFile(clock)
-    log.write_to(tmp_path, "sysid run first")
+    log(RunStarted(pipeline="first", folder=tmp_path, run_id="1", command="sysid run first"))
     return log
 
 
