@@ -15,7 +15,7 @@ from pydantic.json_schema import models_json_schema
 
 from sysid.reporting.assembly.document import assembly_document
 from sysid.reporting.assembly.results import AssemblyResults
-from sysid.reporting.comparing.published import read_published
+from sysid.reporting.comparing.published import PublishedTable, read_published
 from sysid.reporting.comparing.published_comparison import with_published
 from sysid.reporting.document import build_document
 from sysid.reporting.judging.document import judgement_document
@@ -36,19 +36,27 @@ class ResultsKind:
         known: Whether plain data are of this kind.
         record: What they are read as.
         document: Makes the page: of the run's folder, its results, and the workspace with the user's own tables.
-        scores: Makes the scores of a scorecard.
+        scores: Makes the scores of a scorecard, of the results and that workspace.
     """
 
     what: str
     known: Callable[[Dict[str, Any]], bool]
     record: type[RunResults]
     document: Callable[[Path, Any, Path | None], Document]
-    scores: Callable[[Any], list[Score]]
+    scores: Callable[[Any, Path | None], list[Score]]
+
+
+def _published(results: Results, workspace: Path | None) -> PublishedTable | None:
+    return None if results.published is None else read_published(results.published, workspace=workspace)
 
 
 def _fits_document(folder: Path, results: Results, workspace: Path | None) -> Document:
-    published = None if results.published is None else read_published(results.published, workspace=workspace)
+    published = _published(results, workspace)
     return build_document(folder, with_published(results, published), published)
+
+
+def _fits_scores(results: Results, workspace: Path | None) -> list[Score]:
+    return fit_scores(with_published(results, _published(results, workspace)))
 
 
 def _is_ready(document: Dict[str, Any]) -> bool:
@@ -62,28 +70,28 @@ KINDS: Final = (
         known=_is_ready,
         record=ReadyResults,
         document=lambda _, results, __: ready_document(results),
-        scores=lambda results: list(results.judgement.scores),
+        scores=lambda results, _: list(results.judgement.scores),
     ),
     ResultsKind(
         what="assemblies",
         known=lambda document: document.get("kind") == "assembly",
         record=AssemblyResults,
         document=assembly_document,
-        scores=assembly_scores,
+        scores=lambda results, _: assembly_scores(results),
     ),
     ResultsKind(
         what="judgements",
         known=lambda document: "judgement" in document,
         record=JudgementResults,
         document=lambda _, results, __: judgement_document(results),
-        scores=judgement_scores,
+        scores=lambda results, _: judgement_scores(results),
     ),
     ResultsKind(
         what="fits and sweeps",
         known=lambda _: True,
         record=Results,
         document=_fits_document,
-        scores=fit_scores,
+        scores=_fits_scores,
     ),
 )
 """The first row that knows the data has them."""
@@ -148,16 +156,20 @@ def run_document(folder: Path, results: RunResults, *, workspace: Path | None = 
     return _kind_of(results).document(Path(folder), results, workspace)
 
 
-def run_scores(results: RunResults) -> list[Score]:
+def run_scores(results: RunResults, *, workspace: Path | None = None) -> list[Score]:
     """The scores of what a run chose.
 
     Args:
-        results: Its results, with the published figures where there are some.
+        results: Its results.
+        workspace: Where the user's own tables of published figures lie; ``None`` is the current folder.
 
     Returns:
         A score for each output, or subject; none where nothing was chosen.
+
+    Raises:
+        ConfigError: If the table of published figures is not known.
     """
-    return _kind_of(results).scores(results)
+    return _kind_of(results).scores(results, workspace)
 
 
 def _kind_of(results: RunResults) -> ResultsKind:

@@ -65,7 +65,7 @@ def publish_run(
         BundleError: If the bundle is damaged.
     """
     document = run_document(Path(run_folder), read_run(Path(run_folder)), workspace=workspace)
-    scores = run_scores(document.results)
+    scores = run_scores(document.results, workspace=workspace)
     frozen = _frozen(Path(run_folder)) if bundle else ()
     chosen = name or document.results.pipeline
     target = into / chosen

@@ -16,8 +16,10 @@ from typing import Final
 from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.reporting.benchmarks.findings import FINDINGS_FILE, Finding, read_findings
+from sysid.reporting.kinds import read_run, run_scores
 from sysid.reporting.markdown import escape, rows_lines
 from sysid.reporting.numbers import number
+from sysid.reporting.records import RESULTS_FILE
 from sysid.reporting.scores import SCORES_FILE, Score, read_scores
 
 _SETTING: Final = re.compile(r", (?:(?:ARX|TF|NARX|NSS) .*|n = \d+|full)$|(?<=: time of ).*?(?= to )")
@@ -33,7 +35,7 @@ def scorecard(folders: Sequence[Path]) -> str:
     """Two tables: errors of the free run by case, and what benchmarks found beside published figures.
 
     Args:
-        folders: Folders of published reports.
+        folders: Folders of published reports, or of runs.
 
     Returns:
         Markdown.
@@ -50,9 +52,16 @@ def scorecard(folders: Sequence[Path]) -> str:
             findings += found.findings
             peers += [score for benchmark in found.benchmarks for score in benchmark.scores]
         if (folder / SCORES_FILE).exists() or not (folder / FINDINGS_FILE).exists():
-            ours += read_scores(folder)
+            ours += _scores(folder)
     tables = [_errors(ours, peers), _benchmarks(findings)]
     return "\n\n".join("\n".join(table) for table in tables if table) + "\n"
+
+
+def _scores(folder: Path) -> list[Score]:
+    """Of a published report, or of the folder of a run of any kind."""
+    if (folder / RESULTS_FILE).exists() and not (folder / SCORES_FILE).exists():
+        return run_scores(read_run(folder))
+    return read_scores(folder)
 
 
 def place(text: str, path: Path) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from sysid.reporting.numbers import number, seconds, times
 from sysid.reporting.results import CaseRecord, FiguresRecord, FitRecord, PublishedRecord, Results
 from sysid.traces import Role
+from sysid.validation.metrics import MERITS, Merit
 
 SCORED = (Role.VALIDATION, Role.TEST)
 """Roles of the cases that a verdict rests on: nothing was fitted to them or chosen on them."""
@@ -60,6 +61,58 @@ def figure_cell(
 ) -> Cell:
     """A cell with a number in a few significant digits."""
     return Cell(text=number(value, missing=missing, digits=digits), value=value, below=below, mark=mark)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A column of figures.
+
+    Args:
+        key: Which figure.
+        heading: Its head.
+        below: Stands below the heading, such as its unit.
+        digits: Significant digits that are printed.
+        decimals: Digits behind the point, where those say more.
+    """
+
+    key: str
+    heading: str
+    below: str = ""
+    digits: int = 3
+    decimals: int | None = None
+
+    @classmethod
+    def of(cls, merit: Merit, unit: str) -> Column:
+        """The column of a figure of merit.
+
+        Args:
+            merit: The figure.
+            unit: The output's unit.
+
+        Returns:
+            The column.
+        """
+        return cls(
+            key=merit.key,
+            heading=merit.heading,
+            below=merit.said(unit),
+            digits=merit.digits,
+            decimals=merit.decimals,
+        )
+
+    def cell(self, value: float, *, missing: str = "-") -> Cell:
+        """A figure as it is printed everywhere.
+
+        Args:
+            value: The figure.
+            missing: What to say where it is no number.
+
+        Returns:
+            The cell.
+        """
+        if self.decimals is not None and math.isfinite(value):
+            return Cell(text=f"{value:.{self.decimals}f}".replace("-", "−"), value=value, mark="number")
+        return figure_cell(value, digits=self.digits, missing=missing)
 
 
 def plain_table(
@@ -208,33 +261,26 @@ def quality_table(fit: FitRecord, kind: str) -> Table:
     Returns:
         The table.
     """
-    rows = []
-    for name, case in fit.cases.items():
-        figures = getattr(case, kind)
-        rows.append(
+    words = {"free_run": "free run", "one_step": "one step ahead"}[kind]
+    columns = [Column.of(merit, fit.unit) for merit in MERITS]
+    return Table(
+        caption=f"{fit.name}, {words}: all figures by case.",
+        head=(("case", ""), ("role", ""), *((column.heading, column.below) for column in columns)),
+        rows=tuple(
             (
                 Cell(text=name, header=True),
                 Cell(text=case.role.value),
-                figure_cell(figures.mse, missing=DIVERGED),
-                figure_cell(figures.nrmse_fit, digits=4, missing=_word(figures)),
-                figure_cell(figures.max_abs_error, missing=DIVERGED),
-                Cell(text=_correlation(figures), value=figures.r, mark="number"),
+                *(column.cell(getattr(figures, column.key), missing=_word(figures)) for column in columns),
             )
-        )
-    words = {"free_run": "free run", "one_step": "one step ahead"}[kind]
-    unit = fit.unit
-    return Table(
-        caption=f"{fit.name}, {words}: all figures by case.",
-        head=(
-            ("case", ""),
-            ("role", ""),
-            ("mse", f"{unit}²"),
-            ("fit", "%"),
-            ("largest error", unit),
-            ("R", "correlation"),
+            for name, case in fit.cases.items()
+            for figures in (getattr(case, kind),)
         ),
-        rows=tuple(rows),
     )
+
+
+def _word(figures: FiguresRecord) -> str:
+    """Why a figure is not a number: a free run that diverged, or a target that does not vary."""
+    return "-" if math.isfinite(figures.mse) else DIVERGED
 
 
 def ranking_table(results: Results) -> Table:
@@ -365,11 +411,6 @@ def _mark(fit: FitRecord, best: str | None) -> str:
     return "best" if fit.name == best else ""
 
 
-def _word(figures: FiguresRecord) -> str:
-    """Why a figure is not a number: a free run that diverged, or a target that does not vary."""
-    return "-" if math.isfinite(figures.mse) else DIVERGED
-
-
 def _mse_cell(case: CaseRecord, kind: str) -> Cell:
     published = (case.published or {}).get(kind)
     below = times(published.ratio) if published is not None and math.isfinite(published.ratio) else ""
@@ -406,8 +447,3 @@ def _published_row(
 
 def _simulated(fits: Sequence[FitRecord], name: str) -> float:
     return next(fit.cases[name].simulated_s for fit in fits if name in fit.cases)
-
-
-def _correlation(figures: FiguresRecord) -> str:
-    # R lies close to 1 for any useful model: three digits would print 1.00 for all of them.
-    return f"{figures.r:.6f}".replace("-", "−") if math.isfinite(figures.r) else _word(figures)

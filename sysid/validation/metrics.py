@@ -2,12 +2,52 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Mapping as Dict
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Merit:
+    """How a figure of merit is shown: the one place where tables, comparisons and tracking learn of it.
+
+    Args:
+        key: Its name in :class:`Figures`, in ``results.json`` and where it is tracked.
+        heading: Head of its column.
+        unit: ``{unit}`` stands for the output's.
+        below: What stands below the heading in place of the unit.
+        digits: Significant digits that are printed.
+        decimals: Digits behind the point, where those say more.
+        compared: Whether a comparison of two models shows it.
+    """
+
+    key: str
+    heading: str
+    unit: str
+    below: str = ""
+    digits: int = 3
+    decimals: int | None = None
+    compared: bool = True
+
+    def said(self, unit: str) -> str:
+        """What stands below the heading.
+
+        Args:
+            unit: The output's.
+
+        Returns:
+            The unit, or other words.
+        """
+        return self.below or self.unit.format(unit=unit)
+
+
+def _merit(heading: str, unit: str, **shown: Any) -> Any:
+    return field(metadata={"heading": heading, "unit": unit, **shown})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,21 +63,33 @@ class Figures:
         unit: The output's unit.
     """
 
-    mse: float
-    nrmse_fit: float
-    max_abs_error: float
-    r: float
+    mse: float = _merit("mse", "{unit}²")
+    nrmse_fit: float = _merit("fit", "%", digits=4)
+    max_abs_error: float = _merit("largest error", "{unit}")
+    # R lies close to 1 for any useful model: three digits would print 1.00 for all of them.
+    r: float = _merit("R", "", below="correlation", decimals=6, compared=False)
     unit: str
 
     def to_dict(self) -> dict[str, Any]:
         """The figures as JSON values."""
-        return {
-            "mse": self.mse,
-            "nrmse_fit": self.nrmse_fit,
-            "max_abs_error": self.max_abs_error,
-            "r": self.r,
-            "unit": self.unit,
-        }
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, stored: Dict[str, Any]) -> Figures:
+        """What :meth:`to_dict` wrote; a figure that a later release added is NaN.
+
+        Args:
+            stored: What it wrote.
+
+        Returns:
+            The figures.
+        """
+        numbers = {merit.key: float(stored.get(merit.key, math.nan)) for merit in MERITS}
+        return cls(**numbers, unit=stored["unit"])
+
+
+MERITS = tuple(Merit(key=one.name, **one.metadata) for one in fields(Figures) if one.metadata)
+"""The figures of merit in the order of their columns."""
 
 
 def figures(

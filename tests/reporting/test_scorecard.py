@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,8 @@ from sysid.reporting.benchmarks.findings import Benchmark, Finding
 from sysid.reporting.numbers import number
 from sysid.reporting.scorecard import PLACE, main, place, scorecard
 from sysid.reporting.scores import Score, read_scores
+from tests.reporting.assembly.conftest import document, write_run
+from tests.reporting.judging.conftest import leakage
 
 ROOT = Path(__file__).resolve().parents[2]
 NAN = float("nan")
@@ -42,6 +45,26 @@ def test_ours_and_the_published_figures_stand_under_their_cases(report: Path, tm
         assert ours[head.index(case)] == number(1e3 * record.free_run.mse)
     assert published[0] == "published (Table 1: NARX 4/4/20, best)"
     assert published[head.index("VAL01")] == number(1e3 * read_scores(report)[0].published["VAL01"])
+
+
+def test_a_run_counts_as_its_published_report_does(report: Path, tmp_path: Path) -> None:
+    assert scorecard([tmp_path / "run"]) == scorecard([report])
+
+
+def test_runs_of_every_kind_have_their_rows(tmp_path: Path) -> None:
+    whole = write_run(tmp_path / "whole", document())
+    stops = tmp_path / "stops"
+    stops.mkdir()
+    run = {key: document()[key] for key in ("pipeline", "command", "created", "environment")}
+    run |= {"schema_version": 2, "kind": "leak", "data": {"name": "x"}, "subjects": [], "judgement": leakage()}
+    (stops / "results.json").write_text(json.dumps(run), encoding="utf-8")
+    head, _, lower, published, good, poor = rows(scorecard([whole, stops]))
+    assert head[1:] == ["A", "V", "slow", "fast"]
+    assert lower[0] == "**pump → lower** [10⁻³ cm²]: 2 models as one, 40 parameters"
+    assert lower[1:] == ["250", "300", "", ""]
+    assert published == ["published (Table 1)", "", "400", "", ""]
+    assert good[1:] == ["", "", number(500.0), number(1500.0)]
+    assert poor[1:] == ["", "", number(9.0), ""]
 
 
 def test_the_best_peer_is_the_one_with_the_least_geometric_mean_that_never_diverges(

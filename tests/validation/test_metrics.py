@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sysid
+from sysid.reporting.results import FiguresRecord
 from sysid.testing import first_order_record
 from sysid.traces import Role, Trace, TraceSet
-from sysid.validation.metrics import figures, mean_fit, percent
+from sysid.validation.metrics import MERITS, Figures, figures, mean_fit, percent
 
 LEVELS = st.floats(-1e12, 1e12, allow_subnormal=False)
 
@@ -22,6 +23,22 @@ def test_a_fit_is_as_compare_prints_it() -> None:
     found = figures(target, output, "V")
     assert found.nrmse_fit == pytest.approx(100.0 * (1.0 - 1.0 / math.sqrt(5.0)))
     assert (found.mse, found.max_abs_error) == (0.25, 1.0)
+
+
+def test_what_is_stored_is_read_and_what_a_later_release_added_is_no_number() -> None:
+    found = figures(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.5]), "V")
+    assert Figures.from_dict(found.to_dict()) == found
+    stored = {key: value for key, value in found.to_dict().items() if key != "r"}
+    assert math.isnan(Figures.from_dict(stored).r)
+
+
+def test_every_figure_of_merit_is_shown_under_its_unit() -> None:
+    assert (
+        {merit.key for merit in MERITS} | {"unit"}
+        == set(Figures.__dataclass_fields__)
+        == set(FiguresRecord.model_fields)
+    )
+    assert [merit.said("psi") for merit in MERITS][:4] == ["psi²", "%", "psi", "correlation"]
 
 
 @given(level=LEVELS, n=st.integers(1, 70), error=st.floats(-1e3, 1e3))

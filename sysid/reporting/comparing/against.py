@@ -1,4 +1,4 @@
-"""One run against another: which model is better, on which cases, and what else differs between them."""
+"""One run against another, of whichever kinds: who is better, on which cases, and what else differs between them."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sysid.errors import ConfigError
-from sysid.reporting.numbers import number
-from sysid.reporting.results import CaseRecord, FitRecord, Results, read_results
-from sysid.reporting.signals import CaseSignals, read_signals
-from sysid.reporting.tables import SCORED, facts
+from sysid.reporting.comparing.contenders import Contender, Entry, contenders
+from sysid.reporting.kinds import read_run
+from sysid.reporting.records import RunResults
+from sysid.reporting.tables import facts
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -23,38 +21,38 @@ class Side:
     Args:
         name: Name of the run, different from the other's.
         results: Its results.
-        fit: The fit that it chose, or its first.
-        signals: That fit's signals by case.
+        entries: What it puts up, by output.
     """
 
     name: str
-    results: Results
-    fit: FitRecord
-    signals: dict[str, CaseSignals]
+    results: RunResults
+    entries: dict[str, Contender]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Contest:
-    """Both models on one case.
+    """Both runs on one case of one output.
 
     Args:
-        case: Its name.
-        ours: The first run's record of it.
+        output: Name of the output.
+        case: Name of the case.
+        ours: The first run's figures of it.
         theirs: The second run's.
-        ratio: Free-run mse of the first divided by that of the second; NaN where one of them is not finite.
+        ratio: Error of the first divided by that of the second; NaN where one of them is not finite.
         same: Whether both were scored on the same target.
     """
 
+    output: str
     case: str
-    ours: CaseRecord
-    theirs: CaseRecord
+    ours: Entry
+    theirs: Entry
     ratio: float
     same: bool
 
     @property
     def counts(self) -> bool:
         """Whether a verdict may rest on it: unseen by both, and the same target for both."""
-        return self.same and self.ours.role in SCORED and self.theirs.role in SCORED
+        return self.same and not self.ours.seen and not self.theirs.seen
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +62,7 @@ class Comparison:
     Args:
         ours: The first.
         theirs: The one that it is compared with.
-        contests: The cases that both have, in the first one's order.
+        contests: The cases that both have, output by output, in the first one's order.
         differences: What differs apart from figures: name, first and second.
     """
 
@@ -72,6 +70,11 @@ class Comparison:
     theirs: Side
     contests: tuple[Contest, ...]
     differences: tuple[tuple[str, str, str], ...]
+
+    @property
+    def outputs(self) -> list[str]:
+        """The outputs that both have."""
+        return list(dict.fromkeys(contest.output for contest in self.contests))
 
     @property
     def judged(self) -> tuple[Contest, ...]:
@@ -84,81 +87,83 @@ class Comparison:
         ratios = [contest.ratio for contest in self.judged if contest.ratio > 0.0]
         return math.exp(sum(math.log(ratio) for ratio in ratios) / len(ratios)) if ratios else math.nan
 
+    def called(self, contest: Contest) -> str:
+        """A case, with its output where there are several."""
+        return contest.case if len(self.outputs) == 1 else f"{contest.output}, {contest.case}"
+
     def to_dict(self) -> dict[str, Any]:
         """The comparison as JSON values; figures that are not finite are null."""
         return {
-            "schema_version": 1,
-            "runs": {
-                key: {
-                    "name": side.name,
-                    "pipeline": side.results.pipeline,
-                    "command": side.results.command,
-                    "created": side.results.created,
-                    "data_digest": side.results.data.digest,
-                    "fit": side.fit.name,
-                    "label": side.fit.label,
-                    "mapping": side.fit.mapping,
-                    "n_parameters": side.fit.n_parameters,
-                    "train_time_s": _finite(side.fit.train_time_s),
-                }
-                for key, side in (("ours", self.ours), ("theirs", self.theirs))
-            },
+            "schema_version": 2,
+            "runs": {key: self._run(side) for key, side in (("ours", self.ours), ("theirs", self.theirs))},
             "mean_ratio": _finite(self.mean_ratio),
-            "cases": {
-                contest.case: {
-                    "same_target": contest.same,
-                    "counts": contest.counts,
-                    "ratio": _finite(contest.ratio),
-                    **{
-                        key: {
-                            "mse": _finite(record.free_run.mse),
-                            "nrmse_fit": _finite(record.free_run.nrmse_fit),
-                            "max_abs_error": _finite(record.free_run.max_abs_error),
-                            "run_time_s": _finite(record.run_time_s),
-                            "role": record.role.value,
-                        }
-                        for key, record in (("ours", contest.ours), ("theirs", contest.theirs))
-                    },
-                }
-                for contest in self.contests
-            },
+            "cases": [_case(contest) for contest in self.contests],
             "differences": [{"what": what, "ours": ours, "theirs": theirs} for what, ours, theirs in self.differences],
+        }
+
+    def _run(self, side: Side) -> dict[str, Any]:
+        results = side.results
+        return {
+            "name": side.name,
+            "kind": results.kind,
+            "pipeline": results.pipeline,
+            "command": results.command,
+            "created": results.created,
+            "data_digest": results.data.digest,
+            "models": {
+                output: {
+                    "name": one.name,
+                    "unit": one.unit,
+                    "n_parameters": one.parameters,
+                    "train_time_s": _finite(one.train_time_s),
+                    **dict(one.facts),
+                }
+                for output, one in side.entries.items()
+                if output in self.outputs
+            },
         }
 
 
 def compare_runs(run: Path, against: Path) -> Comparison:
-    """Set a run beside another one, by the fits that they chose.
+    """Set a run beside another one, by what they chose.
 
     Args:
         run: Folder of the first run.
-        against: Folder of the run that it is compared with.
+        against: Folder of the run that it is compared with; of another kind too.
 
     Returns:
         The comparison.
 
     Raises:
-        ConfigError: If a folder holds no results, or the runs have no case with the same unit in common.
+        ConfigError: If a folder holds no results, or the runs have no output with a case and the unit in common.
     """
     names = _names(Path(run), Path(against))
     ours, theirs = _side(Path(run), names[0]), _side(Path(against), names[1])
-    common = [name for name in ours.fit.cases if name in theirs.fit.cases]
-    if not common or ours.fit.unit != theirs.fit.unit:
+    contests = tuple(
+        _contest(output, case, one, theirs.entries[output])
+        for output, one in ours.entries.items()
+        if output in theirs.entries and theirs.entries[output].unit == one.unit
+        for case in one.cases
+        if case in theirs.entries[output].cases
+    )
+    if not contests:
         raise ConfigError(
             "the runs cannot be compared",
             where=against,
-            expected=f"a case in common, and {ours.fit.unit} as the output's unit",
-            got=f"cases {', '.join(theirs.fit.cases)} in {theirs.fit.unit}",
-            remedy="compare runs of the same mapping on the same data set",
+            expected=f"an output in common, in the same unit, and a case of it: {_has(ours)}",
+            got=_has(theirs),
+            remedy="compare runs of one output on the same data set",
         )
-    contests = tuple(_contest(name, ours, theirs) for name in common)
     return Comparison(ours=ours, theirs=theirs, contests=contests, differences=_differences(ours, theirs))
 
 
+def _has(side: Side) -> str:
+    return "; ".join(f"{output} in {one.unit} on {', '.join(one.cases)}" for output, one in side.entries.items())
+
+
 def _side(folder: Path, name: str) -> Side:
-    results = read_results(folder)
-    fit = results.best_fit or results.fits[0]
-    signals = read_signals(folder / "fits" / fit.slug, list(fit.cases))
-    return Side(name=name, results=results, fit=fit, signals=signals)
+    results = read_run(folder)
+    return Side(name=name, results=results, entries={one.output: one for one in contenders(folder, results)})
 
 
 def _names(run: Path, against: Path) -> tuple[str, str]:
@@ -170,12 +175,37 @@ def _names(run: Path, against: Path) -> tuple[str, str]:
     return f"{run.name} (1)", f"{run.name} (2)"
 
 
-def _contest(name: str, ours: Side, theirs: Side) -> Contest:
-    one, other = ours.fit.cases[name], theirs.fit.cases[name]
-    same = np.array_equal(ours.signals[name].target, theirs.signals[name].target)
-    mine, yours = one.free_run.mse, other.free_run.mse
+def _contest(output: str, case: str, ours: Contender, theirs: Contender) -> Contest:
+    one, other = ours.cases[case], theirs.cases[case]
+    mine, yours = one.error, other.error
     known = math.isfinite(mine) and math.isfinite(yours) and yours > 0.0
-    return Contest(case=name, ours=one, theirs=other, ratio=mine / yours if known else math.nan, same=same)
+    return Contest(
+        output=output,
+        case=case,
+        ours=one,
+        theirs=other,
+        ratio=mine / yours if known else math.nan,
+        same=bool(one.target) and one.target == other.target,
+    )
+
+
+def _case(contest: Contest) -> dict[str, Any]:
+    sides = {
+        key: {
+            **{name: _finite(value) for name, value in entry.figures.items()},
+            "run_time_s": _finite(entry.run_time_s),
+            "role": None if entry.role is None else entry.role.value,
+        }
+        for key, entry in (("ours", contest.ours), ("theirs", contest.theirs))
+    }
+    return {
+        "output": contest.output,
+        "case": contest.case,
+        "same_target": contest.same,
+        "counts": contest.counts,
+        "ratio": _finite(contest.ratio),
+        **sides,
+    }
 
 
 def _differences(ours: Side, theirs: Side) -> tuple[tuple[str, str, str], ...]:
@@ -185,21 +215,25 @@ def _differences(ours: Side, theirs: Side) -> tuple[tuple[str, str, str], ...]:
 
 
 def _facts(side: Side) -> dict[str, str]:
-    fit, results = side.fit, side.results
-    return {
-        "pipeline": results.pipeline,
-        "fit": fit.name,
-        "mapping": fit.mapping,
-        "structure": fit.label,
-        "trained in": f"{fit.loop.value} loop",
-        "parameters": "unknown" if fit.n_parameters is None else str(fit.n_parameters),
-        "training time [s]": number(fit.train_time_s),
-        "seed": str(results.seed),
-        "data set": results.data.name,
-        "digest of the data set": results.data.digest,
-        "free runs start": str((results.start or {}).get("kind", "unknown")),
-        "command": results.command,
-    } | dict(facts(results.environment))
+    results = side.results
+    several = len(side.entries) > 1
+    models = {
+        f"{output}: {what}" if several else what: text
+        for output, one in side.entries.items()
+        for what, text in one.facts.items()
+    }
+    return (
+        {"kind": results.kind, "pipeline": results.pipeline}
+        | models
+        | {
+            "seed": str(results.seed),
+            "data set": results.data.name,
+            "digest of the data set": results.data.digest,
+            "free runs start": str((results.start or {}).get("kind", "unknown")),
+            "command": results.command,
+        }
+        | dict(facts(results.environment))
+    )
 
 
 def _finite(value: float) -> float | None:

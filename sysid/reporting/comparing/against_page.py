@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import sysid
 from sysid.atomic import replacing
-from sysid.reporting.comparing.against import Comparison, Contest, compare_runs
+from sysid.reporting.comparing.against import Comparison, Contest, Side, compare_runs
 from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.html import page_template, readable
 from sysid.reporting.numbers import quantity, seconds, times
-from sysid.reporting.parts import Part, Section, Tile, Verdict, picture
-from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
+from sysid.reporting.parts import Part, Section, Tile, Verdict, identifier, picture
+from sysid.reporting.tables import DIVERGED, Cell, Column, Table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,18 +64,23 @@ def render_comparison(found: Comparison, numbers: str) -> str:
     Returns:
         HTML 5 in one piece.
     """
-    sections = (_cases(found), *_pictures(found), _what_differs(found))
+    sections = (*(_cases(found, output) for output in found.outputs), *_pictures(found), _what_differs(found))
     ours, theirs = found.ours, found.theirs
+    told = [f"{_chosen(side, found)} of {readable(side.results.created)}" for side in (ours, theirs)]
     return page_template("comparison.html.j2").render(
         document=Page(verdict=_verdict(found), sections=sections),
         verdict=_verdict(found),
         heading=f"{ours.name} against {theirs.name}",
-        subtitle=f"{ours.fit.name} of {readable(ours.results.created)} against {theirs.fit.name} of "
-        f"{readable(theirs.results.created)}, {ours.fit.mapping}.",
+        subtitle=f"{told[0]} against {told[1]}, {' and '.join(found.outputs)}.",
         facts=[(side.name, side.results.command) for side in (ours, theirs)],
         numbers=numbers,
         version=sysid.__version__,
     )
+
+
+def _chosen(side: Side, found: Comparison) -> str:
+    """What a run puts up in the outputs that both have."""
+    return ", ".join(dict.fromkeys(side.entries[output].name for output in found.outputs))
 
 
 def _verdict(found: Comparison) -> Verdict:
@@ -92,9 +98,10 @@ def _verdict(found: Comparison) -> Verdict:
     else:
         headline = f"{ours.name} is better on {len(wins)} of {len(judged)} unseen cases."
     tiles = () if math.isnan(ratio) else (Tile(figure=times(ratio), words="its free-run mse, geometric mean"),)
-    points = [("Sizes", f"{_size(ours.fit.n_parameters)} against {_size(found.theirs.fit.n_parameters)}.")]
-    if judged:
-        slow = max(judged, key=lambda contest: contest.ours.simulated_s)
+    points = [("Sizes", f"{_sizes(ours, found)} against {_sizes(found.theirs, found)}.")]
+    timed = [one for one in judged if math.isfinite(one.ours.run_time_s) and math.isfinite(one.theirs.run_time_s)]
+    if timed:
+        slow = max(timed, key=lambda contest: contest.ours.simulated_s)
         points.append(
             (
                 "Speed",
@@ -102,110 +109,127 @@ def _verdict(found: Comparison) -> Verdict:
                 f"{seconds(slow.ours.run_time_s)} against {seconds(slow.theirs.run_time_s)}.",
             )
         )
+    if judged:
         points.append(("Largest gain", _extreme(min(judged, key=_order), found)))
         points.append(("Largest loss", _extreme(max(judged, key=_order), found)))
     return Verdict(headline=headline, tiles=tiles, points=tuple(points), warnings=_warnings(found))
 
 
 def _better(contest: Contest) -> bool:
-    ours, theirs = contest.ours.free_run.mse, contest.theirs.free_run.mse
+    ours, theirs = contest.ours.error, contest.theirs.error
     return math.isfinite(ours) and (not math.isfinite(theirs) or ours < theirs)
 
 
 def _order(contest: Contest) -> float:
     """From the largest gain to the largest loss; a run that alone diverges has lost more than any other."""
-    if not math.isfinite(contest.ours.free_run.mse):
+    if not math.isfinite(contest.ours.error):
         return math.inf
-    return -math.inf if not math.isfinite(contest.theirs.free_run.mse) else contest.ratio
+    return -math.inf if not math.isfinite(contest.theirs.error) else contest.ratio
 
 
 def _extreme(contest: Contest, found: Comparison) -> str:
-    unit = f"{found.ours.fit.unit}²"
-    ours = quantity(contest.ours.free_run.mse, unit, missing=DIVERGED)
-    theirs = quantity(contest.theirs.free_run.mse, unit, missing=DIVERGED)
+    unit = f"{found.ours.entries[contest.output].unit}²"
+    ours = quantity(contest.ours.error, unit, missing=DIVERGED)
+    theirs = quantity(contest.theirs.error, unit, missing=DIVERGED)
     share = "" if math.isnan(contest.ratio) else f", {times(contest.ratio)} of it"
-    return f"{contest.case}: mse {ours} against {theirs}{share}."
+    return f"{found.called(contest)}: mse {ours} against {theirs}{share}."
 
 
-def _size(parameters: int | None) -> str:
-    return "an unknown number of parameters" if parameters is None else f"{parameters} parameters"
+def _sizes(side: Side, found: Comparison) -> str:
+    counts = dict.fromkeys(side.entries[output].parameters for output in found.outputs)
+    return " and ".join("an unknown number of parameters" if n is None else f"{n} parameters" for n in counts)
 
 
 def _warnings(found: Comparison) -> tuple[str, ...]:
     told = []
-    other = [contest.case for contest in found.contests if not contest.same]
+    unknown = [found.called(one) for one in found.contests if not (one.ours.target and one.theirs.target)]
+    other = [found.called(one) for one in found.contests if not one.same and one.ours.target and one.theirs.target]
     if other:
         told.append(
             f"The targets of {', '.join(other)} differ between the runs: those cases are shown, but not counted."
         )
-    if found.ours.fit.mapping != found.theirs.fit.mapping:
-        told.append(f"The mappings differ: {found.ours.fit.mapping} against {found.theirs.fit.mapping}.")
+    if unknown:
+        told.append(
+            f"Of {', '.join(unknown)} it is not known whether both runs have the same target, as one is of an earlier "
+            "release: those cases are shown, but not counted."
+        )
+    mappings = [
+        (ours, theirs)
+        for output in found.outputs
+        if (ours := found.ours.entries[output].facts.get("mapping"))
+        and (theirs := found.theirs.entries[output].facts.get("mapping"))
+        and ours != theirs
+    ]
+    told += [f"The mappings differ: {ours} against {theirs}." for ours, theirs in mappings]
     if any(what in {"cpu", "cores"} for what, _, _ in found.differences):
         told.append("The runs were made on different machines: their run times are not comparable.")
     return tuple(told)
 
 
-def _cases(found: Comparison) -> Section:
-    unit = found.ours.fit.unit
-    rows = tuple(
-        (
-            Cell(text=one.case, header=True, below="" if one.counts else "not counted"),
-            Cell(text=one.ours.role.value),
-            figure_cell(one.ours.free_run.mse, missing=DIVERGED),
-            figure_cell(one.theirs.free_run.mse, missing=DIVERGED),
-            Cell(text="none" if math.isnan(one.ratio) else times(one.ratio), value=one.ratio, mark="number"),
-            figure_cell(one.ours.free_run.nrmse_fit, missing="-", digits=4),
-            figure_cell(one.theirs.free_run.nrmse_fit, missing="-", digits=4),
-            figure_cell(one.ours.free_run.max_abs_error, missing=DIVERGED),
-            figure_cell(one.theirs.free_run.max_abs_error, missing=DIVERGED),
-        )
-        for one in found.contests
-    )
+def _cases(found: Comparison, output: str) -> Section:
+    contests = [contest for contest in found.contests if contest.output == output]
+    one, other = found.ours.entries[output], found.theirs.entries[output]
     first, second = found.ours.name, found.theirs.name
+    shared = [column for column in one.columns if column.key in {theirs.key for theirs in other.columns}]
+    head = [("case", ""), ("role", "")]
+    for index, column in enumerate(shared):
+        unit = f" [{column.below}]" if column.below else ""
+        head += [(f"{column.heading}{unit}", first), (column.heading, second)]
+        head += [("ratio", "below 1 is better")] if index == 0 else []
+    several = len(found.outputs) > 1
     table = Table(
-        caption="Free runs case by case.",
-        head=(
-            ("case", ""),
-            ("role", ""),
-            (f"mse [{unit}²]", first),
-            ("mse", second),
-            ("ratio", "below 1 is better"),
-            ("fit [%]", first),
-            ("fit", second),
-            (f"largest error [{unit}]", first),
-            ("largest error", second),
-        ),
-        rows=rows,
+        caption=f"Free runs case by case{f', {output}' if several else ''}.",
+        head=tuple(head),
+        rows=tuple(_case_row(contest, shared) for contest in contests),
         note="Counted are cases that neither run was fitted to or chosen on, with the same target in both.",
     )
     series = [
-        figures.Series(name=name, values={c.case: getattr(c, side).free_run.mse for c in found.contests})
+        figures.Series(name=name, values={c.case: getattr(c, side).error for c in contests})
         for side, name in (("ours", first), ("theirs", second))
     ]
-    drawing = figures.cases_figure(series, [c.case for c in found.contests], quantity=f"free-run mse [{unit}²]")
+    drawing = figures.cases_figure(series, [c.case for c in contests], quantity=f"free-run mse [{one.unit}²]")
     caption = "Free-run mse by case; logarithmic, lower is better. A run without a mark diverges."
+    name = identifier(output) if several else ""
     return Section(
-        anchor="cases", title="Case by case", parts=(table, picture(drawing, "Free-run mse", caption, "mse"))
+        anchor=f"cases-{name}" if several else "cases",
+        title=f"Case by case: {output}" if several else "Case by case",
+        parts=(table, picture(drawing, "Free-run mse", caption, f"mse-{name}" if several else "mse")),
     )
 
 
+def _case_row(contest: Contest, columns: Sequence[Column]) -> tuple[Cell, ...]:
+    role = "" if contest.ours.role is None else contest.ours.role.value
+    cells = [Cell(text=contest.case, header=True, below="" if contest.counts else "not counted"), Cell(text=role)]
+    for index, column in enumerate(columns):
+        for entry in (contest.ours, contest.theirs):
+            word = "-" if math.isfinite(entry.error) else DIVERGED
+            cells.append(column.cell(entry.figures[column.key], missing=word))
+        if index == 0:
+            ratio = "none" if math.isnan(contest.ratio) else times(contest.ratio)
+            cells.append(Cell(text=ratio, value=contest.ratio, mark="number"))
+    return tuple(cells)
+
+
 def _pictures(found: Comparison) -> list[Section]:
-    output, unit = found.ours.fit.mapping.rpartition("->")[2].strip(), found.ours.fit.unit
     parts: list[Part] = []
-    for index, contest in enumerate(contest for contest in found.contests if contest.same):
-        ours, theirs = found.ours.signals[contest.case], found.theirs.signals[contest.case]
+    drawn = [one for one in found.contests if one.same and one.ours.signals and one.theirs.signals]
+    for index, contest in enumerate(drawn):
+        ours, theirs = contest.ours.signals, contest.theirs.signals
+        if ours is None or theirs is None:
+            continue
         figure = figures.case_figure(
             ours.time,
             ours.target,
             ours.simulated,
-            title=contest.case,
-            label=output,
-            unit=unit,
+            title=found.called(contest),
+            label=contest.output,
+            unit=found.ours.entries[contest.output].unit,
             other=theirs.simulated,
             names=(found.ours.name, found.theirs.name),
+            columns=max(60, min(450, 450 * 30 // len(drawn))),
         )
-        caption = f"{contest.case}: target and both free runs above, their errors below."
-        parts.append(picture(figure, contest.case, caption, f"case-{index}"))
+        caption = f"{found.called(contest)}: target and both free runs above, their errors below."
+        parts.append(picture(figure, found.called(contest), caption, f"case-{index}"))
     return [Section(anchor="pictures", title="Side by side", parts=tuple(parts))] if parts else []
 
 

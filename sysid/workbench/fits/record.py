@@ -99,14 +99,14 @@ def read_scores(folder: Path) -> Scores:
         name: CaseResult(
             case=name,
             role=Role(fields["role"]),
-            free_run=_figures(fields["free_run"]),
-            one_step=_figures(fields["one_step"]),
+            free_run=Figures.from_dict(fields["free_run"]),
+            one_step=Figures.from_dict(fields["one_step"]),
             run_time_s=fields["run_time_s"],
             first=fields["begins_at"],
             intervals=CaseIntervals.from_dict(fields["coverage"], *(arrays[f"{name}/{signal}"] for signal in INTERVAL))
             if "coverage" in fields
             else None,
-            by_state={state: (_figures(one), float(one["share"])) for state, one in fields["by_state"].items()}
+            by_state={state: (Figures.from_dict(one), float(one["share"])) for state, one in fields["by_state"].items()}
             if "by_state" in fields
             else None,
             **{signal: np.asarray(arrays[f"{name}/{signal}"], dtype=np.float64) for signal in SIGNALS},
@@ -114,11 +114,6 @@ def read_scores(folder: Path) -> Scores:
         for name, fields in stored["cases"].items()
     }
     return Scores(evaluation=Evaluation(cases=cases), selection_mse=float(stored["selection_mse"]))
-
-
-def _figures(fields: Mapping[str, Any]) -> Figures:
-    numbers = {name: float(fields[name]) for name in ("mse", "nrmse_fit", "max_abs_error", "r")}
-    return Figures(**numbers, unit=fields["unit"])
 
 
 def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.traces import Role
-from sysid.validation.metrics import mean_fit
+from sysid.validation.metrics import MERITS, mean_fit
 from sysid.workbench.runner.events import DataLoaded, FitReady, RunStarted
 
 if TYPE_CHECKING:
@@ -142,8 +142,7 @@ def metrics(ready: FitReady) -> dict[str, float]:
         case_name = key(name)
         found[f"free_run_mse/{case_name}"] = case.free_run.mse
         found[f"one_step_mse/{case_name}"] = case.one_step.mse
-        found[f"nrmse_fit/{case_name}"] = case.free_run.nrmse_fit
-        found[f"max_abs_error/{case_name}"] = case.free_run.max_abs_error
+        found |= {f"{one.key}/{case_name}": getattr(case.free_run, one.key) for one in MERITS[1:]}
         found[f"run_time_s/{case_name}"] = case.run_time_s
         if case.intervals is not None:
             found[f"free_run_coverage/{case_name}"] = case.intervals.free_run.share

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 
-@pytest.fixture
-def found() -> dict[str, Any]:
+def leakage() -> dict[str, Any]:
     """Two subjects in two scenes, one of which could not be run with the second."""
     curve = {"time": [0.0, 1.0, 2.0], "value": [5.0, 4.0, 3.0]}
     return {
@@ -59,3 +58,9 @@ def found() -> dict[str, Any]:
             }
         ],
     }
+
+
+@pytest.fixture
+def found() -> dict[str, Any]:
+    """As a judge gives it."""
+    return leakage()
