@@ -17,13 +17,14 @@ def reference(
     """One grid point at a time, as one would do it by hand."""
     out = np.full((len(grid), values.shape[1]), np.nan)
     half = 0.5 * np.median(np.diff(stamps))
+    fuzz = 0.0 if method == "linear" else 1e-6 * width  # on the point counts as before it; a line is the same there
     for row, t in enumerate(grid):
         if method == "average":
             inside = [i for i, s in enumerate(stamps) if t <= s + half + 1e-6 * width < t + width]
             if inside:
                 out[row] = np.mean([values[i] for i in inside], axis=0)
             continue
-        last = max(i for i, s in enumerate(stamps) if s <= t + 1e-6 * width)  # on the point counts as before it
+        last = max(i for i, s in enumerate(stamps) if s <= t + fuzz)
         if method == "hold" or last == len(stamps) - 1:
             out[row] = values[last]
         else:

@@ -6,6 +6,7 @@ import io
 import itertools
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,6 +20,7 @@ from sysid.ingest.numbers import MISSING, NumberFormat
 from sysid.ingest.options import RepairOptions
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, kind_of, split_rows, trimmed
 from sysid.ingest.readers.csv_layout import Layout
+from sysid.ingest.readers.growing import Growing
 from sysid.ingest.readers.text_source import Block, TextFile
 from sysid.ingest.words import WordCollector
 
@@ -26,10 +28,16 @@ _PLAIN_FROM = 100_000
 """Characters: below, importing Arrow takes longer than reading row by row."""
 
 _MOST_FOOTER_LINES = 50
-_QUOTED = re.compile(r'"([^"\n,;\t| ]*)"')
-_PLUS = re.compile(r"(?<![eEdD0-9])\+(?=[0-9.])")
-_BLANKS = re.compile(r"[ \t]+")
-_ENDS = re.compile(r"^ | $", re.MULTILINE)
+_QUOTED = re.compile(rb'"([^"\n,;\t| ]*)"')
+_PLUS = re.compile(rb"(?<![eEdD0-9])\+(?=[0-9.])")
+_BLANKS = re.compile(rb"[ \t]+")
+_ENDS = re.compile(rb"^ | $", re.MULTILINE)
+_FORTRAN = re.compile(rb"(?<=[0-9.,])[dD](?=[-0-9])")
+
+
+def _buffer(array: Any, dtype: type[np.generic]) -> NDArray[Any]:
+    """The numbers of an Arrow array without nulls; ``to_numpy`` would import pandas."""
+    return np.frombuffer(array.buffers()[1], dtype=dtype)[array.offset : array.offset + len(array)]
 
 
 class Column(Protocol):
@@ -51,28 +59,23 @@ class Numbers:
 
     numbers: NumberFormat
     strange: dict[str, int] = field(default_factory=dict)
-    _parts: list[NDArray[np.float64]] = field(default_factory=list)
+    values: Growing = field(default_factory=lambda: Growing(np.float64))
 
     def add(self, cells: Sequence[str], lines: NDArray[np.int32]) -> None:
         """Take a block of cells."""
         values, strange = self.numbers.column_with_words(cells)
-        self._parts.append(values)
+        self.values.extend(values)
         for text, index in strange.items():
             self.strange.setdefault(text, int(lines[index]))
 
     def add_arrow(self, array: Any) -> None:
         """Take a block that Arrow has read."""
-        self._parts.append(array.to_numpy())
+        for chunk in array.chunks:
+            self.values.extend(_buffer(chunk.fill_null(np.nan) if chunk.null_count else chunk, np.float64))
 
     def arrow_type(self, arrow: Any) -> Any:
         """What Arrow shall read it as."""
         return arrow.float64()
-
-    def finish(self) -> NDArray[np.float64]:
-        """The whole column; its blocks are let go."""
-        whole = np.concatenate(self._parts) if self._parts else np.zeros(0)
-        self._parts.clear()
-        return whole
 
 
 @dataclass(kw_only=True)
@@ -81,7 +84,7 @@ class Counts:
 
     origin: int | None = None
     strange: dict[str, int] = field(default_factory=dict)
-    _parts: list[NDArray[np.float64]] = field(default_factory=list)
+    values: Growing = field(default_factory=lambda: Growing(np.float64))
 
     def add(self, cells: Sequence[str], lines: NDArray[np.int32]) -> None:
         """Take a block of cells."""
@@ -97,21 +100,18 @@ class Counts:
                 values[index] = count - self.origin
             elif text.casefold() not in MISSING:
                 self.strange.setdefault(text, int(lines[index]))
-        self._parts.append(values)
+        self.values.extend(values)
 
     def add_arrow(self, array: Any) -> None:
         """Take a block that Arrow has read."""
-        counts = array.to_numpy()
-        self.origin = int(counts[0]) if self.origin is None else self.origin
-        self._parts.append((counts - self.origin).astype(np.float64))
+        for chunk in array.chunks:
+            counts = _buffer(chunk, np.int64)
+            self.origin = int(counts[0]) if self.origin is None else self.origin
+            self.values.extend(counts - self.origin)
 
     def arrow_type(self, arrow: Any) -> Any:
         """What Arrow shall read it as."""
         return arrow.int64()
-
-    def finish(self) -> NDArray[np.float64]:
-        """The whole column."""
-        return np.concatenate(self._parts) if self._parts else np.zeros(0)
 
 
 @dataclass(kw_only=True)
@@ -128,7 +128,7 @@ class Texts:
         """Take a block that Arrow has read."""
         coded = array.combine_chunks().dictionary_encode()
         coded = coded.combine_chunks() if hasattr(coded, "combine_chunks") else coded
-        codes = coded.indices.fill_null(-1).to_numpy().astype(np.int32)
+        codes = _buffer(coded.indices.fill_null(-1), np.int32)
         self.collector.add_coded(codes, [str(text) for text in coded.dictionary.to_pylist()])
 
     def arrow_type(self, arrow: Any) -> Any:
@@ -183,7 +183,7 @@ class Body:
     comment: str
     repairs: RepairOptions
     notes: list[str] = field(default_factory=list)
-    _lines: list[NDArray[np.int32]] = field(default_factory=list)
+    _lines: Growing = field(default_factory=lambda: Growing(np.int32))
     _ragged: list[int] = field(default_factory=list)
 
     def read(self) -> NDArray[np.int32]:
@@ -195,25 +195,34 @@ class Body:
         Raises:
             ReaderError: If rows are ragged, or quotes do not close.
         """
-        for block, last in _with_last(_whole_rows(self.file.blocks(skip=self.layout.skip), self.file.path)):
-            if not self._plain(block):
-                self._row_by_row(block, last=last)
+        with closing(self.file.blocks(skip=self.layout.skip)) as blocks:
+            for block, last in _with_last(_whole_rows(blocks, self.file.path)):
+                if not len(self._lines):
+                    self._reserve(block)
+                if not self._plain(block):
+                    self._row_by_row(block, last=last)
         if self._ragged:
             self.notes.append(f"{len(self._ragged)} ragged rows dropped, first at line {self._ragged[0]}")
-        lines = np.concatenate(self._lines) if self._lines else np.zeros(0, dtype=np.int32)
-        self._lines.clear()
-        return lines
+        return self._lines.whole()
+
+    def _reserve(self, first: Block) -> None:
+        """Room for as many rows as the file seems to have, by the length of its first lines."""
+        expected = int(1.02 * self.file.path.stat().st_size * first.lines / max(len(first.data), 1)) + 64
+        self._lines = Growing(np.int32, expected)
+        for column in self.columns:
+            if isinstance(column, Numbers | Counts):
+                column.values = Growing(np.float64, expected)
 
     def _plain(self, block: Block) -> bool:
         """Read a block by Arrow, if every one of its lines is a row and every cell is what its column holds."""
-        numbers, text = self.layout.numbers, block.text
-        if len(text) < _PLAIN_FROM or numbers.thousands is not None or numbers.states:
+        numbers = self.layout.numbers
+        if len(block.data) < _PLAIN_FROM or numbers.thousands is not None or numbers.states:
             return False
         import pyarrow as pa
         from pyarrow import csv as arrow_csv
 
-        text = self._simplified(text)
-        if '"' in text:
+        data = self._simplified(block.data)
+        if b'"' in data:
             return False
         names = [str(index) for index in range(len(self.columns))]
         types = {name: column.arrow_type(pa) for name, column in zip(names, self.columns, strict=True)}
@@ -228,30 +237,28 @@ class Body:
             ),
         }
         try:
-            table = arrow_csv.read_csv(io.BytesIO(text.encode()), **options)
+            table = arrow_csv.read_csv(pa.py_buffer(data), **options)
         except (pa.ArrowInvalid, pa.ArrowKeyError):
             return False
-        rows = text.count("\n") + (not text.endswith("\n"))
         counted = [table.column(i) for i, column in enumerate(self.columns) if isinstance(column, Counts)]
-        if table.num_rows != rows or any(column.null_count for column in counted):
+        if table.num_rows != block.lines or any(column.null_count for column in counted):
             return False
         for index, column in enumerate(self.columns):
             column.add_arrow(table.column(index))
-        self._lines.append(np.arange(block.line, block.line + rows, dtype=np.int32))
+        self._lines.extend(np.arange(block.line, block.line + block.lines, dtype=np.int32))
         return True
 
-    def _simplified(self, text: str) -> str:
+    def _simplified(self, data: bytes) -> bytes:
         """A block without what Arrow does not know: quotes about plain cells, plus signs, runs of blanks."""
-        if '"' in text:
-            text = _QUOTED.sub(r"\1", text)
-        if "+" in text:
-            text = _PLUS.sub("", text)
+        if b'"' in data:
+            data = _QUOTED.sub(rb"\1", data)
+        if b"+" in data:
+            data = _PLUS.sub(b"", data)
         if self.layout.separator == BLANKS:
-            text = _ENDS.sub("", _BLANKS.sub(" ", text))
-        only_numbers = all(isinstance(column, Numbers) for column in self.columns)
-        return (
-            re.sub("(?<=[0-9.,])[dD](?=[-0-9])", "e", text) if only_numbers and ("D" in text or "d" in text) else text
-        )
+            data = _ENDS.sub(b"", _BLANKS.sub(b" ", data))
+        if (b"D" in data or b"d" in data) and all(isinstance(column, Numbers) for column in self.columns):
+            data = _FORTRAN.sub(b"e", data)
+        return data
 
     def _row_by_row(self, block: Block, *, last: bool) -> None:
         width = len(self.columns)
@@ -270,7 +277,7 @@ class Body:
         self._ragged += [row.line for row in ragged]
         whole = [row for row in rows if len(row.cells) == width] if ragged else rows
         lines = np.array([row.line for row in whole], dtype=np.int32)
-        self._lines.append(lines)
+        self._lines.extend(lines)
         for index, column in enumerate(self.columns):
             column.add([row.cells[index] for row in whole], lines)
 
@@ -285,7 +292,7 @@ class Body:
 
         tail = itertools.takewhile(foreign, reversed(rows[-_MOST_FOOTER_LINES:]))
         count = sum(1 for _ in tail)
-        return count if count < len(rows) or self._lines else 0
+        return count if count < len(rows) or len(self._lines) else 0
 
     def _ragged_error(self, ragged: list[Row], rows: list[Row]) -> ReaderError:
         width, first = len(self.columns), ragged[0]
@@ -307,11 +314,11 @@ def _whole_rows(blocks: Iterator[Block], path: Path) -> Iterator[Block]:
     """Blocks that end where a row ends: a quoted cell may hold line breaks."""
     open_block: Block | None = None
     for block in blocks:
-        joined = block if open_block is None else Block(line=open_block.line, text=open_block.text + block.text)
-        if joined.text.count('"') % 2 == 0:
+        joined = block if open_block is None else open_block.joined(block)
+        if b'"' not in joined.data or joined.data.count(b'"') % 2 == 0:
             open_block = None
             yield joined
-        elif len(joined.text) > 64_000_000:
+        elif len(joined.data) > 64_000_000:
             raise ReaderError(
                 "the file cannot be split into cells",
                 where=f"{path}, after line {joined.line}",
@@ -329,8 +336,8 @@ def _with_last(blocks: Iterator[Block]) -> Iterator[tuple[Block, bool]]:
     """Blocks, and whether it is the last; a short last one is joined to the one before, so that a footer is whole."""
     previous: Block | None = None
     for block in blocks:
-        if previous is not None and len(block.text) < _PLAIN_FROM:
-            previous = Block(line=previous.line, text=previous.text + block.text)
+        if previous is not None and len(block.data) < _PLAIN_FROM:
+            previous = previous.joined(block)
             continue
         if previous is not None:
             yield previous, False

@@ -20,13 +20,27 @@ from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stam
 from sysid.ingest.readers.csv_cells import Kind, unit_text
 from sysid.ingest.readers.csv_layout import Layout, recognise
 from sysid.ingest.readers.reader import Reader
-from sysid.ingest.readers.text_source import open_text
+from sysid.ingest.readers.text_source import TextFile, ZeroBytesError, encodings, not_text
 from sysid.ingest.table import RawColumn, RawTable, recognise_time
 from sysid.ingest.words import WordCollector, states_for
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
-    file = open_text(path, options.encoding)
+    tries = encodings(path, options.encoding)
+    problem: Exception = ValueError("it has no encoding")
+    for encoding in tries:
+        try:
+            return _read_as(TextFile(path=path, encoding=encoding), options, repairs)
+        except (UnicodeError, LookupError) as error:
+            problem = error
+        except ZeroBytesError as error:
+            problem = error
+            break
+    raise not_text(path, tries, problem)
+
+
+def _read_as(file: TextFile, options: FileOptions, repairs: RepairOptions) -> RawTable:
+    path = file.path
     lines, whole = file.head()
     layout = recognise(lines, options, path, whole=whole)
     headers = _headers(layout, options, path)
@@ -219,7 +233,7 @@ def _stamps(header: Header, column: Stamps, where: str, *, is_time: bool) -> tup
 
 
 def _numbers(header: Header, column: Numbers | Counts, layout: Layout, path: Path) -> RawColumn:
-    values = column.finish()
+    values = column.values.whole()
     problem = None
     if column.strange:
         cell, line = next(iter(column.strange.items()))

@@ -43,7 +43,7 @@ READER = Reader(
     suffixes=(".mf4", ".mdf", ".mf3", ".md3"),
     read=_read,
     options=frozenset({"group"}),
-    is_mine=lambda head: head[:8] in _MARKS,
+    is_mine=lambda head: head[:8] in _MARKS and head[8:9].isdigit(),
 )
 
 

@@ -1,22 +1,25 @@
-"""A text file as lines, a block at a time: encoding, ends of lines, and bounds before memory."""
+"""A text file as lines, a block at a time: ends of lines, encodings, and bounds before memory."""
 
 from __future__ import annotations
 
 import codecs
-import io
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from sysid.errors import ReaderError
 
 LONGEST_LINE = 1_000_000
 """Characters; a table of numbers of a thousand columns has some 20,000."""
 
-_CHUNK = 1 << 20
 _BLOCK = 4 << 20
 _HEAD = 1 << 18
-_HEAD_LINES = 1000
+_NEWLINE = 10
+_ASCII_INSIDE = {"utf-8", "utf-8-sig", "cp1252", "iso8859-1", "iso8859-15", "ascii"}
+_HEAD_LINES = 400
 _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
@@ -26,16 +29,27 @@ class Block:
 
     Args:
         line: Number of its first line, from 1.
-        text: The lines, each ended by ``\\n`` but for the file's last.
+        lines: How many lines it has.
+        data: The lines in UTF-8, each ended by ``\n`` but for the file's last.
     """
 
     line: int
-    text: str
+    lines: int
+    data: bytes
+
+    @property
+    def text(self) -> str:
+        """The lines as text."""
+        return self.data.decode()
+
+    def joined(self, later: Block) -> Block:
+        """This block and the one after it as one."""
+        return Block(line=self.line, lines=self.lines + later.lines, data=self.data + later.data)
 
 
 @dataclass(frozen=True, kw_only=True)
 class TextFile:
-    """A text file that was looked through and can be read block by block.
+    """A text file that is read block by block.
 
     Args:
         path: The file.
@@ -48,12 +62,12 @@ class TextFile:
     def head(self) -> tuple[list[str], bool]:
         """Its first lines, and whether these are all."""
         whole = self.path.stat().st_size <= _HEAD
-        blocks = self.blocks(size=_HEAD)
-        text = "".join(block.text for block in blocks) if whole else next(blocks).text
+        with closing(self.blocks(size=_HEAD)) as blocks:
+            text = b"".join(block.data for block in blocks).decode() if whole else next(blocks).text
         lines = text.split("\n")
         return lines[:_HEAD_LINES], whole and len(lines) <= _HEAD_LINES
 
-    def blocks(self, *, skip: int = 0, size: int = _BLOCK) -> Iterator[Block]:
+    def blocks(self, *, skip: int = 0, size: int = _BLOCK) -> Generator[Block]:
         r"""Its lines, some millions of characters at a time.
 
         Args:
@@ -61,53 +75,75 @@ class TextFile:
             size: Bytes to be read at a time.
 
         Yields:
-            Blocks of whole lines; every end of a line is ``\\n``.
+            Blocks of whole lines; every end of a line is ``\n``.
+
+        Raises:
+            ReaderError: If a line is too long for a table.
+            UnicodeError: If the file is not in its encoding.
         """
-        line, rest = 1, ""
-        for part in _decoded(self.path, self.encoding, size):
-            text = rest + part if rest else part
-            cut = text.rfind("\n") + 1
-            whole, rest = text[:cut], text[cut:]
-            while skip and whole:
-                whole = whole.partition("\n")[2]
-                skip, line = skip - 1, line + 1
-            if whole:
-                yield Block(line=line, text=whole)
-                line += whole.count("\n")
+        line, rest = 1, b""
+        with closing(_in_utf8(self.path, self.encoding, size)) as parts:
+            for part in parts:
+                data = rest + part if rest else part
+                cut = data.rfind(b"\n") + 1
+                whole, rest = data[:cut], data[cut:]
+                while skip and whole:
+                    whole = whole.partition(b"\n")[2]
+                    skip, line = skip - 1, line + 1
+                lines = int(np.count_nonzero(np.frombuffer(whole, dtype=np.uint8) == _NEWLINE))
+                # Below that many bytes in all, no line among them can be too long.
+                if len(data) > lines * LONGEST_LINE or len(rest) > LONGEST_LINE:
+                    self._check_lines(whole, rest, line)
+                if whole:
+                    yield Block(line=line, lines=lines, data=whole)
+                    line += lines
         if rest and not skip:
-            yield Block(line=line, text=rest)
+            yield Block(line=line, lines=1, data=rest)
+
+    def _check_lines(self, whole: bytes, rest: bytes, line: int) -> None:
+        for index, text in enumerate([*whole.split(b"\n")[:-1], rest]):
+            if len(text) <= LONGEST_LINE:
+                continue
+            raise ReaderError(
+                "a line is too long for a table",
+                where=f"{self.path}, line {line + index}",
+                expected=f"at most {LONGEST_LINE:,} characters in a line",
+                got=f"more than {LONGEST_LINE:,}",
+                remedy=f"look at it with: head -n {line + index} '{self.path}' | cut -c1-200 | tail -n 1; "
+                "export one line per sample, with a column per signal",
+            )
 
 
-def open_text(path: Path, encoding: str | None) -> TextFile:
-    """Look through a text file without keeping it.
+def encodings(path: Path, encoding: str | None) -> list[str]:
+    """The encodings that a file may have.
 
     Args:
         path: The file.
-        encoding: Its encoding, or ``None`` to recognise it: a byte-order mark, else UTF-8, else
-            Windows-1252.
+        encoding: The one that was asked for, or ``None``.
 
     Returns:
-        The file, to be read block by block.
-
-    Raises:
-        ReaderError: If it is not text in that encoding, or one of its lines is too long for a table.
+        That one; else what a byte-order mark says; else UTF-8 and, where that fails, Windows-1252.
     """
+    if encoding is not None:
+        return [encoding]
     with path.open("rb") as file:
         start = file.read(4)
     marked = next((name for mark, name in _MARKS if start.startswith(mark)), None)
-    tries = [encoding] if encoding is not None else [marked] if marked else ["utf-8", "cp1252"]
-    problem: Exception | None = None
-    for name in tries:
-        try:
-            _look_through(path, name)
-        except (UnicodeError, LookupError) as error:
-            problem = error
-            continue
-        except ValueError as error:
-            problem = error
-            break
-        return TextFile(path=path, encoding=name)
-    raise ReaderError(
+    return [marked] if marked else ["utf-8", "cp1252"]
+
+
+def not_text(path: Path, tries: list[str], problem: Exception) -> ReaderError:
+    """The error for a file that is not text.
+
+    Args:
+        path: The file.
+        tries: The encodings that were tried.
+        problem: What came of the last.
+
+    Returns:
+        The error to raise.
+    """
+    return ReaderError(
         "the file is not text",
         where=path,
         expected=f"text in {' or '.join(tries)}",
@@ -116,40 +152,34 @@ def open_text(path: Path, encoding: str | None) -> TextFile:
     )
 
 
-def _look_through(path: Path, encoding: str) -> None:
-    line, length = 1, 0
-    for text in _decoded(path, encoding, _CHUNK):
-        if "\x00" in text:
-            raise ValueError("it holds zero bytes")
-        end = text.find("\n")
-        length += len(text) if end < 0 else end
-        if length > LONGEST_LINE:
-            raise ReaderError(
-                "a line is too long for a table",
-                where=f"{path}, line {line}",
-                expected=f"at most {LONGEST_LINE:,} characters in a line",
-                got=f"more than {LONGEST_LINE:,}",
-                remedy=f"look at it with: cut -c1-200 '{path}' | head -n {line}; export one line per sample, "
-                "with a column per signal",
-            )
-        if end >= 0:
-            line += text.count("\n")
-            length = len(text) - text.rfind("\n") - 1
+class ZeroBytesError(ValueError):
+    """The file holds zero bytes, as no text does."""
 
 
-def _decoded(path: Path, encoding: str, size: int) -> Iterator[str]:
+def _in_utf8(path: Path, encoding: str, size: int) -> Generator[bytes]:
+    """The file in UTF-8, with one kind of line ends."""
     if not getattr(codecs.lookup(encoding), "_is_text_encoding", True):
         raise LookupError(f"{encoding} is no encoding of text")
-    decoder = io.IncrementalNewlineDecoder(codecs.getincrementaldecoder(encoding)(), translate=True)
-    first = True
+    decoder = codecs.getincrementaldecoder(encoding)()
+    plain = codecs.lookup(encoding).name in _ASCII_INSIDE
+    first, held = True, b""
     with path.open("rb") as file:
         while True:
             chunk = file.read(size)
-            text = decoder.decode(chunk, final=not chunk)
+            # ASCII is as it is in these encodings, and need not be decoded.
+            as_is = plain and chunk.isascii() and not decoder.getstate()[0]
+            data = chunk if as_is and chunk else decoder.decode(chunk, final=not chunk).encode()
+            if b"\x00" in data:
+                raise ZeroBytesError("it holds zero bytes")
             # An encoding that was asked for may leave the byte-order mark in the text.
-            if first and text:
-                text, first = text.removeprefix("\ufeff"), False
-            if text:
-                yield text
+            if first and data:
+                data, first = data.removeprefix(codecs.BOM_UTF8), False
+            data, held = held + data, b""
+            if b"\r" in data:
+                if data.endswith(b"\r") and chunk:
+                    data, held = data[:-1], b"\r"
+                data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+            if data:
+                yield data
             if not chunk:
                 return
