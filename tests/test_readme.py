@@ -1,4 +1,4 @@
-"""The README's first hour, followed to the letter: its files are written, its commands run, their output compared.
+"""The first hour, followed to the letter: its files are written, its commands run, their output compared.
 
 With ``SYSID_DATA`` (a folder that holds ``hair_dryer/dryer.dat``) the numbers count; without it a linear record of the
 same shape stands in, and the words do.
@@ -20,7 +20,8 @@ import pytest
 
 from sysid.workbench.cli import run_cli
 
-README = Path(__file__).resolve().parents[1] / "README.md"
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "first-hour.md"
 BLOCK = re.compile(r"^```(\w+) ?([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TIME = re.compile(r"under 1 s|\b\d+ h \d+ min|\b\d+ min \d+ s|\b[\d.]+ m?s\b")
 HASH = re.compile(r"\b[0-9a-f]{16,}\b")
@@ -40,8 +41,7 @@ class Command:
 
 def blocks() -> list[tuple[str, str, str]]:
     """Language, file and text of each block of the tutorial."""
-    tutorial = README.read_text(encoding="utf-8").split("## The first hour", 1)[1].split("\n## ", 1)[0]
-    return BLOCK.findall(tutorial)
+    return BLOCK.findall(PAGE.read_text(encoding="utf-8"))
 
 
 def commands(text: str) -> list[Command]:
@@ -125,12 +125,12 @@ def check(command: Command, got: str) -> None:
         expected = expected[:-1]
         lines = lines[: len(expected)]
     for number, line in enumerate(lines):
-        assert number < len(expected), f"{command.words}: the README lacks the line\n{line}"
-        assert same(expected[number], line), f"{command.words}:\n{line}\nwhere the README has\n{expected[number]}"
+        assert number < len(expected), f"{command.words}: the page lacks the line\n{line}"
+        assert same(expected[number], line), f"{command.words}:\n{line}\nwhere the page has\n{expected[number]}"
     assert len(lines) == len(expected), f"{command.words}: it no longer prints\n{expected[len(lines) :]}"
 
 
-def test_the_first_hour_is_as_the_readme_tells_it(
+def test_the_first_hour_is_as_the_page_tells_it(
     home: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done = 0
@@ -154,3 +154,17 @@ def test_the_comparison_tells_a_changed_number_and_a_changed_word() -> None:
     assert same("at most 8.0e-15 V", "at most 3.1e-14 V")
     if DATA:
         assert not same("│ 8.480e-03 │", "│ 8.680e-03 │")
+
+
+def test_the_readme_is_one_screen_after_another_and_no_book() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (block,) = [
+        text for language, name, text in BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8")) if name
+    ]
+    exec(compile(block, "README.md", "exec"), {})  # noqa: S102 - our own page
+    assert (tmp_path / "compare.png").is_file()
+    assert (tmp_path / "frame" / "model.json").is_file()
