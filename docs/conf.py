@@ -24,7 +24,13 @@ html_theme_options = {"navigation_with_keys": True}
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 # Links from a page to files of the repository (reports, YAML) are checked by the tests, not here.
-suppress_warnings = ["myst.xref_missing", "mystnb.unknown_mime_type", "mystnb.lexer", "myst-nb.lexer", "misc.highlighting_failure"]
+suppress_warnings = [
+    "myst.xref_missing",
+    "mystnb.unknown_mime_type",
+    "mystnb.lexer",
+    "myst-nb.lexer",
+    "misc.highlighting_failure",
+]
 
 # A notebook that fails fails the build. The cache spares those that did not change.
 nb_execution_mode = os.environ.get("SYSID_NOTEBOOKS", "cache")

@@ -27,7 +27,9 @@ def found() -> OrderSearch:
 @pytest.mark.parametrize("criterion", ["BIC", "bic", "AICc", "AIC"])
 def test_a_criterion_finds_the_orders_and_the_dead_time(found: OrderSearch, criterion: str) -> None:
     best = found.best(criterion)
-    assert (best.na, best.nk) == (2, (3,))
+    assert best.nk == (3,)
+    # Akaike's criterion chooses too many parameters with a probability that does not vanish (Shibata 1976).
+    assert best.na == 2 if criterion.upper() == "BIC" else best.na in {2, 3}
     assert best.nb[0] <= 2
 
 

@@ -69,7 +69,9 @@ class NeuralProvider(AbstractProvider):
 
     def _record(self, experiment: Experiment, at: int) -> _Record:
         history, scaling = experiment.history, self.template.scaling
-        n_past = len(history.output) if experiment.past is not None and experiment.past.any() else 0
+        # One measured sample is a system that has stood there, here as in every free run of the model.
+        stood = len(history.output) == 1 and (experiment.past is None or bool(experiment.past.any()))
+        n_past = len(history.output) if not stood and experiment.past is not None and experiment.past.any() else 0
         u = np.concatenate([history.inputs[:n_past], experiment.inputs])
         target = np.concatenate([history.output[:n_past], experiment.output])
         roots = None
@@ -85,7 +87,7 @@ class NeuralProvider(AbstractProvider):
             target=scaling.scale_output(target),
             root_weights=roots,
             oldest=oldest,
-            free=slice(at, at + self.template.sizes.states) if experiment.free else None,
+            free=slice(at, at + self.template.sizes.states) if experiment.free and not stood else None,
         )
 
     @property

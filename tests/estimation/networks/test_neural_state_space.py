@@ -9,7 +9,8 @@ from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import linear_start
 from sysid.estimation.networks.provider import experiments_of
 from sysid.models import Mapping, NeuralForm, NeuralStateSpace, Scaling, Start, StartKind
-from sysid.traces import Channel, Trace
+from sysid.traces import Channel, Role, Trace
+from sysid.validation import evaluate_case
 
 MAPPING = Mapping.parse("u -> y")
 CHANNELS = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
@@ -142,3 +143,22 @@ def test_there_is_no_open_loop():
 def test_options_of_lagged_regressors_are_refused(given):
     with pytest.raises(ConfigError, match=next(iter(given))):
         fit_neural_state_space([linear(0)], MAPPING, NeuralStateSpace(states=1, neurons=1), Training(**given))
+
+
+def test_one_measured_sample_is_a_system_that_has_stood_there_in_the_fit_as_in_the_run() -> None:
+    rng = np.random.default_rng(0)
+
+    def record(name: str, first: float) -> Trace:
+        u, y = np.repeat(rng.uniform(-1.0, 1.0, 10), 20), np.full(200, first)
+        for k in range(199):
+            y[k + 1] = 0.95 * y[k] + 0.05 * u[k]
+        channels = (Channel(name="u", unit="1"), Channel(name="y", unit="1"))
+        return Trace(name=name, sample_time=0.1, channels=channels, values=np.column_stack([u, y]))
+
+    records = (record("a", 2.0), record("b", -1.0))
+    start = Start(kind=StartKind.MEASURED, n_measured=1)
+    network = NeuralStateSpace(states=1, neurons=2)
+    fit = fit_neural_state_space(records, Mapping.parse("u -> y"), network, Training(max_iterations=60), start=start)
+    for one in records:
+        found = evaluate_case(fit.model, one, Role.ESTIMATION, start, 1)
+        assert found.free_run.nrmse_fit > 99.0
