@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sysid.api.fits import SystemFit
+from sysid.api.several import Several
 from sysid.estimation import FitResult
 from sysid.models import Start, StartKind
 from sysid.traces import TraceSet
@@ -104,7 +104,7 @@ class Comparison:
         return comparison_figure(list(panels.values()))
 
 
-def compare(traces: TraceSet, *fits: FitResult | SystemFit, start: Start = ESTIMATED) -> Comparison:
+def compare(traces: TraceSet, *fits: FitResult | Several, start: Start = ESTIMATED) -> Comparison:
     """Run fitted models over every case: fed with nothing but inputs and their own past output.
 
     Args:
@@ -116,9 +116,7 @@ def compare(traces: TraceSet, *fits: FitResult | SystemFit, start: Start = ESTIM
         The figures; printing them shows a table, ``plot()`` draws them.
     """
     single = [
-        (one, output if isinstance(fit, SystemFit) else "")
-        for fit in fits
-        for output, one in (fit.fits.items() if isinstance(fit, SystemFit) else {"": fit}.items())
+        (one, output) for fit in fits for output, one in ({"": fit} if isinstance(fit, FitResult) else fit.fits).items()
     ]
     evaluations: dict[str, Evaluation] = {}
     outputs: dict[str, tuple[str, str]] = {}

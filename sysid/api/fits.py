@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.api.comparison import compare
+from sysid.api.saving import save
 from sysid.errors import ChannelError, TraceError
 from sysid.estimation import FitResult
 from sysid.ingest.arrays import inputs_of
@@ -111,14 +113,10 @@ class Fit(FitResult):
         Returns:
             A figure of matplotlib's, to restyle, show or save.
         """
-        from sysid.api.comparison import compare
-
         return compare(traces or self.traces, self, start=self.start).plot()
 
     def save(self, folder: str | Path, *, formats: tuple[str, ...] = ("onnx", "torchscript")) -> Bundle:
         """Write it as files that run elsewhere; see :func:`sysid.save`."""
-        from sysid.api.saving import save
-
         return save(self, self.traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
@@ -141,8 +139,6 @@ class Fit(FitResult):
 
     @cached_property
     def _compared(self) -> Any:
-        from sysid.api.comparison import compare
-
         return compare(self.traces, self, start=self.start)
 
     def _history(
@@ -207,14 +203,10 @@ class SystemFit:
 
     def plot(self, traces: TraceSet | None = None) -> Figure:
         """The free run of each output over its measurement, case by case."""
-        from sysid.api.comparison import compare
-
         return compare(traces or self.traces, self, start=self.start).plot()
 
     def save(self, folder: str | Path, *, formats: tuple[str, ...] = ("onnx", "torchscript")) -> Bundle:
         """Write it as files of several outputs that run elsewhere; see :func:`sysid.save`."""
-        from sysid.api.saving import save
-
         return save(self, self.traces, folder, formats=formats)
 
     def summary(self) -> str:

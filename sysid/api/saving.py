@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysid.api.fits import Fit, SystemFit
+from sysid.api.several import Several
 from sysid.estimation import FitResult
 from sysid.models import Start
 from sysid.traces import TraceSet
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def save(
-    fit: FitResult | SystemFit,
+    fit: FitResult | Several,
     traces: TraceSet,
     folder: str | Path,
     *,
@@ -39,10 +39,10 @@ def save(
     """
     from sysid.export import export_bundle
 
-    if isinstance(fit, SystemFit):
+    if not isinstance(fit, FitResult):
         fits = {str(one.model.mapping): one for one in fit.fits.values()}
         return export_bundle(fit.model, traces, Path(folder), outputs=fit.outputs, formats=formats, fits=dict(fits))
-    begun = start or (fit.start if isinstance(fit, Fit) else Start())
+    begun = start or getattr(fit, "start", Start())
     return export_bundle(fit, traces, Path(folder), start=begun, formats=formats)
 
 

@@ -13,9 +13,7 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training, estimators
 from sysid.models import NARX, AbstractStructure, Limit, Mapping
-
-Level = float | str
-"""A level at rest in the channel's unit, or the name of the channel that it equals."""
+from sysid.models.cascade_run import Level
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,6 +16,7 @@ from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
 from sysid.models.scaling import Scaling
+from sysid.models.to_control import Matrices, in_powers_of_z, transfer_function
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,9 +163,34 @@ class ARXModel(AbstractModel):
         Returns:
             One row of transfer functions, one column per input; see :mod:`sysid.models.to_control` for a state space.
         """
-        from sysid.models.to_control import arx_transfer_function
+        F = np.concatenate([[1.0], -self.a])
+        B = [
+            np.concatenate([np.zeros(nk), b, [0.0] * (not len(b))])
+            for b, nk in zip(self.b, self.orders.nk, strict=True)
+        ]
+        return transfer_function([in_powers_of_z(b, F) for b in B], self.mapping, self.sample_time)
 
-        return arx_transfer_function(self)
+    @property
+    def matrices(self) -> Matrices:
+        """A state space of it: delay lines of the output and of each input as a state, newest first."""
+        lags = self.orders.lags
+        lengths = [len(lags.output), *(max(per, default=0) for per in lags.inputs)]
+        first = np.concatenate([[0], np.cumsum(lengths)])
+        n, m = int(first[-1]), lags.n_inputs
+        C, D = np.zeros((1, n)), np.zeros((1, m))
+        C[0, : lengths[0]] = self.a
+        for j, (per, b) in enumerate(zip(lags.inputs, self.b, strict=True)):
+            for lag, weight in zip(per, b.tolist(), strict=True):
+                if lag == 0:
+                    D[0, j] = weight
+                else:
+                    C[0, first[1 + j] + lag - 1] = weight
+        A, B = np.eye(n, k=-1), np.zeros((n, m))
+        for j, (at, length) in enumerate(zip(first[:-1], lengths, strict=True)):
+            if length:
+                A[at] = C[0] if j == 0 else 0.0
+                B[at] = D[0] if j == 0 else np.eye(m)[j - 1]
+        return A, B, C, D
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""

@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.models.cascade_batch import simulate_records
 from sysid.models.cascade_program import Limit, Part
-from sysid.models.cascade_run import CascadeRun
+from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
 from sysid.models.wiring import Ends, Member, Wiring
 from sysid.traces import Trace
-
-Level = float | str
-"""A value at rest in the channel's unit, or the input whose first sample it is."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -274,8 +272,6 @@ class Cascade:
             TraceError: If the number of inputs is not the cascade's.
             ChannelError: If a level names a channel that it cannot.
         """
-        from sysid.models.cascade_batch import simulate_records
-
         return simulate_records(self, inputs, rest=rest, workers=workers)
 
     def checked(self, inputs: NDArray[np.float64], axes: int) -> NDArray[np.float64]:

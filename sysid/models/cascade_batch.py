@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.kernels import cascade_lanes as kernel
-from sysid.models.cascade import Cascade, Level
-from sysid.models.cascade_run import CascadeRun
-from sysid.models.cascade_stages import CompiledStage
+from sysid.models.cascade_run import CascadeRun, Level
+from sysid.models.cascade_stages import CompiledStage, ModelStage
+from sysid.models.wiring import Wiring
 
 MAX_LANES = 32
 """Records in lockstep at most: their past must stay in the second-level cache."""
@@ -22,8 +23,49 @@ MIN_LANES = 20
 """Records from which lockstep pays (measured: 8 records take 14 ms each, 20 records 7.2, 24 records 5.9; alone 7.1)."""
 
 
+class Batched(Protocol):
+    """What of a cascade a run over many records needs."""
+
+    @property
+    def wiring(self) -> Wiring:
+        """What reads what."""
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Channels that no member writes."""
+
+    @property
+    def stages(self) -> tuple[CompiledStage | ModelStage, ...]:
+        """What runs, in order."""
+
+    def levels(self, first: NDArray[np.float64], rest: Dict[str, Level] | None = None) -> NDArray[np.float64]:
+        """Every channel before the first sample."""
+
+    def checked(self, inputs: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
+        """Inputs of the right shape, or an error."""
+
+    def empty(self, *shape: int) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
+        """Room for a run."""
+
+    def wrapped(self, values: NDArray[np.float64], held: NDArray[np.int8]) -> CascadeRun:
+        """Arrays that are filled as a run."""
+
+    def run(
+        self,
+        inputs: NDArray[np.float64],
+        rest: Dict[str, Level] | None,
+        values: NDArray[np.float64],
+        held: NDArray[np.int8],
+    ) -> None:
+        """Fill them with one record's run."""
+
+
 def simulate_records(
-    cascade: Cascade, inputs: NDArray[np.float64], *, rest: Dict[str, Level] | None = None, workers: int = 2
+    cascade: Batched, inputs: NDArray[np.float64], *, rest: Dict[str, Level] | None = None, workers: int = 2
 ) -> CascadeRun:
     """Free runs of one cascade over independent records of equal length.
 
@@ -67,7 +109,7 @@ def simulate_records(
 
 
 def simulate_family(
-    cascades: Sequence[Cascade],
+    cascades: Sequence[Batched],
     inputs: NDArray[np.float64],
     *,
     rest: Dict[str, Level] | None = None,

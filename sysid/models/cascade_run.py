@@ -12,6 +12,9 @@ from sysid.errors import ChannelError
 from sysid.kernels.cascade_layout import HIGH, HIGH_CHANNEL, LOST, LOW, LOW_CHANNEL
 from sysid.traces import Channel, Trace
 
+Level = float | str
+"""A value at rest in the channel's unit, or the input whose first sample it is."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Activity:

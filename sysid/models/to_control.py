@@ -6,77 +6,60 @@ imported when a function is called, because it takes half a second.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models.arx import ARXModel
-from sysid.models.orthonormal_basis import Domain
-from sysid.models.transfer_function import TransferFunctionModel
+from sysid.models.mapping import Mapping
+
+Polynomials = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Numerator and denominator."""
+
+Matrices = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+"""A, B, C and D of a discrete state space in the channels' units."""
 
 
-def arx_transfer_function(model: ARXModel) -> Any:
-    """An ARX model as ``control.TransferFunction``.
+class Linear(Protocol):
+    """What a linear model tells of itself."""
+
+    @property
+    def mapping(self) -> Mapping:
+        """Its channels."""
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds."""
+
+    @property
+    def matrices(self) -> Matrices:
+        """The recursion that is run, from deviations to deviations."""
+
+
+def transfer_function(ratios: Sequence[Polynomials], mapping: Mapping, sample_time: float) -> Any:
+    """Ratios of polynomials as ``control.TransferFunction``.
 
     Args:
-        model: The model.
+        ratios: For each input the polynomials, in falling powers of ``z``, or of ``s``.
+        mapping: Its channels.
+        sample_time: Seconds; 0 in continuous time.
 
     Returns:
-        One row, one column per input, with the model's sample time.
+        One row, one column per input. The polynomials of many poles carry fewer digits than :func:`state_space`.
     """
     import control
 
-    F = np.concatenate([[1.0], -model.a])
-    B = [
-        np.concatenate([np.zeros(nk), b, [0.0] * (not len(b))]) for b, nk in zip(model.b, model.orders.nk, strict=True)
-    ]
-    pairs = [_in_powers_of_z(b, F) for b in B]
     return control.TransferFunction(
-        [[num for num, _ in pairs]],
-        [[den for _, den in pairs]],
-        model.sample_time,
-        inputs=list(model.mapping.inputs),
-        outputs=[model.mapping.output],
+        [[num for num, _ in ratios]],
+        [[den for _, den in ratios]],
+        sample_time,
+        inputs=list(mapping.inputs),
+        outputs=[mapping.output],
     )
 
 
-def transfer_function(model: TransferFunctionModel, *, pade_order: int = 3) -> Any:
-    """A transfer function as ``control.TransferFunction``.
-
-    Args:
-        model: The model.
-        pade_order: Order of the Padé approximation of a continuous model's dead time.
-
-    Returns:
-        One row, one column per input; discrete with the model's sample time, or continuous. The polynomials of many
-        poles carry fewer digits than :func:`state_space`.
-    """
-    import control
-
-    discrete = model.orders.domain is Domain.DISCRETE
-    nums, dens = [], []
-    for j, delay in enumerate(model.delays):
-        B, F = model.numerator(j), model.denominator(j)
-        if discrete:
-            num, den = _in_powers_of_z(np.concatenate([np.zeros(delay), B]), F)
-        else:
-            num, den = B[::-1], F[::-1]
-            if delay:
-                dead_num, dead_den = control.pade(delay * model.sample_time, pade_order)
-                num, den = np.convolve(num, dead_num), np.convolve(den, dead_den)
-        nums.append(num)
-        dens.append(den)
-    return control.TransferFunction(
-        [nums],
-        [dens],
-        model.sample_time if discrete else 0,
-        inputs=list(model.mapping.inputs),
-        outputs=[model.mapping.output],
-    )
-
-
-def state_space(model: ARXModel | TransferFunctionModel) -> Any:
+def state_space(model: Linear) -> Any:
     """A linear model as a discrete ``control.StateSpace`` in the channels' units: exactly the recursion that is run.
 
     Args:
@@ -87,44 +70,40 @@ def state_space(model: ARXModel | TransferFunctionModel) -> Any:
     """
     import control
 
-    A, B, C, D = _lag_matrices(model) if isinstance(model, ARXModel) else _matrices(model)
+    A, B, C, D = model.matrices
     return control.StateSpace(
         A, B, C, D, model.sample_time, inputs=list(model.mapping.inputs), outputs=[model.mapping.output]
     )
 
 
-Matrices = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+def delayed(ratio: Polynomials, seconds: float, order: int) -> Polynomials:
+    """A continuous transfer function behind a dead time.
+
+    Args:
+        ratio: In falling powers of ``s``.
+        seconds: The dead time.
+        order: Of the Padé approximation that stands for it.
+
+    Returns:
+        The two as one.
+    """
+    import control
+
+    if not seconds:
+        return ratio
+    num, den = control.pade(seconds, order)
+    return np.convolve(ratio[0], num), np.convolve(ratio[1], den)
 
 
-def _matrices(model: TransferFunctionModel) -> Matrices:
-    form = model.recursion
-    gain, scale = form.scaling.output_scale, np.array(form.scaling.input_scale)
-    return form.A, form.B / scale, gain * form.C[np.newaxis], gain * form.D[np.newaxis] / scale
+def in_powers_of_z(B: NDArray[np.float64], F: NDArray[np.float64]) -> Polynomials:
+    """Polynomials in ``1/z`` as polynomials in ``z`` of the same ratio, descending.
 
+    Args:
+        B: Numerator, the newest lag first.
+        F: Denominator, likewise.
 
-def _lag_matrices(model: ARXModel) -> Matrices:
-    """Delay lines of the output and of each input as a state, newest first."""
-    lags = model.orders.lags
-    lengths = [len(lags.output), *(max(per, default=0) for per in lags.inputs)]
-    first = np.concatenate([[0], np.cumsum(lengths)])
-    n, m = int(first[-1]), lags.n_inputs
-    C, D = np.zeros((1, n)), np.zeros((1, m))
-    C[0, : lengths[0]] = model.a
-    for j, (per, b) in enumerate(zip(lags.inputs, model.b, strict=True)):
-        for lag, weight in zip(per, b.tolist(), strict=True):
-            if lag == 0:
-                D[0, j] = weight
-            else:
-                C[0, first[1 + j] + lag - 1] = weight
-    A, B = np.eye(n, k=-1), np.zeros((n, m))
-    for j, (at, length) in enumerate(zip(first[:-1], lengths, strict=True)):
-        if length:
-            A[at] = C[0] if j == 0 else 0.0
-            B[at] = D[0] if j == 0 else np.eye(m)[j - 1]
-    return A, B, C, D
-
-
-def _in_powers_of_z(B: NDArray[np.float64], F: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Polynomials in ``1/z`` as polynomials in ``z`` of the same ratio, descending."""
+    Returns:
+        The two, of equal length.
+    """
     n = max(len(B), len(F))
     return np.pad(B, (0, n - len(B))), np.pad(F, (0, n - len(F)))

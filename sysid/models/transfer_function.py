@@ -20,6 +20,7 @@ from sysid.models.ranges import IntRange
 from sysid.models.realisation import Realisation, realise
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
+from sysid.models.to_control import Matrices, delayed, in_powers_of_z, transfer_function
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -275,9 +276,22 @@ class TransferFunctionModel(AbstractModel):
         Returns:
             One row of transfer functions, one column per input; see :mod:`sysid.models.to_control` for a state space.
         """
-        from sysid.models.to_control import transfer_function
+        discrete = self.orders.domain is Domain.DISCRETE
+        ratios = []
+        for j, delay in enumerate(self.delays):
+            B, F = self.numerator(j), self.denominator(j)
+            if discrete:
+                ratios.append(in_powers_of_z(np.concatenate([np.zeros(delay), B]), F))
+            else:
+                ratios.append(delayed((B[::-1], F[::-1]), delay * self.sample_time, pade_order))
+        return transfer_function(ratios, self.mapping, self.sample_time if discrete else 0.0)
 
-        return transfer_function(self, pade_order=pade_order)
+    @property
+    def matrices(self) -> Matrices:
+        """A discrete state space of it, in the channels' units."""
+        form = self.recursion
+        gain, scale = form.scaling.output_scale, np.array(form.scaling.input_scale)
+        return form.A, form.B / scale, gain * form.C[np.newaxis], gain * form.D[np.newaxis] / scale
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""
