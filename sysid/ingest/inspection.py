@@ -232,6 +232,8 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
 def _other(column: RawColumn, usual: int) -> str:
     if column.problem is not None:
         return column.problem.what
+    if len(column.values) == usual:
+        return "stands beside the record, not in it"
     return f"{len(column.values)} samples, where the record has {usual}"
 
 

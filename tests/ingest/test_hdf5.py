@@ -33,3 +33,45 @@ def test_hdf5_tables_give_a_column_per_field(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "run.h5", "w") as file:
         file["log"] = table
     assert read_table(tmp_path / "run.h5").find("u").values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_attributes_say_sample_time_and_names_of_columns(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        item = file.create_dataset("x", data=np.column_stack([TIME, VOLT]))
+        item.attrs["columns"], item.attrs["fs"] = ["u", "y"], 20.0
+    table = read_table(tmp_path / "run.h5")
+    assert (table.names, table.step) == (("u", "y"), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "expected"),
+    [
+        ({"scale_factor": 0.5}, [1.0, 1.5, -0.5, 4.0]),
+        ({"add_offset": 10.0}, [12.0, 13.0, 9.0, 18.0]),
+        ({"missing_value": np.int16(-1)}, [2.0, 3.0, np.nan, 8.0]),
+        ({"_FillValue": np.int16(-1), "scale_factor": 0.1, "add_offset": 1.0}, [1.2, 1.3, np.nan, 1.8]),
+        ({"valid_range": np.array([0, 7], dtype="i2")}, [2.0, 3.0, np.nan, np.nan]),
+        ({"valid_min": np.int16(3)}, [np.nan, 3.0, np.nan, 8.0]),
+    ],
+    ids=lambda given: "+".join(given) if isinstance(given, dict) else "",
+)
+def test_packed_numbers_are_unpacked(tmp_path: Path, attributes: dict[str, object], expected: list[float]) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["y"] = np.array([2, 3, -1, 8], dtype=np.int16)
+        file["y"].attrs.update(attributes)
+    np.testing.assert_allclose(read_table(tmp_path / "run.h5").find("y").values, expected, rtol=1e-12)
+
+
+def test_units_of_cf_and_time_since_a_date(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "run.nc", "w") as file:
+        file["t"], file["q"] = TIME / 60.0, VOLT
+        file["t"].attrs["units"], file["q"].attrs["units"] = "minutes since 2000-01-01 00:00", "kg m-3 s-1"
+    table = read_table(tmp_path / "run.nc")
+    assert (table.find("t").unit, table.find("q").unit) == ("min", "kg * m**-3 * s**-1")
+    assert "t: minutes since 2000-01-01 00:00" in table.notes

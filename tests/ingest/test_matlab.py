@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from sysid.errors import ReaderError
 from sysid.ingest import read_table
 from tests.ingest.recordings import PIPE, TIME, VOLT, mark_as_mat73
+from tests.ingest.zoo_binary import U, Y, cells, iddata, mat, modelica
 
 
 def _opaque_mat5(path: Path) -> None:
@@ -87,3 +89,62 @@ def test_a_matrix_becomes_numbered_columns(tmp_path: Path) -> None:
     table = read_table(tmp_path / "run.mat")
     assert table.names == ("t", "p_1", "p_2")
     np.testing.assert_array_equal(table.find("p_2").values, VOLT)
+
+
+def test_a_sample_time_in_a_cell_is_that_of_its_record(tmp_path: Path) -> None:
+    mat("5", u=cells(U, U[:12]), y=cells(Y, Y[:12]), Ts=cells(0.1, 0.2))(tmp_path / "run.mat")
+    assert [record.table.step for record in read_table(tmp_path / "run.mat").records] == [0.1, 0.2]
+
+
+def test_an_iddata_is_taken_by_itself_and_what_stands_beside_it_stays_there(tmp_path: Path) -> None:
+    mat("5", z=iddata(U[:, None], Y[:, None]), t=0.5 * np.arange(20.0), extra=2.0 * U)(tmp_path / "run.mat")
+    table = read_table(tmp_path / "run.mat")
+    assert (table.names, table.time, table.step) == (("z.u1", "z.y1"), None, 0.1)
+    assert (table.find("z.u1").unit, table.find("z.y1").unit) == ("A", "V")
+    np.testing.assert_array_equal(table.find("extra").values, 2.0 * U)
+
+
+@pytest.mark.parametrize(
+    ("more", "time", "step"),
+    [
+        ({"TimeUnit": "minutes"}, None, 6.0),
+        ({"Ts": cells(0.1)}, None, 0.1),
+        ({"Tstart": 5.0}, [5.0, 5.1], None),
+        ({"SamplingInstants": 0.25 * np.arange(20.0)[:, None]}, [0.0, 0.25], None),
+    ],
+    ids=["minutes", "in a cell", "start", "instants"],
+)
+def test_the_clock_of_an_iddata(
+    tmp_path: Path, more: dict[str, Any], time: list[float] | None, step: float | None
+) -> None:
+    mat("5", z=iddata(U[:, None], Y[:, None], **more))(tmp_path / "run.mat")
+    table = read_table(tmp_path / "run.mat")
+    assert table.step == step
+    assert time is None or table.find("time").values[:2].tolist() == pytest.approx(time)
+
+
+def test_cells_beside_vectors_leave_them_readable(tmp_path: Path) -> None:
+    mat("5", t=TIME, u=VOLT, info=cells("rig 3", np.arange(3.0)), more=cells({"a": 1.0}, np.arange(2.0)))(
+        tmp_path / "run.mat"
+    )
+    table = read_table(tmp_path / "run.mat")
+    np.testing.assert_array_equal(table.find("u").values, VOLT)
+    with pytest.raises(ReaderError, match=r"(?s)another length.*got: +3 samples"):
+        table.find("info{2}")
+
+
+def test_what_a_case_asks_for_is_compared_and_nothing_else(tmp_path: Path) -> None:
+    mat("5", uEst=U, yEst=Y, uVal=U[:12], yVal=Y[:12], Ts=0.1)(tmp_path / "run.mat")
+    table = read_table(tmp_path / "run.mat")
+    assert len(table.narrowed(["uVal", "yVal"])) == 12
+    with pytest.raises(ReaderError, match=r"(?s)another length.*columns: \{\.\.\.\} of the case"):
+        table.narrowed(["uEst", "yVal"])
+
+
+def test_a_simulation_result_gives_variables_with_units_aliases_and_parameters(tmp_path: Path) -> None:
+    modelica("binTrans")(tmp_path / "run.mat")
+    table = read_table(tmp_path / "run.mat")
+    assert table.names == ("time", "rig.u", "rig.y", "rig.minus_y", "k")
+    assert [column.unit for column in table.columns] == ["s", "V", "m", "m", None]
+    np.testing.assert_allclose(table.find("rig.minus_y").values, -Y)
+    assert (set(table.find("k").values), table.find("k").aside) == ({0.2}, "a parameter, 0.2 throughout")

@@ -145,11 +145,18 @@ def _table(path: Path, sheet: str, cells: NDArray[Any]) -> RawTable:
         )
     used = np.flatnonzero(filled[first:].any(axis=0))
     headers, titles = _headers(cells, int(first), used)
-    last = int(np.flatnonzero(filled[:, used].any(axis=1)).max()) + 1
+    # A line below the numbers has text where they have none: the table ends above it.
+    texts = (filled & ~numbers)[:, numbers[first]].any(axis=1)
+    last = int(np.flatnonzero(filled[:, used].any(axis=1) & ~texts).max()) + 1
+    below = int(filled[last:].any(axis=1).sum())
     columns = tuple(
         _column(header, cells[first:last, at], where=where) for header, at in zip(headers, used, strict=True)
     )
-    notes = (f"{titles} lines of titles passed over",) if titles else ()
+    notes = tuple(
+        f"{count} {'line' if count == 1 else 'lines'} {where_} the table passed over"
+        for count, where_ in ((titles, "above"), (below, "below"))
+        if count
+    )
     return RawTable(
         source=path,
         reader="excel",

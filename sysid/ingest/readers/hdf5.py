@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_claim
-from sysid.ingest.readers.leaves import Leaf
+from sysid.ingest.readers.leaves import Leaf, step_in
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable
@@ -25,6 +26,7 @@ from sysid.units import Reference
 
 _SINCE = re.compile(r"\s*(\w+)\s+since\s+(.+)", re.IGNORECASE | re.DOTALL)
 _POWERS = re.compile(r"(?=.*\d)[A-Za-z]+(?:-?[1-9])?(?: [A-Za-z]+(?:-?[1-9])?)*")
+_COLUMN_NAMES = ("columns", "column_names", "channel_names", "channels", "names")
 _CLASSIC = b"CDF"
 _DAMAGES = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
 """What h5py raises on damaged files."""
@@ -152,12 +154,15 @@ def _dataset(name: str, item: Any, notes: list[str]) -> Any:
     if item.dtype.kind not in "buif":
         return None
     attributes = {key: item.attrs[key] for key in item.attrs if _is_said(key)}
-    return _leaf(name, np.asarray(item[()]), attributes, notes)
+    leaf = _leaf(name, np.asarray(item[()]), attributes, notes)
+    names = next((np.ravel(attributes[key]) for key in _COLUMN_NAMES if key in attributes), ())
+    texts = [_text(text) for text in names]
+    return leaf if None in texts else replace(leaf, names=tuple(map(str, texts)))
 
 
 def _is_said(key: str) -> bool:
     # Others may be references that only the library that wrote them follows.
-    return key in {
+    return key in _COLUMN_NAMES or step_in(key, 1.0) is not None or key in {
         "units", "unit", "description", "long_name", "reference", "scale_factor", "add_offset", "_FillValue",
         "missing_value", "valid_min", "valid_max", "valid_range", "standard_name", "_Unsigned",
     }  # fmt: skip
@@ -200,6 +205,7 @@ def _leaf(name: str, array: NDArray[Any], attributes: Mapping[str, Any], notes: 
         unit=unit,
         reference=Reference(reference) if reference in {item.value for item in Reference} else None,
         description=_text(attributes.get("description")) or _text(attributes.get("long_name")) or "",
+        step=next((step for key, value in attributes.items() if (step := step_in(key, _number(value)))), None),
     )
 
 

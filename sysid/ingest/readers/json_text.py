@@ -13,7 +13,7 @@ import numpy as np
 from sysid.errors import ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import too_large
-from sysid.ingest.readers.leaves import Leaf
+from sysid.ingest.readers.leaves import Leaf, number_of, step_in
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable
@@ -126,6 +126,7 @@ def _signal(node: Mapping[str, Any]) -> Leaf | None:
         values=values,
         unit=unit if isinstance(unit, str) and unit else None,
         description=about if isinstance(about, str) else "",
+        step=next((step for key, value in node.items() if (step := step_in(str(key), number_of(value)))), None),
     )
 
 

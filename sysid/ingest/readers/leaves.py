@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 from sysid.units import Reference
 
+_STEPS = {"ts", "dt", "sample_time", "sampletime", "sampling_time", "samplingtime", "sample_period", "sampling_period"}
+_STEPS |= {"samplingperiod", "sampleperiod", "sampling_interval", "sample_interval", "wf_increment", "t_s", "delta_t"}
+_RATES = {"fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "samplingrate", "sampling_frequency"}
+_RATES |= {"sample_frequency", "samplingfrequency", "samplefrequency", "sfreq"}
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Leaf:
@@ -23,6 +28,7 @@ class Leaf:
         reference: As found in the file.
         description: As found in the file.
         names: Names of its columns, where the file says them.
+        step: Sample time in seconds, where the file says one of it alone.
         aside: Why it is no channel unless it is asked for.
         problem: Why it cannot be used.
     """
@@ -32,6 +38,7 @@ class Leaf:
     reference: Reference | None = None
     description: str = ""
     names: tuple[str, ...] = ()
+    step: float | None = None
     aside: str = ""
     problem: ReaderError | None = None
 
@@ -100,6 +107,22 @@ def number_of(value: Any) -> float | None:
     if array is None or np.size(array) != 1 or np.asarray(array).dtype.kind not in "buif":
         return None
     return float(np.asarray(array).reshape(-1)[0])
+
+
+def step_in(name: str, number: float | None) -> float | None:
+    """The sample time that a number of a certain name says.
+
+    Args:
+        name: For example ``"Ts"`` or ``"fs"``.
+        number: The number.
+
+    Returns:
+        Seconds, or ``None`` if the name is not known for one or the number cannot be one.
+    """
+    if number is None or not (number > 0.0 and np.isfinite(number)):
+        return None
+    plain = name.casefold().strip()
+    return number if plain in _STEPS else 1.0 / number if plain in _RATES else None
 
 
 def texts_of(value: Any) -> tuple[str, ...]:

@@ -78,6 +78,7 @@ def records_of(table: RawTable, found: list[Found], *, separator: str, head: str
         Two or more records, or none.
     """
     usable = [item for item in found if item.column.problem is None]
+    usable = [item for item in usable if item.whole] or usable
     groups = _by_group(table, usable, separator)
     if len(groups) > 1:
         return tuple(

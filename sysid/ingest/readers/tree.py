@@ -12,21 +12,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
 from sysid.ingest.headers import parse_header
 from sysid.ingest.options import FileOptions
 from sysid.ingest.readers.forms import understood
-from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of
+from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, step_in
 from sysid.ingest.readers.records import Found, joined, records_of
 from sysid.ingest.table import RawTable, array_column, by_length, recognise_time
 
-_STEPS = {"ts", "dt", "sample_time", "sampletime", "sampling_time", "samplingtime", "sample_period", "sampling_period"}
-_STEPS |= {"samplingperiod", "sampleperiod", "sampling_interval", "sample_interval", "wf_increment", "t_s", "delta_t"}
-_RATES = {"fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "samplingrate", "sampling_frequency"}
-_RATES |= {"sample_frequency", "samplingfrequency", "samplefrequency", "sfreq"}
 _DEEPEST = 40
 
 
@@ -68,8 +63,11 @@ def table_of(
     found = list(walk.columns(shown, (), outer))
     found, head = _without_common_prefix(found, separator) if short else (found, "")
     named = [walk.named(item) for item in found]
-    alike, others = by_length([item.column for item in named])
-    steps = {item.step for item in named if len(item.column.values) == (len(alike[0].values) if alike else 0)}
+    # A saved record is taken by itself: whatever stands beside it may have another clock.
+    inside = [item for item in named if item.whole] or named
+    alike, others = by_length([item.column for item in inside])
+    others += tuple(item.column for item in named if item not in inside)
+    steps = {item.step for item in inside if len(item.column.values) == (len(alike[0].values) if alike else 0)}
     time = recognise_time(alike)
     step = steps.pop() if len(steps) == 1 and time is None else None
     turned = [f"{name}: its rows are taken as channels, as it is {r} x {c}" for name, (r, c) in walk.turned.items()]
@@ -150,17 +148,17 @@ class _Walk:
     def __post_init__(self) -> None:
         self.turned: dict[str, tuple[int, int]] = {}
 
-    def step_beside(self, node: Any, outer: float | None) -> float | None:
-        """The sample time that stands in a mapping, else the one from further out."""
+    def step_beside(self, node: Any, outer: float | None, index: int | None = None) -> float | None:
+        """The sample time that stands in a mapping, else the one from further out.
+
+        In a cell array it is the one of the element ``index``, or that of all where they are the same.
+        """
         if not isinstance(node, Mapping):
             return outer
         for key, value in node.items():
-            name, number = str(key).casefold().strip(), number_of(value)
-            if number is not None and number > 0.0 and np.isfinite(number):
-                if name in _STEPS:
-                    return number
-                if name in _RATES:
-                    return 1.0 / number
+            step = step_in(str(key), _of_element(value, index))
+            if step is not None:
+                return step
         return outer
 
     def columns(self, node: Any, path: tuple[str, ...], step: float | None, *, whole: bool = False) -> Iterator[Found]:
@@ -191,9 +189,8 @@ class _Walk:
             name = str(key)
             if name in cells:
                 for index, part in cells[name]:
-                    yield from self._leaf(
-                        name, part, path, step, index=index, whole=whole, lengths=lengths, units=units
-                    )
+                    own = self.step_beside(node, step, index)
+                    yield from self._leaf(name, part, path, own, index=index, whole=whole, lengths=lengths, units=units)
             elif name in leaves:
                 yield from self._leaf(name, leaves[name], path, step, whole=whole, lengths=lengths, units=units)
             elif isinstance(value, Mapping | list):
@@ -228,7 +225,7 @@ class _Walk:
                 full, values, where=self.where, unit=unit, reference=reference, description=leaf.description
             )
             column = replace(column, problem=column.problem or leaf.problem, aside=leaf.aside)
-            yield Found(path=path, stem=stem, cell=index, column=column, step=step, whole=whole)
+            yield Found(path=path, stem=stem, cell=index, column=column, step=leaf.step or step, whole=whole)
 
     def _standing(self, name: str, array: NDArray[Any], lengths: set[int]) -> NDArray[Any]:
         """A matrix with its channels in columns."""
@@ -254,6 +251,15 @@ def _cell(value: Any) -> list[tuple[int, Leaf]] | None:
         return None
     parts = [(index, leaf) for index, item in enumerate(value) if (leaf := leaf_of(item)) is not None]
     return parts or None
+
+
+def _of_element(value: Any, index: int | None) -> float | None:
+    if not isinstance(value, list):
+        return number_of(value)
+    numbers = [number_of(item) for item in value]
+    if index is not None and index < len(numbers):
+        return numbers[index]
+    return numbers[0] if len(set(numbers)) == 1 else None
 
 
 def _units_beside(node: Mapping[str, Any]) -> dict[str, str]:
