@@ -223,8 +223,10 @@ def check(model: type[Model], data: Mapping[str, Any], *, where: object) -> Mode
 def _config_error(error: ValidationError, model: type[BaseModel], origins: Origins) -> ConfigError:
     # A misspelt field usually causes the "missing" beside it: name the cause first.
     found = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
-    first, others = found[0], found[1:]
+    first = found[0]
     loc = first["loc"]
+    # What holds the first one, such as a list that is one too short without it, is not at fault itself.
+    others = [item for item in found[1:] if item["loc"] != loc[: len(item["loc"])]]
     what: str
     expected: object
     got: object

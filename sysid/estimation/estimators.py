@@ -243,7 +243,7 @@ def estimator_of(structure: AbstractStructure) -> Estimator:
             where="structure",
             expected=", ".join(row.structure.__name__ for row in ESTIMATORS.values()),
             got=type(structure).__name__,
-            remedy="choose one of these",
+            remedy="choose one of these; several outputs as one network: sysid.estimation.fit_vector_narx",
         )
     return found
 

@@ -24,7 +24,6 @@ from sysid.estimation.least_squares.checkpoints import Checkpoints
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.termination import Termination
-from sysid.estimation.networks.gpu_starts import Scout
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import AbstractProvider
@@ -64,7 +63,6 @@ class Race:
         on_progress: Called after every iteration, from the threads that train.
         resume: Where the first start was put aside; ``None`` to begin it.
         prelude: Where a random start is drawn and trained one step ahead before anything else; ``None`` for none.
-        curriculum: Providers over shorter horizons, which a random start is trained on first, in this order.
     """
 
     training: Training
@@ -78,14 +76,11 @@ class Race:
     on_progress: Callable[[FitProgress], None]
     resume: Checkpoint | None = None
     prelude: StepSamples | None = None
-    curriculum: Sequence[AbstractProvider] = ()
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
     """Where the runs of this race, and of others of the same fit, are kept."""
     name: str = ""
     """Of the race, where a fit has several."""
     stop: threading.Event = field(default_factory=threading.Event)
-    scouted: Sequence[Scout] = ()
-    """Starts that were found among many; by default each is drawn."""
     iterations: dict[int, int] = field(default_factory=dict)
     """Iterations done by each start, for the progress bar."""
 
@@ -227,11 +222,6 @@ def _advance(race: Race, number: int, before: Candidate | None, share: float, se
         seed, theta, centre = _begin(race, number)
         if race.prelude is not None and seed is not None:
             theta = _prelude(race, race.prelude, number, seed, centre)
-        for horizon, provider in enumerate(race.curriculum):
-            first = replace(engine, termination=Termination(max_iterations=training.curriculum_iterations))
-            first = replace(first, on_iteration=lambda _: None)
-            prior = first_prior(training, race.layout, provider, theta, centre)
-            theta = keep.minimise(f"{run}, horizon {horizon}", first, provider, theta, prior).theta
         prior = first_prior(training, race.layout, race.provider, theta, centre)
         solution = keep.minimise(run, engine, race.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
@@ -308,8 +298,6 @@ def _begin(race: Race, number: int) -> tuple[int | None, NDArray[np.float64], ND
     centre = _in_basis(race, race.layout.centre())
     if number == 0 and race.initial is not None:
         return None, _in_basis(race, race.initial), centre
-    if race.scouted:
-        return race.scouted[number].seed, race.scouted[number].theta, centre
     seed = race.training.seed + number
     return seed, race.layout.draw(np.random.default_rng(seed), centre), centre
 

@@ -20,8 +20,6 @@ from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks import ensemble as committee
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
-from sysid.estimation.networks.gpu_recursion import device_named
-from sysid.estimation.networks.gpu_starts import Patrol, Scout
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
 from sysid.estimation.networks.pretraining import StepSamples
@@ -97,8 +95,6 @@ def fit_narx(
         checkpoints=checkpoints_of(on_progress),
         resume=resume,
         prelude=_prelude(training, task, experiments),
-        scouted=_scouted(training, task),
-        curriculum=[task.within(horizon) for horizon in training.curriculum],
     )
     tasks = _raced(race, task, experiments)
     on_checkpoint(Checkpoint.of(choose(list(tasks), training.choose_by).chosen.solution.state))
@@ -156,10 +152,6 @@ class _Task(committee.Task):
         provider = RebasedProvider(inner=inner, to_plain=to_plain)
         return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider, inner=inner)
 
-    def within(self, horizon: int) -> RebasedProvider:
-        """Residuals of free runs over so many samples."""
-        return RebasedProvider(inner=replace(self.inner, horizon=horizon), to_plain=self.to_plain)
-
 
 def _raced(race: starts.Race, task: _Task, experiments: Sequence[Experiment]) -> dict[starts.Candidate, _Task]:
     """Every start at every look with what it minimises; those that do without some inputs race among themselves."""
@@ -177,7 +169,6 @@ def _raced(race: starts.Race, task: _Task, experiments: Sequence[Experiment]) ->
                 initial=None,
                 resume=None,
                 prelude=_prelude(view.training, part, experiments),
-                curriculum=[part.within(horizon) for horizon in race.training.curriculum],
             )
         found = starts.run(own)
         named = [replace(one, number=one.number + view.first, without=view.without) for one in found]
@@ -205,21 +196,6 @@ def _with_committee(
         return {}
     task = _Task.of(found[0].model, experiments, race.training)
     return {committee.seated(race, *found, task): task}
-
-
-def _scouted(training: Training, task: _Task) -> list[Scout]:
-    """The best of the scouts as starts; none where none are asked for, or no device is there to send them out on."""
-    if not training.scouts or (training.device == "auto" and device_named("auto") == "cpu"):
-        return []
-    patrol = Patrol(
-        provider=task.inner,
-        to_plain=task.to_plain,
-        layout=task.layout,
-        centre=np.asarray(np.linalg.solve(task.to_plain, task.layout.centre())),
-        regularisation=training.regularisation,
-        device=training.device,
-    )
-    return patrol.scouts(range(training.seed, training.seed + training.scouts))[: training.starts]
 
 
 def _prelude(training: Training, task: _Task, experiments: Sequence[Experiment]) -> StepSamples | None:

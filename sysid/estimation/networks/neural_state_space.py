@@ -22,7 +22,7 @@ from sysid.estimation.result import FitResult, Loop
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start
 from sysid.traces import Trace
 
-LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "curriculum", "scouts", "committee", "leave_out")
+LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "committee", "leave_out")
 """Options of a training that concern lagged regressors."""
 
 

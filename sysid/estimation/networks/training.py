@@ -11,7 +11,6 @@ from sysid.estimation.result import Loop
 CHOICES = {
     "choose_by": ("selection", "evidence"),
     "basis": ("levels and rates", "plain"),
-    "device": ("auto", "cpu", "cuda"),
 }
 """Options that are words, and what they may be; the first is a good example."""
 
@@ -45,19 +44,11 @@ class Training:
         prelude_iterations: Iterations of the prelude.
         stride: Every so-manieth sample counts in the loss. Residuals of a free run are correlated over tens of samples:
             a few of them say nearly as much as all, and the price of the normal equations falls with them.
-        curriculum: Horizons in samples over which a closed-loop start is trained before the whole record, such as
-            ``[1, 20, 200]``: after each horizon the free run begins anew from measured output. It helps the typical
-            start more than the best of many (``docs/choosing-lags.md`` has the figures).
-        curriculum_iterations: Iterations of each horizon; they come before those of ``max_iterations``.
-        scouts: Random starts that a graphics processor fits at once for a few iterations (``scouting.py``); the best of
-            them are the starts. 0 for none.
         committee: Votes that unite the candidates of the race into one network whose one-step map is the mean of theirs
             (``committee.py``), elected on the selection traces; 1 for none. Each member adds its neurons.
         leave_out: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs and
             networks that do without each of the sets (``views.py``), for a committee whose members differ in what they
             rely on. All see everything by default.
-        device: Where scouts run: ``auto`` sends them out only where there is a graphics processor, ``cuda`` insists on
-            one, ``cpu`` does without, slowly.
     """
 
     loop: Loop = Loop.CLOSED
@@ -75,12 +66,8 @@ class Training:
     prelude: int = 0
     prelude_iterations: int = 300
     stride: int = 1
-    curriculum: tuple[int, ...] = ()
-    curriculum_iterations: int = 20
-    scouts: int = 0
     committee: int = 1
     leave_out: tuple[tuple[str, ...], ...] = ()
-    device: str = "auto"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loop", Loop(self.loop))
@@ -95,42 +82,23 @@ class Training:
                     got=repr(getattr(self, name)),
                     remedy=f"write for example {name}: {choices[0]}",
                 )
-        object.__setattr__(self, "curriculum", tuple(self.curriculum))
-        if self.curriculum and (self.loop is Loop.OPEN or min(self.curriculum) < 1):
-            raise ConfigError(
-                "not a curriculum",
-                where="curriculum",
-                expected="horizons of 1 sample or more, for a closed loop",
-                got=f"{list(self.curriculum)} for the {self.loop.value} loop",
-                remedy="write for example curriculum: [1, 20, 200] beside loop: closed",
-            )
         for name in (
             "max_iterations",
             "patience",
             "starts",
             "workers",
-            "curriculum_iterations",
             "prelude_iterations",
             "stride",
             "committee",
         ):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        if self.scouts and (self.scouts < self.starts or self.loop is Loop.OPEN or self.prelude or self.stride != 1):
-            raise ConfigError(
-                "scouts cannot be sent out with these options",
-                where="scouts",
-                expected="at least as many scouts as starts, in closed loop, without a prelude or a stride",
-                got=f"{self.scouts} scouts for {self.starts} starts, {self.loop.value} loop, prelude {self.prelude}, "
-                f"stride {self.stride}",
-                remedy="leave scouts out, or the other option",
-            )
-        if self.leave_out and (self.starts <= len(self.leave_out) or self.scouts):
+        if self.leave_out and self.starts <= len(self.leave_out):
             raise ConfigError(
                 "not every set of inputs has a start",
                 where="leave_out",
-                expected=f"{1 + len(self.leave_out)} starts or more, none of them scouted",
-                got=f"{self.starts} starts, {self.scouts} scouts",
+                expected=f"{1 + len(self.leave_out)} starts or more",
+                got=f"{self.starts} starts",
                 remedy="raise starts, or leave out fewer sets",
             )
         if self.prelude < 0:

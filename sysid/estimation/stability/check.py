@@ -214,7 +214,9 @@ class FreeRunCheck(AbstractStabilityCheck):
         if found is None:
             return fit
         status = fit.status if found.stable else _unstable(fit.status)
-        return replace(fit, status=status, stability=found.to_dict(), notes=(*fit.notes, found.sentence))
+        attempts = tuple(replace(one, stable=found.stable) if one.chosen else one for one in fit.attempts)
+        notes = (*fit.notes, found.sentence)
+        return replace(fit, status=status, stability=found.to_dict(), attempts=attempts, notes=notes)
 
     def _of(self, model: AbstractModel) -> Stability | None:
         if self.source is None:

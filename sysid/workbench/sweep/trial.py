@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from sysid.errors import SysidError
 from sysid.estimation import FitResult, StabilityOptions, Training, estimators
-from sysid.estimation.estimators import Estimator, Options, estimator_of
+from sysid.estimation.estimators import ESTIMATORS, Estimator, Options, estimator_of
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
@@ -154,7 +154,8 @@ def _checked(bench: Bench, row: Estimator, training: Options | None) -> Stabilit
 
 def _options(job: Job) -> dict[str, Any] | None:
     # One start at a time in one thread: processes are what runs side by side.
-    return {**job.training, "workers": 1} if job.training else None
+    side_by_side = hasattr(ESTIMATORS[job.structure["kind"]].training, "workers")
+    return {**job.training, **({"workers": 1} if side_by_side else {})} if job.training else None
 
 
 def _shortened(traces: TraceSet, share: float) -> TraceSet:

@@ -135,7 +135,6 @@ def test_something_has_to_be_left_to_see():
         views(Training(starts=2, leave_out=[["rumour", "pump"]]), BOTH)
 
 
-@pytest.mark.parametrize("fields", [{"starts": 1}, {"starts": 2, "scouts": 8}], ids=["too few starts", "scouts"])
-def test_every_set_needs_a_start(fields):
+def test_every_set_needs_a_start():
     with pytest.raises(ConfigError, match="not every set of inputs has a start"):
-        Training(leave_out=[["rumour"]], **fields)
+        Training(leave_out=[["rumour"]], starts=1)

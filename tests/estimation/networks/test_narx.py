@@ -112,14 +112,6 @@ def test_an_initial_fit_is_where_the_first_start_begins():
     assert fit.seed is None
 
 
-def test_a_curriculum_comes_before_the_whole_record():
-    training = Training(curriculum=[1, 10, 50], curriculum_iterations=15, max_iterations=1)
-    with_it = fit_narx([tank(1)], TANK, SMALL, training)
-    without = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=1))
-    assert with_it.history["mse"][0] < 0.1 * without.history["mse"][0]
-    assert with_it.history["iteration"].tolist() == [0.0, 1.0]
-
-
 def test_an_initial_fit_that_is_not_contained_is_refused():
     first = fit_narx([tank(1)], TANK, SMALL, Training(loop="open", max_iterations=2))
     with pytest.raises(ConfigError, match="not contained"):
@@ -203,8 +195,6 @@ def test_progress_ends_at_the_whole():
         {"basis": "fourier"},
         {"starts": 0},
         {"max_iterations": 0},
-        {"curriculum": [0, 5]},
-        {"curriculum": [5], "loop": "open"},
     ],
     ids=lambda fields: next(iter(fields)),
 )
