@@ -25,6 +25,7 @@ from sysid.reporting.records import (
     read_document,
     write_record,
 )
+from sysid.reporting.sweep.record import SweepSummary
 from sysid.traces import Role
 
 
@@ -251,6 +252,7 @@ class Results(RunResults):
     best: BestRecord | None = Field(default=None, description="Which fit was chosen.")
     linearity: LinearityRecord | None = Field(default=None, description="Whether a linear model is enough.")
     published: str | None = Field(default=None, description="Reference table to set beside ours.")
+    sweep: SweepSummary | None = Field(default=None, description="How the fits were found, where a sweep found them.")
 
     @property
     def best_fit(self) -> FitRecord | None:

@@ -14,6 +14,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.reporting import read_results, write_report
+from sysid.validation.metrics import MERITS
 
 PAIR = ("ARX", "NARX free run")
 VOID = {"meta", "link", "br", "img", "input", "hr", "use", "path", "rect"}
@@ -170,7 +171,7 @@ def test_every_figure_of_the_chosen_fit_is_the_one_in_results_json(page: Page, r
     rows = page.table(f"{best.name}, {kind.replace('_', ' ')}")
     for row in rows[1:]:
         case = getattr(best.cases[row[0]["text"]], kind)
-        assert [cell["value"] for cell in row[2:]] == [case.mse, case.nrmse_fit, case.max_abs_error, case.r]
+        assert [cell["value"] for cell in row[2:]] == [getattr(case, merit.key) for merit in MERITS]
 
 
 def test_run_times_are_those_of_results_json_in_milliseconds(page: Page, run_folder: Path) -> None:

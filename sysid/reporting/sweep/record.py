@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from sysid.atomic import replacing
-from sysid.errors import ConfigError
-from sysid.reporting.records import Number
+from sysid.reporting.records import Number, Record, parse_record, read_document, write_record
 
 SCHEMA_VERSION: Final = 1
 SWEEP_FILE: Final = "sweep.json"
@@ -21,13 +20,7 @@ TRACES: Final = {"selection": "the selection traces", "estimation": "the estimat
 """What chooses, in words, by ``choose_on``."""
 
 
-class _Record(BaseModel):
-    """Frozen; keys from a later release are kept."""
-
-    model_config = ConfigDict(frozen=True, extra="allow", protected_namespaces=())
-
-
-class TrialCase(_Record):
+class TrialCase(Record):
     """One trial on one case."""
 
     role: str = Field(description="What the case is used for.")
@@ -36,7 +29,7 @@ class TrialCase(_Record):
     run_time_s: Number = Field(description="Seconds of the free run: least of the repeats.")
 
 
-class Trial(_Record):
+class Trial(Record):
     """One point that was tried."""
 
     number: int = Field(ge=1, description="Its place in the grid.")
@@ -122,7 +115,27 @@ FIGURES: Final[dict[str, Figure]] = {
 """The figures that a sweep can minimise, choose by, and show."""
 
 
-class SweepRecord(_Record):
+class SweepSummary(Record):
+    """What a sweep came to, in results.json; every trial is in sweep.json."""
+
+    file: str = Field(default=SWEEP_FILE, description="Where the trials are, relative to the run folder.")
+    points: int = Field(description="Points of the ranges, whether all were tried or not.")
+    trials: int = Field(description="Points that were tried.")
+    in_full: int = Field(description="Trials that were trained to the end and may be chosen.")
+    dropped: int = Field(description="Trials that were dropped before their end.")
+    unusable: dict[str, int] = Field(default={}, description="Trials that may not be chosen, by status.")
+    choose_by: str = Field(description="Figure that chose the winner; less is better.")
+    choose_on: str = Field(description="Traces that chose: selection, estimation or cases.")
+    winner: int | None = Field(description="Number of the trial that was chosen.")
+    label: str = Field(default="", description="Short form of the winner's structure.")
+    least: Number = Field(default=math.nan, description="The winner's figure.")
+    unit: str = Field(default="", description="Of that figure.")
+    front: list[int] = Field(default=[], description="Numbers of the trials that no other beats in every objective.")
+    wall_s: Number = Field(description="Seconds from the first trial to the last, of all sessions together.")
+    workers: int = Field(description="Processes that worked on it.")
+
+
+class SweepRecord(Record):
     """All of sweep.json."""
 
     schema_version: int = Field(default=SCHEMA_VERSION, description="Of this file.")
@@ -172,6 +185,28 @@ class SweepRecord(_Record):
         unit = figure.unit.format(unit=self.unit)
         return f"{figure.words} [{unit}]" if unit else figure.words
 
+    @property
+    def summary(self) -> SweepSummary:
+        """What it came to."""
+        winner = self.winning
+        unusable = Counter(trial.status for trial in self.trials if not trial.usable and trial.dropped_at is None)
+        return SweepSummary(
+            points=self.points,
+            trials=len(self.trials),
+            in_full=len(self.tried_in_full),
+            dropped=sum(trial.dropped_at is not None for trial in self.trials),
+            unusable=dict(sorted(unusable.items())),
+            choose_by=self.choose_by,
+            choose_on=self.choose_on,
+            winner=self.winner,
+            label="" if winner is None else winner.label,
+            least=math.nan if winner is None else self.figure(winner, self.choose_by),
+            unit=FIGURES[self.choose_by].unit.format(unit=self.unit),
+            front=[trial.number for trial in self.front()],
+            wall_s=self.wall_s,
+            workers=self.workers,
+        )
+
     def front(self, names: list[str] | None = None) -> list[Trial]:
         """The trials that no other beats in every one of some figures.
 
@@ -211,26 +246,9 @@ def read_sweep(folder: Path) -> SweepRecord:
     Raises:
         ConfigError: If there is none, it is damaged, or it was written by a newer release.
     """
-    path = Path(folder) / SWEEP_FILE
-    try:
-        record = SweepRecord.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError) as error:
-        raise ConfigError(
-            "the record of the sweep cannot be read",
-            where=path,
-            expected=f"what sysid sweep writes, schema_version up to {SCHEMA_VERSION}",
-            got=str(error).splitlines()[0],
-            remedy="run the sweep again; it takes its finished trials from the folder",
-        ) from error
-    if record.schema_version > SCHEMA_VERSION:
-        raise ConfigError(
-            "the sweep was written by a newer release",
-            where=path,
-            expected=f"schema_version up to {SCHEMA_VERSION}",
-            got=record.schema_version,
-            remedy="upgrade the workbench",
-        )
-    return record
+    path, again = Path(folder) / SWEEP_FILE, "run the sweep again; it takes its finished trials from the folder"
+    document = read_document(path, remedy=again)
+    return parse_record(SweepRecord, document, where=path, newest=SCHEMA_VERSION, what="the trials", remedy=again)
 
 
 def write_sweep(folder: Path, record: SweepRecord) -> Path:
@@ -243,7 +261,4 @@ def write_sweep(folder: Path, record: SweepRecord) -> Path:
     Returns:
         The file.
     """
-    path = Path(folder) / SWEEP_FILE
-    with replacing(path) as draft:
-        draft.write_text(record.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    return path
+    return write_record(Path(folder) / SWEEP_FILE, record)

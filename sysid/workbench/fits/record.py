@@ -12,6 +12,7 @@ import numpy as np
 
 from sysid.estimation import CascadeFit, FitResult, Posterior, Status
 from sysid.reporting.records import SCHEMA_VERSION
+from sysid.reporting.sweep.record import SweepRecord
 from sysid.traces import Role
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
 from sysid.workbench.fits.config import PipelineConfig
@@ -160,8 +161,9 @@ def results_document(
     fits: Sequence[FitReady],
     choice: Choice | None,
     exports: Sequence[Mapping[str, Any]],
+    sweep: SweepRecord | None = None,
 ) -> dict[str, Any]:
-    """The contents of results.json; its contract is in ``reports/README.md``.
+    """The contents of results.json; its contract is in ``docs/results.md``.
 
     Args:
         config: The pipeline.
@@ -171,6 +173,7 @@ def results_document(
         fits: The fits that are ready.
         choice: Which of them is put first.
         exports: Exported files of that fit.
+        sweep: That found the fits, if one did.
 
     Returns:
         JSON values, apart from NaN and the infinities.
@@ -180,6 +183,7 @@ def results_document(
     start = config.start
     return {
         "schema_version": SCHEMA_VERSION,
+        "kind": "fits" if sweep is None else "sweep",
         "pipeline": config.name,
         "description": config.description,
         "command": command,
@@ -212,6 +216,7 @@ def results_document(
         "best": asdict(choice) if choice else None,
         "linearity": linearity(fits),
         "published": config.report.published,
+        "sweep": None if sweep is None else sweep.summary.model_dump(),
     }
 
 

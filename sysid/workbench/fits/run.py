@@ -13,6 +13,7 @@ from sysid.estimation import FitResult
 from sysid.estimation.estimators import seedless
 from sysid.reporting.comparing.published import read_published
 from sysid.reporting.results import Results, parse_results
+from sysid.reporting.sweep.record import has_sweep, read_sweep
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig, read_pipeline
 from sysid.workbench.fits.data import Data, load_data, unmade_data
@@ -369,6 +370,7 @@ class FitSteps:
             fits=[one.ready(self.config, run.store.fit(one.config.slug)) for one in fitted.values()],
             choice=choice,
             exports=exports,
+            sweep=read_sweep(run.store.path) if has_sweep(run.store.path) else None,
         )
         new = parse_results(strict(document), where=run.store.results)
         return run.results(new)

@@ -221,3 +221,20 @@ def test_a_damaged_record_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / SWEEP_FILE).write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match="sweep"):
         read_sweep(tmp_path)
+
+
+def test_the_summary_counts_what_became_of_every_trial() -> None:
+    swept = record()
+    found = swept.summary
+    assert (found.points, found.trials, found.in_full, found.dropped, found.unusable) == (
+        18,
+        18,
+        16,
+        1,
+        {"UNSTABLE": 1},
+    )
+    assert swept.winning is not None
+    assert (found.winner, found.label, found.unit) == (swept.winner, swept.winning.label, "psi²")
+    assert found.least == swept.winning.selection_free_run_mse
+    assert found.front == [one.number for one in swept.front()]
+    assert record(winner=None).summary.label == ""

@@ -81,8 +81,10 @@ def test_the_winner_is_the_best_stable_one_and_goes_through_the_steps_of_any_fit
     assert first.selection_mse == pytest.approx(record.winning.selection_free_run_mse, rel=1e-9)
     assert first.exports[0].largest_difference < 1e-9
     assert (results / "bundle" / "model.json").is_file()
-    assert read_results(results).best is not None
+    stored = read_results(results)
+    assert stored.best is not None
     assert read_sweep(results) == record
+    assert (stored.kind, stored.sweep) == ("sweep", record.summary)
 
 
 def test_the_best_may_be_taken_as_it_is_and_says_that_it_is_unstable(workspace: Path, swept: Swept) -> None:
