@@ -109,7 +109,7 @@ Rows = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)] | None]
 
 
 def _state_words(value: Any) -> Any:
-    """YAML takes a bare ON or no for a truth value; as the name of a state each stands for all that YAML so reads."""
+    """YAML takes a bare true for a truth value; as the name of a state it stands for the word."""
     if not isinstance(value, dict):
         return value
     words: dict[Any, Any] = {}
@@ -117,15 +117,10 @@ def _state_words(value: Any) -> Any:
         if isinstance(number, dict):
             words[str(key)] = _state_words(number)
         elif isinstance(key, bool):
-            words |= dict.fromkeys(
-                (w for word in _TRUTH_WORDS[key] for w in (word, word.upper(), word.title())), number
-            )
+            words |= dict.fromkeys((str(key), str(key).lower(), str(key).upper()), number)
         else:
             words[str(key)] = number
     return words
-
-
-_TRUTH_WORDS = {True: ("on", "yes", "true", "y"), False: ("off", "no", "false", "n")}
 
 
 class FileOptions(Options):

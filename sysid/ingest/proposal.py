@@ -13,7 +13,7 @@ from sysid.ingest.options import GridOptions
 from sysid.units import Reference
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_/.^-]*(?: [A-Za-z0-9_/.^-]+)*")
-_WORDS = {"true", "false", "null", "on", "off", "yes", "no", "y", "n"}
+_WORDS = {"true", "false", "null"}
 
 
 def propose_dataset(finding: FileFinding, *, folder: Path | None = None) -> str:

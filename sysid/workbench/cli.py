@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from sysid.errors import SysidError
+from sysid.workbench.commands.reader_options import META, ReaderCommand
 
 app = typer.Typer(
     name="sysid",
@@ -167,8 +168,9 @@ def sweep(  # noqa: PLR0917 - one parameter an option, by name on the command li
     raise typer.Exit(code)
 
 
-@app.command(epilog="Example: sysid ingest measurements.csv")
+@app.command(epilog="Example: sysid ingest measurements.csv --skip-lines 2 --zone Europe/Berlin", cls=ReaderCommand)
 def ingest(
+    ctx: typer.Context,
     source: Annotated[str, typer.Argument(help="A file with traces, or the name of a data set.")],
     propose: Annotated[
         Path | None, typer.Option(help="Write the proposed dataset.yaml here, to be checked by you.")
@@ -186,7 +188,7 @@ def ingest(
         return
     from sysid.workbench.commands.ingest import ingest_command
 
-    ingest_command(source, propose=propose)
+    ingest_command(source, propose=propose, given=ctx.meta[META])
 
 
 @app.command(epilog='Example: sysid orders dryer --mapping "heater -> temperature"')

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
@@ -16,26 +18,36 @@ from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import svg
 from sysid.traces import TraceSet
 from sysid.units import Reference
+from sysid.workbench.commands.reader_options import files_from
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.schemas import schema_line
 
 
-def ingest_command(source: str, *, propose: Path | None) -> None:
+def ingest_command(source: str, *, propose: Path | None, given: Mapping[str, Any] | None = None) -> None:
     """Show what a file or a data set holds.
 
     Args:
         source: A file with traces, a data set's name, or its ``dataset.yaml``.
         propose: Where to write the proposed ``dataset.yaml``.
+        given: Options of the readers, as plain data.
 
     Raises:
         UserError: If it cannot be read.
     """
     path = Path(source)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:
-        _show_file(inspect_file(path), propose)
+        _show_file(inspect_file(path, files=files_from(given or {})), propose)
         return
+    if given:
+        raise ConfigError(
+            "only a file is read with options of the command line",
+            where=source,
+            expected="a file with traces",
+            got=", ".join(given),
+            remedy="name the file; a data set has them in its dataset.yaml, under source: files:",
+        )
     if propose is not None and not _is_name(path):
         raise _no_such(path)
     if propose is not None:

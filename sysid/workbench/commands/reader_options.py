@@ -1,0 +1,225 @@
+"""The options of the readers on the command line, made from the one model that ``dataset.yaml`` is checked by."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from types import UnionType
+from typing import TYPE_CHECKING, Any, Literal
+
+from typer.core import TyperCommand
+
+from sysid.errors import ConfigError
+
+if TYPE_CHECKING:
+    from sysid.ingest import FileOptions
+
+META = "sysid.reader_options"
+"""Where a command finds what was given, in the context's ``meta``."""
+
+_APART = frozenset({"columns", "units", "references"})
+"""What the proposal itself says of each channel."""
+
+_SHORT = {"time_zone": "zone", "time_column": "time"}
+_MARKS = {"\\t": "\t", "tab": "\t", "blank": " ", "space": " "}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReaderOption:
+    """An option of the readers.
+
+    Args:
+        flag: As it is typed.
+        place: Where its value belongs in the options, outermost first.
+        truth: Whether it is a truth value: ``--flag`` or ``--no-flag``.
+        literal: Whether its value is text as it stands, no YAML.
+        repeated: Whether it may be given several times.
+        told: What it is.
+    """
+
+    flag: str
+    place: tuple[str, ...]
+    truth: bool
+    literal: bool
+    repeated: bool
+    told: str
+
+
+class ReaderCommand(TyperCommand):
+    """A command that takes the readers' options beside its own; they are imported only where one is given."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take the readers' options out, and leave the rest to the command."""
+        own = {word for parameter in self.params for word in (*parameter.opts, *parameter.secondary_opts)}
+        foreign = [
+            word for word in args if word.startswith("--") and word.split("=", 1)[0] not in {*own, "--help", "--"}
+        ]
+        given, rest = take_options(args) if foreign else ({}, args)
+        ctx.meta[META] = given
+        return super().parse_args(ctx, rest)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The command's help, and the readers' options below it."""
+        from rich.console import Console
+        from rich.table import Table
+
+        super().format_help(ctx, formatter)
+        table = Table(
+            title="How the file is read, as in dataset.yaml under source: files:", title_justify="left", box=None
+        )
+        table.add_column("option", no_wrap=True)
+        table.add_column("")
+        for option in reader_options().values():
+            table.add_row(option.flag + (f", --no-{option.flag[2:]}" if option.truth else ""), option.told)
+        Console(highlight=False).print(table, markup=False)
+
+
+def files_from(given: Mapping[str, Any]) -> FileOptions:
+    """The options as the readers take them.
+
+    Args:
+        given: From the context's ``meta``.
+
+    Returns:
+        The options.
+
+    Raises:
+        ConfigError: If a value cannot be.
+    """
+    from sysid.ingest import FileOptions
+    from sysid.yaml_files import check
+
+    return check(FileOptions, given, where="the command line") if given else FileOptions()
+
+
+def take_options(words: Sequence[str]) -> tuple[dict[str, Any], list[str]]:
+    """The readers' options among the words of a command line.
+
+    Args:
+        words: For example ``["log.csv", "--separator", ";", "--states", "OFF=0"]``.
+
+    Returns:
+        The options as plain data, and the words that are left.
+
+    Raises:
+        ConfigError: If a value is missing or cannot be read.
+    """
+    known = reader_options()
+    given: dict[str, Any] = {}
+    rest: list[str] = []
+    queue = list(words)
+    while queue:
+        word = queue.pop(0)
+        flag, equals, value = word.partition("=")
+        option = known.get(flag)
+        negated = known.get("--" + flag.removeprefix("--no-")) if flag.startswith("--no-") else None
+        if option is None and (negated is None or not negated.truth):
+            rest.append(word)
+        elif option is None or option.truth:
+            _put(given, (option or typing.cast("ReaderOption", negated)).place, option is not None)
+        else:
+            if not equals and not queue:
+                raise _bad(option, "nothing after it")
+            _add(given, option, value if equals else queue.pop(0))
+    return given, rest
+
+
+def _put(given: dict[str, Any], place: tuple[str, ...], value: object) -> None:
+    for part in place[:-1]:
+        given = given.setdefault(part, {})
+    given[place[-1]] = value
+
+
+def _add(given: dict[str, Any], option: ReaderOption, text: str) -> None:
+    value = _MARKS.get(text, text) if option.literal else _plain(option, text)
+    before: Any = given
+    for part in option.place:
+        before = before.get(part, {}) if isinstance(before, dict) else {}
+    if isinstance(value, dict) and isinstance(before, dict):
+        value = {**before, **value}
+    elif option.repeated:
+        value = [*(before or []), *(value if isinstance(value, list) else [text])]
+    _put(given, option.place, value)
+
+
+def _plain(option: ReaderOption, text: str) -> Any:
+    """A value as YAML; ``OFF=0`` is short for ``{OFF: 0}``."""
+    from sysid.yaml_files import parse_yaml
+
+    pair = re.fullmatch(r"([^={}\[\]:]+)=(.+)", text)
+    shown = f"{{{pair[1]!r}: {pair[2]}}}" if pair and not option.repeated else text
+    try:
+        return parse_yaml(f"value: {shown}", where=f"the command line, {option.flag}")["value"]
+    except ConfigError:
+        if option.repeated:
+            return [text]
+        raise
+
+
+def _bad(option: ReaderOption, got: str) -> ConfigError:
+    return ConfigError(
+        f"{option.flag} needs a value",
+        where="the command line",
+        expected=option.told,
+        got=got,
+        remedy=f"write it behind the option: {option.flag} VALUE",
+    )
+
+
+@cache
+def reader_options() -> dict[str, ReaderOption]:
+    """Every option of the readers that can be typed, by its flag."""
+    from pydantic import BaseModel
+
+    from sysid.ingest import FileOptions
+
+    found = []
+
+    def walk(model: type[BaseModel], place: tuple[str, ...]) -> None:
+        told = _told(model)
+        for name, field in model.model_fields.items():
+            inner = next(
+                (t for t in _types(field.annotation) if isinstance(t, type) and issubclass(t, BaseModel)), None
+            )
+            if not place and name in _APART:
+                continue
+            if inner is not None:
+                walk(inner, (*place, name))
+                continue
+            found.append(_option((*place, name), _types(field.annotation), told.get(name, "")))
+
+    walk(FileOptions, ())
+    return {option.flag: option for option in found}
+
+
+def _option(place: tuple[str, ...], types: Sequence[Any], told: str) -> ReaderOption:
+    name = "_".join(place)
+    texts = {str} | {kind for kind in types if typing.get_origin(kind) is Literal}
+    return ReaderOption(
+        flag="--" + _SHORT.get(name, name).replace("_", "-"),
+        place=place,
+        truth=bool in types,
+        literal=all(kind in texts or kind is type(None) for kind in types),
+        repeated=any(typing.get_origin(kind) is tuple and ... in typing.get_args(kind) for kind in types),
+        told=told,
+    )
+
+
+def _types(annotation: Any) -> tuple[Any, ...]:
+    """The alternatives of an annotation."""
+    if typing.get_origin(annotation) in {typing.Union, UnionType}:
+        return tuple(kind for part in typing.get_args(annotation) for kind in _types(part))
+    if typing.get_origin(annotation) is typing.Annotated:
+        return _types(typing.get_args(annotation)[0])
+    return (annotation,)
+
+
+def _told(model: type[Any]) -> dict[str, str]:
+    """What the docstring of a model says of each of its fields."""
+    lines = inspect.getdoc(model) or ""
+    entries = re.findall(r"^ {4}(\w+): (.*(?:\n {8,}.*)*)", lines, re.MULTILINE)
+    return {name: " ".join(text.split()).replace("``", "") for name, text in entries}
