@@ -170,12 +170,12 @@ def _table(path: Path, sheet: str, cells: NDArray[Any]) -> RawTable:
 def _headers(cells: NDArray[Any], first: int, used: NDArray[np.intp]) -> tuple[list[Header], int]:
     """Names and units from the rows above the numbers, and how many rows above them are passed over."""
     above = first - 1
-    texts = [str(cells[above, at]).strip() for at in used] if above >= 0 else []
+    texts = [_text(cells[above, at]) for at in used] if above >= 0 else []
     units: list[str] = []
     if texts and above > 0 and all(is_unit(text.strip("[]() ")) for text in texts if text) and any(texts):
         units = [text.strip("[]() ") for text in texts]
         above -= 1
-        texts = [str(cells[above, at]).strip() for at in used]
+        texts = [_text(cells[above, at]) for at in used]
     headers = []
     for index in range(len(used)):
         header = parse_header(texts[index]) if index < len(texts) and texts[index] else None
@@ -205,6 +205,10 @@ def _values(cells: NDArray[Any]) -> NDArray[Any]:
 
 def _of_day(time: datetime.time) -> float:
     return 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
+
+
+def _text(cell: Any) -> str:
+    return "" if _empty(cell) else str(cell).strip()
 
 
 def _empty(cell: Any) -> bool:

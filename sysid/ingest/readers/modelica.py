@@ -29,7 +29,8 @@ def is_result(variables: Mapping[str, Any]) -> bool:
     Returns:
         True if they are.
     """
-    return {"name", "dataInfo", "data_2"} <= set(variables) and any(key.casefold() == "aclass" for key in variables)
+    known = {"name", "dataInfo", "data_2"} <= set(variables) or {"names", "data"} <= set(variables)
+    return known and any(key.casefold() == "aclass" for key in variables)
 
 
 def result_tree(variables: Mapping[str, Any], path: Path) -> dict[str, Leaf]:
@@ -46,7 +47,7 @@ def result_tree(variables: Mapping[str, Any], path: Path) -> dict[str, Leaf]:
         ReaderError: If the index does not fit the matrices.
     """
     try:
-        return _trajectories(variables)
+        return _trajectories(variables) if "dataInfo" in variables else _plotted(variables)
     except (IndexError, KeyError, ValueError, TypeError) as error:
         raise ReaderError(
             "the index of a simulation result does not fit its matrices",
@@ -59,7 +60,7 @@ def result_tree(variables: Mapping[str, Any], path: Path) -> dict[str, Leaf]:
 
 def _trajectories(variables: Mapping[str, Any]) -> dict[str, Leaf]:
     kind = next(value for key, value in variables.items() if key.casefold() == "aclass")
-    transposed = "bintrans" in "".join(_characters(kind).reshape(-1).tolist()).casefold()
+    transposed = _is_transposed(kind)
     index = np.asarray(variables["dataInfo"])
     index = (index.T if transposed else index).astype(np.int64)
     names = _texts(variables["name"], len(index), transposed=transposed, first=lambda text: text.casefold() == "time")
@@ -82,12 +83,31 @@ def _trajectories(variables: Mapping[str, Any]) -> dict[str, Leaf]:
         unit, said = _unit(text)
         if table != 1 and len(values) == rows:
             unit = unit or ("s" if not moving and name.casefold() == "time" else None)
-            moving[name] = Leaf(values=values, unit=unit, description=said)
+            moving[name] = Leaf(values=values, unit=unit, description=said, names=(name,))
         else:
             constant = float(values[0])
             aside = f"a parameter, {constant:g} throughout"
-            still[name] = Leaf(values=np.full(rows, constant), unit=unit, description=said, aside=aside)
+            still[name] = Leaf(values=np.full(rows, constant), unit=unit, description=said, aside=aside, names=(name,))
     return moving | still
+
+
+def _plotted(variables: Mapping[str, Any]) -> dict[str, Leaf]:
+    """What Dymola saves of the variables that are plotted: names and one matrix."""
+    kind = next(value for key, value in variables.items() if key.casefold() == "aclass")
+    transposed = _is_transposed(kind)
+    matrix = variables["data"].T if transposed else variables["data"]
+    names = _texts(
+        variables["names"], matrix.shape[1], transposed=transposed, first=lambda text: text.casefold() == "time"
+    )
+    units = ["s" if name.casefold() == "time" else None for name in names]
+    return {
+        name: Leaf(values=matrix[:, at], unit=unit, names=(name,))
+        for at, (name, unit) in enumerate(zip(names, units, strict=True))
+    }
+
+
+def _is_transposed(kind: Any) -> bool:
+    return "bintrans" in "".join(_characters(kind).reshape(-1).tolist()).casefold()
 
 
 def _unit(text: str) -> tuple[str | None, str]:

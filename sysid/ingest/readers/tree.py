@@ -71,7 +71,8 @@ def table_of(
     time = recognise_time(alike)
     step = steps.pop() if len(steps) == 1 and time is None else None
     turned = [f"{name}: its rows are taken as channels, as it is {r} x {c}" for name, (r, c) in walk.turned.items()]
-    settings = {"transpose": True} if walk.turned else {}
+    # Where some are turned and some are not, no word is right for all: they are told apart anew each time.
+    settings = {"transpose": True} if walk.turned and not walk.standing else {}
     told = [f"sample time {step:g} s, from the file"] if step is not None else []
     table = RawTable(
         source=path,
@@ -147,6 +148,7 @@ class _Walk:
 
     def __post_init__(self) -> None:
         self.turned: dict[str, tuple[int, int]] = {}
+        self.standing = False
 
     def step_beside(self, node: Any, outer: float | None, index: int | None = None) -> float | None:
         """The sample time that stands in a mapping, else the one from further out.
@@ -237,6 +239,8 @@ class _Walk:
             wide = beside[1] if beside[0] != beside[1] else 1 < rows < columns
             if wide:
                 self.turned[name] = (rows, columns)
+            else:
+                self.standing = True
         return array.T if wide else array
 
     def named(self, found: Found) -> Found:
