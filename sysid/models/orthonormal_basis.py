@@ -1,6 +1,6 @@
 r"""Ladders: a rational function as a chain of sections of first or second order, tapped between them.
 
-A transfer function :math:`B/F` with :math:`n_p` poles and :math:`n_z < n_p` zeros is written
+A transfer function :math:`B/F` with :math:`n_p` poles and :math:`n_z \le n_p` zeros is written
 
 .. math::
     \frac{B}{F} = \sum_k \theta_k \psi_k, \qquad F = \prod_j F_j,
@@ -10,7 +10,7 @@ numerators allowed they are the Takenaka-Malmquist (for pairs of poles: Kautz) f
 or the imaginary axis: each rung is tapped and handed on through its all-pass :math:`\tilde F_j/F_j` (Ninness and
 Gustafsson 1997, "A unifying construction of orthonormal bases for system identification"; the basis of the
 Sanathanan-Koerner iterations in Drmač et al. 2015). Fewer zeros are had by handing on through :math:`1/F_j`, untapped,
-at the head of the chain.
+at the head of the chain; as many zeros as poles by tapping the input itself.
 
 Why not polynomials: the roots of a polynomial of degree 20 with roots near 1 move by more than their distance from the
 circle when its coefficients are rounded. Sections keep every pole to full precision.
@@ -80,21 +80,21 @@ def rungs(denominators: Sequence[NDArray[np.float64]], n_zeros: int, domain: Dom
 
     Args:
         denominators: Of each section: ``[1, c1, c2]`` in powers of ``1/q``, or ``[c0, c1, 1]`` in powers of ``s``.
-        n_zeros: Degree of the numerator, below the number of poles.
+        n_zeros: Degree of the numerator, at most the number of poles.
         domain: Which of the two.
 
     Returns:
         One rung per section; their taps number ``n_zeros + 1``.
 
     Raises:
-        ConfigError: If there are not fewer zeros than poles.
+        ConfigError: If there are more zeros than poles.
     """
     left = sum(len(d) - 1 for d in denominators)
     wanted = n_zeros + 1
-    if not 0 < wanted <= left:
+    if not 0 < wanted <= left + 1:
         raise ConfigError(
             "not the orders of a transfer function",
-            expected=f"fewer zeros than poles, from 0 to {left - 1} zeros",
+            expected=f"no more zeros than poles, from 0 to {left} zeros",
             got=f"{left} poles and {n_zeros} zeros",
             remedy="lower the number of zeros, or raise the number of poles",
         )
@@ -107,6 +107,8 @@ def rungs(denominators: Sequence[NDArray[np.float64]], n_zeros: int, domain: Dom
         plain[0] = max(abs(pole_gain), _TINY)
         if wanted <= left - order:
             rung = Rung(denominator=denominator, taps=np.empty((0, order + 1)), onward=plain)
+        elif wanted > left:  # the first rung: its own denominator as a numerator hands the input through
+            rung = Rung(denominator=denominator, taps=np.vstack([denominator, taps]), onward=all_pass)
         elif wanted == left:
             rung = Rung(denominator=denominator, taps=taps, onward=all_pass)
         else:

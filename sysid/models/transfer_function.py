@@ -29,7 +29,7 @@ class TransferFunction(AbstractStructure):
 
     Args:
         poles: Number of poles.
-        zeros: Number of zeros, fewer than poles.
+        zeros: Number of zeros, at most that of the poles.
         delays: Dead time in samples; ``None`` to search for it. A discrete transfer function without dead time reacts
             to its input at once, and one that is sampled from a plant has a dead time of at least 1.
         domain: ``discrete``: ``B(1/q) / F(1/q)``, where ``zeros`` is the degree of ``B``; or ``continuous``:
@@ -45,7 +45,7 @@ class TransferFunction(AbstractStructure):
     """
 
     poles: Annotated[tuple[int, ...], IntRange(low=1, high=8)]
-    zeros: Annotated[tuple[int, ...], IntRange(low=0, high=7)]
+    zeros: Annotated[tuple[int, ...], IntRange(low=0, high=8)]
     delays: tuple[int, ...] | None = None
     domain: Domain = Domain.DISCRETE
     intercept: bool = True
@@ -60,11 +60,11 @@ class TransferFunction(AbstractStructure):
         object.__setattr__(self, "domain", _domain(self.domain))
         delays = self.delays or (0,) * len(self.poles)
         same = len(self.poles) == len(self.zeros) == len(delays)
-        orders = all(0 <= z < p for p, z in zip(self.poles, self.zeros, strict=False))
+        orders = all(0 <= z <= p and p > 0 for p, z in zip(self.poles, self.zeros, strict=False))
         if not same or not self.poles or not orders or min(delays) < 0:
             raise ConfigError(
                 "not the orders of a transfer function",
-                expected="for each input fewer zeros than poles, and a dead time from 0 on",
+                expected="for each input no more zeros than poles, at least one pole, and a dead time from 0 on",
                 got=f"poles {list(self.poles)}, zeros {list(self.zeros)}, delays {self.delays}",
                 remedy="write for example poles: [2, 2], zeros: [1, 1], delays: [1, 1]",
             )

@@ -174,7 +174,7 @@ def percent(fit: float) -> str:
         fit: In percent.
 
     Returns:
-        Two digits after the point; ``-`` where the target does not vary, and ``diverged`` for a run that is not finite.
+        Two digits after the point; ``-`` where the target does not vary, and ``diverged`` for a run that is lost.
 
     Example:
         >>> percent(99.987), percent(float("nan")), percent(-np.inf)
@@ -182,4 +182,8 @@ def percent(fit: float) -> str:
     """
     if np.isnan(fit):
         return "-"
-    return f"{fit:.2f}" if np.isfinite(fit) else "diverged"
+    return f"{fit:.2f}" if fit > _LOST else "diverged"
+
+
+_LOST = -1e4
+"""Percent below which a number says no more than that the run left its target by a hundred times its range."""

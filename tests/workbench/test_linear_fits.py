@@ -50,7 +50,7 @@ def test_its_key_knows_orders_seed_and_selection(workspace: Path) -> None:
 @pytest.mark.parametrize(
     ("new", "said"),
     [
-        (TF.replace("poles: [1, 1]", "poles: [1]"), "fewer zeros than poles"),
+        (TF.replace("poles: [1, 1]", "poles: [1]"), "no more zeros than poles"),
         (TF.replace("[1, 1], zeros: [0, 0], delays: [1, 1]", "[2], zeros: [1]"), "do not match the inputs"),
         (TF.replace("structure", "training: {loop: open}, structure"), "but is TransferFunction"),
         (TF.replace("delays", "domain: laplace, delays"), "unknown domain"),

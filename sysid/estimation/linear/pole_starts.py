@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,16 +54,21 @@ class LongArx:
     @property
     def poles(self) -> NDArray[np.complex128]:
         """In the z plane, mirrored into the unit circle."""
-        poles = np.asarray(np.roots([1.0, *(-self.a)]), dtype=np.complex128)
-        return stabilised(poles, Domain.DISCRETE)
+        return stabilised(self.raw_poles, Domain.DISCRETE)
+
+    @property
+    def raw_poles(self) -> NDArray[np.complex128]:
+        """In the z plane, wherever they are."""
+        return np.asarray(np.roots([1.0, *(-self.a)]), dtype=np.complex128)
 
 
-def long_arx(records: Sequence[TimeRecord], n_lags: int) -> LongArx:
+def long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> LongArx:
     """Fit the long model.
 
     Args:
         records: Data in scaled numbers, inputs delayed by their dead times.
         n_lags: Lags of each channel.
+        more: Lags of the inputs beyond those: what a plant over time answers to a held input comes a sample later.
 
     Returns:
         The model.
@@ -75,15 +81,52 @@ def long_arx(records: Sequence[TimeRecord], n_lags: int) -> LongArx:
         drive = [
             np.concatenate([np.full(lag, record.past[j]), record.inputs[: n - lag, j]])
             for j in range(m)
-            for lag in range(n_lags)
+            for lag in range(n_lags + more)
         ]
-        root = record.root_weights
+        root = record.root_weights * _known(record, n_lags + more)
         tables.append(np.column_stack([*past, *drive, np.ones(n)]) * root[:, np.newaxis])
         targets.append(y * root)
-    solution = solve(np.concatenate(tables), np.concatenate(targets)).coefficients
-    m = records[0].inputs.shape[1]
-    b = tuple(solution[n_lags * (1 + j) : n_lags * (2 + j)] for j in range(m))
+    X, y = np.concatenate(tables), np.concatenate(targets)
+    few = len(X) < X.shape[1]  # a start all the same: the shortest of all that fit
+    solution = linalg.lstsq(X, y, cond=1e-10)[0] if few else solve(X, y).coefficients
+    m, width = records[0].inputs.shape[1], n_lags + more
+    b = tuple(solution[n_lags + width * j : n_lags + width * (j + 1)] for j in range(m))
     return LongArx(a=solution[:n_lags], b=b)
+
+
+def _known(record: TimeRecord, n_lags: int) -> NDArray[np.bool_]:
+    """Rows none of whose lags is masked, or before a record of which nothing is known there."""
+    usable = record.root_weights > 0.0
+    before = np.full(n_lags, not record.free_start)
+    known = np.concatenate([before, usable])
+    rows = usable.copy()
+    for lag in range(1, n_lags + 1):
+        rows &= known[n_lags - lag : n_lags - lag + len(usable)]
+    return rows if rows.any() else usable
+
+
+def free_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...]) -> list[PoleStart]:
+    """Starts that need not be stable: the poles of an ARX model of that order as they are, and integrators.
+
+    Args:
+        records: Data in scaled numbers.
+        n_poles: For each input.
+
+    Returns:
+        The starts.
+    """
+    domain, sample_time = records[0].domain, records[0].sample_time
+    found = {"ARX of that order, as it is": long_arx(records, max(n_poles), more=1).raw_poles}
+    for n in range(1, min(2, max(n_poles)) + 1):
+        found[f"{n} integrators"] = np.concatenate([np.ones(n), np.linspace(0.3, 0.8, max(n_poles) - n)]).astype(
+            complex
+        )
+    starts = []
+    for name, poles in found.items():
+        chosen = [_padded(poles, n) for n in n_poles]
+        planes = [p if domain is Domain.DISCRETE else continuous_from(p, sample_time) for p in chosen]
+        starts.append(PoleStart(name=name, sections=tuple(sections_of(p, domain) for p in planes)))
+    return starts
 
 
 def arx_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zeros: tuple[int, ...]) -> list[PoleStart]:
@@ -100,17 +143,28 @@ def arx_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zeros:
     domain, sample_time = records[0].domain, records[0].sample_time
     n_rows = sum(len(record.target) for record in records)
     n_lags = max(2, min(LONGEST_ARX, max(2 * max(n_poles), 10), n_rows // (4 * (1 + len(n_poles)))))
+    if records[0].free_start:
+        n_lags = max(1, min(n_lags, max(len(record.target) for record in records) // 2))
     model = long_arx(records, n_lags)
-    found = {
-        "long ARX, balanced truncation": [_balanced(model, j, n) for j, n in enumerate(n_poles)],
-        "long ARX, Sanathanan-Koerner": [
-            _sk(model, j, n, zeros, records) for j, (n, zeros) in enumerate(zip(n_poles, n_zeros, strict=True))
-        ],
+    pairs = list(enumerate(zip(n_poles, n_zeros, strict=True)))
+    ways: dict[str, Callable[[], list[NDArray[np.complex128]]]] = {
+        "long ARX, balanced truncation": lambda: [_balanced(model, j, n) for j, (n, _) in pairs],
+        "long ARX, Sanathanan-Koerner": lambda: [_sk(model, j, n, zeros, records) for j, (n, zeros) in pairs],
+        "ARX of that order": lambda: [_padded(long_arx(records, min(max(n_poles), n_lags)).poles, n) for n in n_poles],
+        "poles at a few samples": lambda: [_padded(np.empty(0, dtype=np.complex128), n) for n in n_poles],
     }
-    short = long_arx(records, min(max(n_poles), n_lags))
-    found["ARX of that order"] = [_padded(short.poles, n) for n in n_poles]
     starts: list[PoleStart] = []
-    for name, poles in found.items():
+    for name, way in ways.items():
+        if starts and name == "poles at a few samples":
+            break
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # an equation that is nearly singular has a poor start
+            try:
+                poles = way()
+            except (linalg.LinAlgError, ValueError):  # an input that moves too little to show any pole
+                continue
+        if not all(np.isfinite(p).all() for p in poles):
+            continue
         planes = [p if domain is Domain.DISCRETE else continuous_from(p, sample_time) for p in poles]
         sections = tuple(sections_of(stabilised(p, domain), domain) for p in planes)
         starts.append(PoleStart(name=name, sections=sections))
@@ -141,8 +195,13 @@ def pole_starts(
     n_rows = sum(len(record.target) for record in records)
     starts = arx_starts(records, n_poles, n_zeros)
     if max(n_poles) <= MOST_REFINED:
-        refined = refined_sections(records, starts[0].sections, n_zeros)
-        starts.append(PoleStart(name="refined instrumental variables", sections=refined))
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            try:
+                refined = refined_sections(records, starts[0].sections, n_zeros)
+                starts.append(PoleStart(name="refined instrumental variables", sections=refined))
+            except (linalg.LinAlgError, ValueError):  # the other starts are there
+                pass
     rng = np.random.default_rng(seed)
     for k in range(n_scattered):
         parts = tuple(sections_of(scattered(n, n_rows, sample_time, rng, domain), domain) for n in n_poles)

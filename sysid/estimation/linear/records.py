@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.linear.predictor import MirroredPredictor
 from sysid.kernels import linear as kernel
 from sysid.models.orthonormal_basis import Domain, Rung, responses, rungs
 from sysid.models.realisation import Realisation, realise
@@ -56,6 +57,17 @@ class AbstractRecord(ABC):
         Returns:
             Shape ``(n_rows, n_taps_of_all + n_private)``, unweighted.
         """
+
+    def predictor(self, ladders: Ladders) -> MirroredPredictor | None:  # noqa: ARG002 - asked of records over time
+        """Through what the errors are computed where poles are so unstable that a free run is lost.
+
+        Args:
+            ladders: One per input.
+
+        Returns:
+            The predictor; ``None`` where errors are those of the free run.
+        """
+        return None
 
     @abstractmethod
     def tangents(
@@ -124,16 +136,34 @@ class TimeRecord(AbstractRecord):
     sample_time: float
     free_start: bool
 
+    def predictor(self, ladders: Ladders) -> MirroredPredictor | None:
+        """From a fitted initial state alone; see the base class."""
+        if not self.free_start:
+            return None
+        systems = [realise(ladder, self.domain) for ladder in ladders]
+        if self.domain is Domain.CONTINUOUS:
+            rates = max((float(np.abs(system.A).max(initial=0.0)) for system in systems), default=0.0)
+            if not rates * self.sample_time <= _FASTEST:
+                return None
+            systems = [system.sampled(self.sample_time) for system in systems]
+        if not all(np.isfinite(system.A).all() for system in systems):
+            return None
+        return MirroredPredictor.of(systems, len(self.target))
+
     def private(self, ladders: Ladders) -> int:
         """The initial state, if it is fitted; see the base class."""
         return sum(rung.order for ladder in ladders for rung in ladder) if self.free_start else 0
 
     def columns(self, ladders: Ladders) -> NDArray[np.float64]:
         """Responses to the inputs, then to a pulse before the record; see the base class."""
+        through = self.predictor(ladders)
+        if through is not None:
+            found = [through.responses(j, self.inputs[:, j]) for j in range(len(ladders))]
+            return np.concatenate([*found, through.beginnings()], axis=1)
         parts = [self._pass(ladder, self.inputs[:, j], self.past[j]) for j, ladder in enumerate(ladders)]
         if self.free_start:
-            pulse = np.eye(len(self.target), 1)[:, 0]
-            parts += [self._pass(ladder, pulse, 0.0) for ladder in full(ladders, self.domain)]
+            pulse = self._pulse()
+            parts += [self._pass(ladder, pulse, 0.0)[-len(self.target) :] for ladder in full(ladders, self.domain)]
         return np.concatenate(parts, axis=1)
 
     def tangents(
@@ -156,10 +186,14 @@ class TimeRecord(AbstractRecord):
                 part = self._continuous_tangents(ladder, self.inputs[:, j], self.past[j], weights[own[j]])
                 if free:
                     at = slice(shared + free[j].start, shared + free[j].stop)
-                    pulse = np.eye(len(self.target), 1)[:, 0]
-                    part = part + self._continuous_tangents(full((ladder,), self.domain)[0], pulse, 0.0, weights[at])
+                    begun = self._continuous_tangents(full((ladder,), self.domain)[0], self._pulse(), 0.0, weights[at])
+                    part = part + begun[-len(self.target) :]
                 parts.append(part)
         return np.concatenate(parts, axis=1)
+
+    def _pulse(self) -> NDArray[np.float64]:
+        """A pulse that leaves any state behind: in the first row, or before it where the output takes a sample."""
+        return np.eye(len(self.target) + (self.domain is Domain.CONTINUOUS), 1)[:, 0]
 
     def _pass(self, ladder: tuple[Rung, ...], x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
         if self.domain is Domain.DISCRETE:
@@ -222,7 +256,7 @@ def _discrete_columns(ladder: Sequence[Rung], x: NDArray[np.float64], past: floa
     v = np.empty(n + 2)
     at = 0
     for i, rung in enumerate(ladder):
-        before = past / float(rung.denominator.sum())
+        before = _held(past, rung)
         v[:2] = before
         kernel.all_pole(x, *_coefficients(rung), before, v[2:])
         delayed = (v[2:], v[1:-1], v[:-2])
@@ -233,6 +267,11 @@ def _discrete_columns(ladder: Sequence[Rung], x: NDArray[np.float64], past: floa
             x = _combined(rung.onward, delayed)
             past = before * float(rung.onward.sum())
     return columns
+
+
+def _held(past: float, rung: Rung) -> float:
+    """A section's all-pole output while its input is held; zero for no input, also where the section integrates."""
+    return past / float(rung.denominator.sum()) if past != 0.0 else 0.0
 
 
 def _combined(numerator: NDArray[np.float64], delayed: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
@@ -247,7 +286,7 @@ def _static_taps(ladder: Sequence[Rung], past: float) -> NDArray[np.float64]:
     """Every tap while the input is held."""
     values: list[float] = []
     for rung in ladder:
-        v = past / float(rung.denominator.sum())
+        v = _held(past, rung)
         values += [v * float(numerator.sum()) for numerator in rung.taps]
         past = v * float(rung.onward.sum())
     return np.array(values)
@@ -260,7 +299,7 @@ def _discrete_tangents(ladder: Sequence[Rung], y: NDArray[np.float64], past: flo
     v = np.empty(n + 2)
     at = 0
     for rung in ladder:
-        before = -past / float(rung.denominator.sum())
+        before = -_held(past, rung)
         v[:2] = before
         kernel.all_pole(y, *_coefficients(rung), before, v[2:])
         for lag in range(1, rung.order + 1):

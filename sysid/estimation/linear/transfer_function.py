@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -12,13 +12,15 @@ from threadpoolctl import threadpool_limits
 from sysid.errors import TraceError
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, pole_starts
+from sysid.estimation.linear.dead_time import likely, longest_dead_time
+from sysid.estimation.linear.determined import STILL, Determined
+from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.transfer_function_search import AbstractProblem, Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.networks.provider import Experiment, experiments_of, unit_range
 from sysid.estimation.result import FitResult
-from sysid.models import AbstractModel, Mapping, Scaling, Start, TransferFunction
+from sysid.models import AbstractModel, Domain, Mapping, Scaling, Start, TransferFunction, TransferFunctionModel
 from sysid.traces import Trace
 
 
@@ -63,36 +65,68 @@ def fit_transfer_function(
         FitDivergedError: If no start gives a finite free run.
     """
     began = time.perf_counter()
+    start = start or Start()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
-    experiments = experiments_of(traces, mapping, start or Start(), rest)
-    _check(orders, mapping, experiments)
+    whole = tuple(_bridged(experiment) for experiment in experiments_of(traces, mapping, start, rest))
+    _check(orders, mapping, whole)
+    determined = Determined.of(whole, mapping)
+    experiments, own = tuple(determined.only(e) for e in whole), determined.narrowed(orders)
     problem = _Problem(
         experiments=experiments,
         scaling=unit_range(experiments),
-        orders=orders,
+        orders=own,
         training=training or TransferFunctionTraining(),
         terms=Terms(
-            mapping=mapping,
+            mapping=replace(mapping, inputs=tuple(mapping.inputs[j] for j in determined.kept)),
             sample_time=traces[0].sample_time,
             input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
             output_unit=traces[0].channel(mapping.output).unit,
             rest_output=rest,
         ),
     )
-    chosen_on = experiments_of(selection, mapping, start or Start(), rest)
+    scaling = unit_range(whole)
+
+    def of_all_inputs(model: AbstractModel) -> AbstractModel:
+        if own is orders or not isinstance(model, TransferFunctionModel):
+            return model
+        return determined.widened(model, orders, mapping, scaling)
+
+    def score(model: AbstractModel) -> float:
+        return _mean_mse(of_all_inputs(model), selection, start)
+
     # BLAS threads that wake for matrices of some ten columns cost more than they give: beside one other process on two
     # cores a fit took four times as long with them.
     with threadpool_limits(1, "blas"):
-        return problem.solve(began, on_iteration, (lambda model: _mean_mse(model, chosen_on)) if selection else None)
+        fit = problem.solve(began, on_iteration, score if selection else None)
+    return replace(fit, model=of_all_inputs(fit.model), notes=(*fit.notes, *determined.notes, *_still(experiments)))
 
 
-def _mean_mse(model: AbstractModel, experiments: Sequence[Experiment]) -> float:
+def _bridged(experiment: Experiment) -> Experiment:
+    """The record with straight lines under the mask, for filters that run through it; what is there does not count."""
+    usable = experiment.usable
+    if usable is None or not usable.any():
+        return experiment
+    known, places = np.flatnonzero(usable), np.arange(len(usable))
+    return replace(
+        experiment, output=np.where(usable, experiment.output, np.interp(places, known, experiment.output[known]))
+    )
+
+
+def _still(experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    values = np.concatenate([e.output if e.usable is None else e.output[e.usable] for e in experiments])
+    if len(values) and np.ptp(values) > STILL * np.abs(values).max():
+        return ()
+    return ("The output never changes in these records: they say nothing of a response to any input.",)
+
+
+def _mean_mse(model: AbstractModel, traces: Sequence[Trace], start: Start) -> float:
     """Mean over records of the free run's mean squared error; infinite where a free run is not finite."""
     errors = []
-    for experiment in experiments:
+    for trace in traces:
+        experiment = Experiment.for_model(trace, model, start)
         error = model.simulate(experiment.inputs, experiment.history) - experiment.output
         weights = np.ones(len(error)) if experiment.weights is None else experiment.weights
-        errors.append(float(np.sum(weights * error**2) / experiment.n_counted))
+        errors.append(float(np.sum(weights * error**2) / max(experiment.n_counted, 1)))
     return float(np.mean(errors)) if np.isfinite(errors).all() else np.inf
 
 
@@ -119,7 +153,8 @@ class _Problem(AbstractProblem):
         """From ARX models and instrumental variables, and scattered ones; see the base class."""
         records = [record for record in provider.records if isinstance(record, TimeRecord)]
         if few:
-            return arx_starts(records, self.orders.poles, self.orders.zeros)
+            found = arx_starts(records, self.orders.poles, self.orders.zeros)
+            return [*found, *self.free_starts(provider)] if self.training.stable is False else found
         return pole_starts(
             records,
             self.orders.poles,
@@ -127,6 +162,30 @@ class _Problem(AbstractProblem):
             n_scattered=self.training.scattered_starts,
             seed=self.training.seed,
         )
+
+    def delay_range(self) -> tuple[int, int]:
+        """Up to a third of the longest record where nothing else is said; see the base class."""
+        most = self.training.max_delay
+        if most is None:
+            most = longest_dead_time([len(experiment.output) for experiment in self.experiments])
+        return 0 if self.orders.domain is Domain.CONTINUOUS else min(1, most), most
+
+    def likely_delays(self, least: int, most: int) -> list[list[int]]:
+        """By correlation; see the base class."""
+        return likely(self.experiments, self.orders.poles, most, least)
+
+    def unbounded(self) -> _Problem:
+        """With inputs as they are: the offset of an input adds up in an integrator, and no constant undoes it."""
+        scaling = replace(self.scaling, input_offset=(0.0,) * len(self.scaling.input_offset))
+        unknown = tuple(e if e.free else replace(e, past=np.zeros(1, dtype=np.bool_)) for e in self.experiments)
+        return replace(
+            self, scaling=scaling, experiments=unknown, training=replace(self.training, stable=False)
+        )  # fmt: skip
+
+    def free_starts(self, provider: SeparableProvider) -> list[PoleStart]:
+        """ARX as it is, and integrators; see the base class."""
+        records = [record for record in provider.records if isinstance(record, TimeRecord)]
+        return free_starts(records, self.orders.poles)
 
     def _records(self, delays: tuple[int, ...], unknown: int) -> tuple[TimeRecord, ...]:
         """Records whose first samples are left out where an input a dead time ago would come before a record."""
@@ -177,11 +236,12 @@ def _check(orders: TransferFunction, mapping: Mapping, experiments: Sequence[Exp
             got=f"{len(orders.poles)} numbers",
             remedy="give one number of poles and of zeros for each input",
         )
-    needed = sum(orders.poles) + sum(orders.zeros) + len(orders.zeros) + orders.intercept
+    states = sum(orders.poles) * sum(experiment.free for experiment in experiments)
+    needed = sum(orders.poles) + sum(orders.zeros) + len(orders.zeros) + orders.intercept + states
     counted = sum(experiment.n_counted for experiment in experiments)
     if counted < needed:
         raise TraceError(
-            "fewer samples than parameters",
+            "fewer samples than parameters and initial states" if states else "fewer samples than parameters",
             expected=f"at least {needed} samples that count",
             got=counted,
             remedy="lower the orders, or use longer traces",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
@@ -26,13 +28,23 @@ def transfer_function_uncertainty(
     Returns:
         The uncertainty: ``B(input, power)``, ``F(input, power)``, ``constant``.
     """
-    linear = provider.design(solution.columns)
+    with np.errstate(all="ignore"):  # what the data leave open has a variance beyond all numbers
+        found = _uncertainty(model, provider, solution)
+    open_ = ~np.isfinite(np.diag(found.covariance))
+    covariance = found.covariance.copy()
+    covariance[open_] = covariance[:, open_] = np.nan
+    return replace(found, covariance=covariance)
+
+
+def _uncertainty(model: TransferFunctionModel, provider: SeparableProvider, solution: Separated) -> Uncertainty:
+    linear = provider.design(solution.columns, solution.constants)
     J = np.concatenate([linear, provider.tangents(solution)], axis=1)
     variance = float(solution.residual @ solution.residual) / max(provider.n_samples - J.shape[1], 1)
     scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(np.float64).tiny)
     R = linalg.qr(J / scale, mode="r")[0][: J.shape[1]]
     _, sizes, Vt = linalg.svd(R)
-    kept = sizes > 1e-13 * sizes[0]
+    sizes = np.concatenate([sizes, np.zeros(J.shape[1] - len(sizes))])
+    kept = sizes > 1e-13 * float(sizes[0])
     root = (Vt[kept].T / sizes[kept]) / scale[:, np.newaxis]
     names, values, rows = _polynomials(model, J.shape[1])
     spread = rows @ root

@@ -26,6 +26,7 @@ from sysid.models.orthonormal_basis import Domain, rungs, section_orders
 RANK_TOLERANCE = 1e-11
 """Singular values of the unit columns below this part of the largest are directions that the data do not show."""
 _NO_EFFECT = 1e-24
+_APART = 1e-6
 _LARGEST_REFLECTION = 1.0 - 1e-12
 
 Sections = tuple[tuple[NDArray[np.float64], ...], ...]
@@ -152,6 +153,8 @@ class Separated:
         span: Orthonormal basis of the weighted columns, shape ``(n_rows, rank)``.
         weights: Solution: shared columns (taps of all inputs, then the constant), then each record's own.
         residual: Weighted output minus target, shape ``(n_rows,)``.
+        mirrored: Whether the errors are those of a predictor (see :mod:`sysid.estimation.linear.predictor`).
+        constants: What a constant output is in each record's errors.
     """
 
     ladders: Ladders
@@ -159,6 +162,8 @@ class Separated:
     span: NDArray[np.float64]
     weights: NDArray[np.float64]
     residual: NDArray[np.float64]
+    mirrored: bool = False
+    constants: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -194,7 +199,11 @@ class SeparableProvider(AbstractProvider):
         n = len(theta)
         if solution is None:
             return Linearisation(loss=np.inf, gradient=np.zeros(n), gauss_newton=np.eye(n))
-        J = self.poles.chain(theta, self.tangents(solution))
+        J = (
+            self._differences(theta, solution)
+            if solution.mirrored
+            else self.poles.chain(theta, self.tangents(solution))
+        )
         J -= solution.span @ (solution.span.T @ J)
         loss = 0.5 * float(solution.residual @ solution.residual)
         H = J.T @ J
@@ -203,6 +212,18 @@ class SeparableProvider(AbstractProvider):
         floor = max(float(diagonal.max(initial=0.0)), np.finfo(np.float64).tiny) * _NO_EFFECT
         H[np.diag_indices_from(H)] = np.maximum(diagonal, floor)
         return Linearisation(loss=loss, gradient=J.T @ solution.residual, gauss_newton=H)
+
+    def _differences(self, theta: NDArray[np.float64], solution: Separated) -> NDArray[np.float64]:
+        """Derivatives of the residual where the predictor changes with the poles, by differences."""
+        columns = []
+        for i in range(len(theta)):
+            step = np.zeros(len(theta))
+            step[i] = _APART * max(abs(float(theta[i])), 1e-3 * float(np.abs(theta).max(initial=0.0)), 1e-9)
+            with np.errstate(all="ignore"):
+                moved = self._solve(theta + step)
+            away = np.zeros(len(solution.residual)) if moved is None else moved.residual - solution.residual
+            columns.append(away / step[i])
+        return np.column_stack(columns)
 
     def separated(self, theta: NDArray[np.float64]) -> Separated | None:
         """Solve the linear part.
@@ -242,11 +263,12 @@ class SeparableProvider(AbstractProvider):
             parts.append(record.tangents(solution.ladders, columns, weights) * record.root_weights[:, np.newaxis])
         return np.concatenate(parts)
 
-    def design(self, columns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def design(self, columns: Sequence[NDArray[np.float64]], constants: Sequence[float]) -> NDArray[np.float64]:
         """All records' weighted columns: shared ones, the constant, then each record's own.
 
         Args:
             columns: Of each record, unweighted.
+            constants: What a constant output is in each record's errors.
 
         Returns:
             Shape ``(n_rows, n_columns)``.
@@ -256,11 +278,11 @@ class SeparableProvider(AbstractProvider):
         width = shared + self.constant + sum(private)
         table = np.zeros((sum(len(c) for c in columns), width), order="F")
         row, own = 0, shared + self.constant
-        for record, c, n in zip(self.records, columns, private, strict=True):
+        for record, c, n, level in zip(self.records, columns, private, constants, strict=True):
             rows = slice(row, row + len(c))
             table[rows, :shared] = c[:, :shared] * record.root_weights[:, np.newaxis]
             if self.constant:
-                table[rows, shared] = record.root_weights
+                table[rows, shared] = record.root_weights * level
             table[rows, own : own + n] = c[:, shared:] * record.root_weights[:, np.newaxis]
             row, own = row + len(c), own + n
         return table
@@ -276,10 +298,17 @@ class SeparableProvider(AbstractProvider):
             rungs(part, zeros, self.poles.domain) for part, zeros in zip(sections, self.n_zeros, strict=True)
         )
         columns = tuple(record.columns(ladders) for record in self.records)
-        table = self.design(columns)
+        through = [record.predictor(ladders) for record in self.records]
+        constants = tuple(1.0 if one is None else one.constant_gain for one in through)
+        table = self.design(columns, constants)
         if not np.isfinite(table).all():
             return None
-        target = np.concatenate([record.target * record.root_weights for record in self.records])
+        target = np.concatenate(
+            [
+                (record.target if one is None else one.filtered(record.target)) * record.root_weights
+                for record, one in zip(self.records, through, strict=True)
+            ]
+        )
         norms = np.linalg.norm(table, axis=0)
         scale = np.where(norms > 0.0, norms, 1.0)
         if not np.isfinite(scale).all():
@@ -290,4 +319,7 @@ class SeparableProvider(AbstractProvider):
         span = Q @ U[:, : len(sizes)][:, kept]
         seen = span.T @ target
         weights = (Vt[: len(sizes)][kept].T @ (seen / sizes[kept])) / scale
-        return Separated(ladders=ladders, columns=columns, span=span, weights=weights, residual=span @ seen - target)
+        return Separated(
+            ladders=ladders, columns=columns, span=span, weights=weights, residual=span @ seen - target,
+            constants=constants, mirrored=any(one is not None for one in through),
+        )  # fmt: skip
