@@ -104,7 +104,7 @@ def test_twenty_poles_near_one_keep_their_places() -> None:
     assert np.isfinite(realise(ladder, Domain.DISCRETE).C).all()
 
 
-@pytest.mark.parametrize("n_zeros", [-1, 2, 5])
-def test_as_many_zeros_as_poles_are_refused(n_zeros: int) -> None:
+@pytest.mark.parametrize("n_zeros", [-1, 3, 5])
+def test_more_zeros_than_poles_are_refused(n_zeros: int) -> None:
     with pytest.raises(ConfigError, match="no more zeros"):
         rungs(sections(2, Domain.DISCRETE, 0), n_zeros, Domain.DISCRETE)

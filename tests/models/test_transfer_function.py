@@ -173,7 +173,7 @@ def signal_to_ss(model: ARXModel) -> control.StateSpace:
 @pytest.mark.parametrize(
     "fields",
     [
-        {"poles": (2,), "zeros": (2,)},
+        {"poles": (2,), "zeros": (3,)},
         {"poles": (0,), "zeros": (0,)},
         {"poles": (2, 1), "zeros": (1,)},
         {"poles": (2,), "zeros": (1,), "delays": (-1,)},

@@ -263,7 +263,7 @@ class AbstractProblem(ABC):
             end = self._long_run(best, began, on_iteration)
         else:
             end = self._chosen(candidates, score, began, on_iteration)
-        problem, end = self._free_poles(end, delays, began, on_iteration)
+        problem, end = self._free_poles(end, delays, (began, on_iteration), score)
         model, uncertainty = problem._model(end.provider, end.theta, end.delays)
         unit = self.scaling.output_scale**2
         return FitResult(
@@ -302,7 +302,11 @@ class AbstractProblem(ABC):
         return found
 
     def _free_poles(
-        self, end: _End, delays: tuple[int, ...], began: float, on_iteration: Callable[[Iteration], None]
+        self,
+        end: _End,
+        delays: tuple[int, ...],
+        watched: tuple[float, Callable[[Iteration], None]],
+        score: Callable[[AbstractModel], float] | None,
     ) -> tuple[AbstractProblem, _End]:
         """The same without bounds on the poles, where the data ask for it: plants that integrate, or are unstable.
 
@@ -326,10 +330,17 @@ class AbstractProblem(ABC):
         best = min((free._short_run(start, delays, provider) for start in starts), key=lambda run: run.loss)
         if not np.isfinite(best.loss):
             return self, at_end
-        found = replace(free._long_run(best, began, on_iteration), notes=told)
+        found = replace(free._long_run(best, *watched), notes=told)
         n, power = provider.n_samples, sum(float(np.sum((r.target * r.root_weights) ** 2)) for r in provider.records)
         inside, loss = end.provider.loss(end.theta) / end.provider.n_samples, provider.loss(found.theta) / n
-        if not _worse(inside, loss, n, power / n):
+        # Poles may be anywhere in a plant that few samples say much of, but not for the sake of their noise: beyond
+        # chance, the gain must be one that as many parameters as there are, fitted to it, could not have.
+        size = sum(self.orders.poles) + provider.n_taps
+        if not _worse(inside, loss, n, power / n, free=size):
+            return self, at_end
+        if score is not None and not score(free._model(provider, found.theta, delays)[0]) < score(
+            self._model(end.provider, end.theta, end.delays)[0]
+        ):
             return self, at_end
         moved = _at_one(provider.poles.sections(found.theta), domain, sample_time, 5.0 * (1.0 - edge))
         theta = provider.poles.theta(moved)
@@ -531,10 +542,13 @@ def _slowness(sections: Sections, domain: Domain, sample_time: float) -> float:
     return float(np.abs(_poles(sections, domain, sample_time)).max())
 
 
-def _worse(loss: float, than: float, n: int, scale: float) -> bool:
+def _worse(loss: float, than: float, n: int, scale: float, *, free: int = 0) -> bool:
     """Whether a loss is significantly worse than another; below rounding all losses are one."""
     floor = 1e-20 * max(scale, np.finfo(np.float64).tiny)
-    return bool(n * np.log((loss + floor) / (than + floor)) > SIGNIFICANT) if np.isfinite(loss) else True
+    if not np.isfinite(loss):
+        return True
+    left = max(n - 2 * free, 1)
+    return bool(left * np.log((loss + floor) / (than + floor)) > SIGNIFICANT + free * np.log(n))
 
 
 def _at_one(sections: Sections, domain: Domain, sample_time: float, near: float) -> Sections:

@@ -116,7 +116,7 @@ def test_a_record_in_motion_needs_its_initial_state() -> None:
     assert moving.history["mse"][-1] < 0.01 * resting.history["mse"][-1]
 
 
-def test_selection_traces_choose_how_far_to_refine() -> None:
+def test_selection_traces_choose_between_minima() -> None:
     trace, other = record(Domain.DISCRETE, 1, 3.0, 60), record(Domain.DISCRETE, 2, 60.0, 400)
     large = TransferFunction(poles=(6, 6), zeros=(5, 5), delays=(1, 1))
     blind = fit_transfer_function([trace], TWO, large, rest_output=0.0)
@@ -125,7 +125,8 @@ def test_selection_traces_choose_how_far_to_refine() -> None:
     def error(fit: FitResult) -> float:
         return float(np.mean((fit.model.simulate(other.columns(["u1", "u2"])) - other["y"]) ** 2))
 
-    assert error(seeing) < error(blind)
+    assert error(seeing) <= error(blind)
+    assert seeing.status is not Status.STOPPED_EARLY
     assert any("selection traces" in note for note in seeing.notes)
 
 
@@ -153,7 +154,7 @@ def test_the_result_says_what_was_done() -> None:
         [record(Domain.DISCRETE, 0, 40.0)], TWO, orders(Domain.DISCRETE, delays=(1, 3)), rest_output=0.0
     )
     assert (fit.loop, fit.status) == (Loop.CLOSED, Status.CONVERGED)
-    assert "Best of 6 starts" in fit.notes[0]
+    assert fit.notes[0].startswith("Best of ")
     again = FitResult.from_dict(fit.to_dict())
     np.testing.assert_array_equal(again.uncertainty.covariance, fit.uncertainty.covariance)
     assert fit.uncertainty.names == ("B(u1, 0)", "B(u1, 1)", "F(u1, 1)", "F(u1, 2)", "B(u2, 0)", "F(u2, 1)", "constant")
