@@ -1,21 +1,21 @@
 """Traces and a structure in, a FitResult out."""
 
 from sysid.estimation.attempts import Attempt
-from sysid.estimation.least_squares.posterior import Posterior
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.instrumental import fit_iv4
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
-from sysid.estimation.linear.uncertainty import Uncertainty
 from sysid.estimation.networks.joint import CascadeFit, JointTraining
 from sysid.estimation.networks.joint_training import fit_cascade, with_upstream_outputs
 from sysid.estimation.networks.narx import fit_narx
 from sysid.estimation.networks.neural_state_space import fit_neural_state_space
+from sysid.estimation.networks.posterior import Posterior
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.vector_narx import fit_vector_narx
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.estimation.result import Evidence, FitResult, Loop, Status
 from sysid.estimation.stability import StabilityOptions
+from sysid.estimation.uncertainty import Uncertainty
 
 __all__ = [
     "Attempt",

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.attempts import Attempt
-from sysid.estimation.linear.uncertainty import Uncertainty
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import AbstractModel, model_from_dict
 
 if TYPE_CHECKING:
-    from sysid.estimation.least_squares.posterior import Posterior
+    from sysid.estimation.networks.posterior import Posterior
 
 
 class Status(enum.Enum):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.linear.uncertainty import Uncertainty
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import ARXModel, Domain, TransferFunctionModel
 
 LinearModel = ARXModel | TransferFunctionModel

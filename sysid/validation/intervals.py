@@ -12,7 +12,7 @@ from scipy import stats
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Posterior
-from sysid.estimation.networks.provider import Experiment
+from sysid.estimation.experiment import Experiment
 from sysid.models import AbstractModel, Start
 from sysid.traces import Trace
 
@@ -140,7 +140,7 @@ def predict_interval(
 ) -> OutputInterval:
     """A fitted network's output over a trace, with the interval in which the measured output is expected.
 
-    Where the interval comes from, and its limits, stand at the head of :mod:`sysid.estimation.least_squares.posterior`.
+    Where the interval comes from, and its limits, stand at the head of :mod:`sysid.estimation.networks.posterior`.
 
     Args:
         fit: A fit with a posterior.

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from sysid.estimation import Loop, Training, fit_arx, fit_narx
+from sysid.estimation.experiment import experiments_of
 from sysid.estimation.linear.instrumental import fit_iv4
 from sysid.estimation.linear.order_search import OrderGrid, search_orders
-from sysid.estimation.networks.provider import RecursionProvider, experiments_of
+from sysid.estimation.networks.provider import RecursionProvider
 from sysid.models import ARX, NARX, Mapping, Start, StartKind
 from sysid.traces import Channel, Trace
 

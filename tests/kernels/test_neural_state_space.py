@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.neural_provider import NeuralProvider
-from sysid.estimation.networks.provider import BLOCK, Experiment
+from sysid.estimation.networks.provider import BLOCK
 from sysid.models import History, NeuralForm, NeuralStateSpace, Scaling
 from sysid.testing import finite_difference_jacobian, run_neural
 

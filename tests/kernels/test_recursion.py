@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sysid.estimation.networks.provider import BLOCK, Experiment, RecursionProvider
+from sysid.estimation.experiment import Experiment
+from sysid.estimation.networks.provider import BLOCK, RecursionProvider
 from sysid.models import NARX, History, Recursion, Scaling, parameter_count
 from sysid.testing import finite_difference_jacobian, simulate
 

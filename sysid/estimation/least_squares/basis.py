@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.networks.initialise import Layout
-from sysid.estimation.networks.provider import AbstractProvider, Linearisation
 from sysid.models import Lags
 
 SMALLEST = 1e-6

@@ -16,7 +16,7 @@ from sysid.errors import ConfigError
 from sysid.estimation.least_squares.damping import MarquardtDamping
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, State
-from sysid.estimation.networks.provider import AbstractProvider
+from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.result import Evidence
 
 MEASURED = ("mse", "damping", "effective_parameters", "elapsed_s")

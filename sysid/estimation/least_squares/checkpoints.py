@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, State
-from sysid.estimation.networks.provider import AbstractProvider
+from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.result import Status
 
 EVERY_S = 30.0

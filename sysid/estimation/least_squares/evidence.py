@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.estimation.networks.provider import Linearisation
+from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.result import Evidence
 
 ALPHA_BOUNDS = (1e-9, 1e9)

@@ -62,8 +62,8 @@ from threadpoolctl import threadpool_limits
 
 from sysid.estimation.least_squares.damping import MarquardtDamping
 from sysid.estimation.least_squares.evidence import Prior, update
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.least_squares.termination import MAX_DAMPING, Termination
-from sysid.estimation.networks.provider import AbstractProvider, Linearisation
 from sysid.estimation.result import Evidence, Status
 
 MIN_GAIN = 1e-4

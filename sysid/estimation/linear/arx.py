@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
+from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.linear.regression import Solution, deviation, solve, stack
-from sysid.estimation.linear.uncertainty import Uncertainty
-from sysid.estimation.networks.provider import Experiment, experiments_of
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import ARX, ARXModel, Mapping, Start
 from sysid.traces import Trace
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import lfilter
 
-from sysid.estimation.networks.provider import Experiment
+from sysid.estimation.experiment import Experiment
 
 TIME_CONSTANTS = (0.0, 2.0, 5.0, 12.0, 30.0, 80.0, 200.0)
 """Of the poles, in samples; those longer than the record are left out."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.poles import sections_of
-from sysid.estimation.networks.provider import Experiment
 from sysid.models import Domain, Mapping, Scaling, TransferFunction, TransferFunctionModel
 
 SAME = 1e-9

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.arx import arx_experiments, arx_model, arx_uncertainty, first_output, stability_note
 from sysid.estimation.linear.regression import Solution, regressor_matrix, solve, stack
-from sysid.estimation.networks.provider import Experiment
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.models import ARX, ARXModel, Mapping, Start

@@ -15,9 +15,9 @@ from scipy import linalg
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, TraceError
+from sysid.estimation.experiment import experiments_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import root_weights, stack
-from sysid.estimation.networks.provider import experiments_of
 from sysid.kernels import linear_orders as kernel
 from sysid.models import ARX, Lags, Mapping, Start
 from sysid.traces import Trace

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import TraceError
-from sysid.estimation.networks.provider import Experiment
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.models import Lags
 

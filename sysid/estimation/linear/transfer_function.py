@@ -10,6 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sysid.errors import TraceError
+from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.dead_time import likely, longest_dead_time
@@ -18,7 +19,6 @@ from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_star
 from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.transfer_function_search import AbstractProblem, Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
-from sysid.estimation.networks.provider import Experiment, experiments_of, unit_range
 from sysid.estimation.result import FitResult
 from sysid.models import AbstractModel, Domain, Mapping, Scaling, Start, TransferFunction, TransferFunctionModel
 from sysid.traces import Trace

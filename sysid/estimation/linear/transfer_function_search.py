@@ -21,9 +21,9 @@ from sysid.estimation.linear.dead_time import AROUND, descend
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import sections_of
 from sysid.estimation.linear.transfer_function_uncertainty import transfer_function_uncertainty
-from sysid.estimation.linear.uncertainty import Uncertainty
 from sysid.estimation.linear.variable_projection import PoleParameters, Sections, SeparableProvider
 from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import AbstractModel, Mapping, Scaling, TransferFunction, TransferFunctionModel
 from sysid.models.orthonormal_basis import Domain, section_poles
 

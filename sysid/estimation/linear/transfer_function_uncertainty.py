@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.estimation.linear.uncertainty import Uncertainty
 from sysid.estimation.linear.variable_projection import SeparableProvider, Separated
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import TransferFunctionModel
 from sysid.models import orthonormal_basis as ladders
 from sysid.models.orthonormal_basis import Domain

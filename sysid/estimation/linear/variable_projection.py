@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.linear.records import AbstractRecord, Ladders
-from sysid.estimation.networks.provider import AbstractProvider, Linearisation
 from sysid.models.orthonormal_basis import Domain, rungs, section_orders
 
 RANK_TOLERANCE = 1e-11

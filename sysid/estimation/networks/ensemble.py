@@ -42,9 +42,9 @@ from threadpoolctl import threadpool_limits
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Solution
+from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.initialise import Layout
-from sysid.estimation.networks.provider import AbstractProvider
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.models import NARXModel
 from sysid.traces import Trace

@@ -15,8 +15,8 @@ from sysid.errors import ChannelError
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.counted_rows import counted_rows
 from sysid.estimation.least_squares.leverage import leverage_roots
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.least_squares.robust_loss import counted
-from sysid.estimation.networks.provider import AbstractProvider, Linearisation
 from sysid.estimation.networks.trained_members import TrainedMembers
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import Program

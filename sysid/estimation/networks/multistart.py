@@ -23,10 +23,10 @@ from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
-from sysid.estimation.networks.provider import AbstractProvider
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import Loop, Status
 from sysid.models import NARXModel, NeuralStateSpaceModel, Start, beginning

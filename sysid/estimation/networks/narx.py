@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
+from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
-from sysid.estimation.least_squares.posterior import calibrate, laplace
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks import ensemble as committee
@@ -22,8 +22,9 @@ from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
+from sysid.estimation.networks.posterior import calibrate, laplace
 from sysid.estimation.networks.pretraining import StepSamples
-from sysid.estimation.networks.provider import Experiment, RecursionProvider, experiments_of, unit_range
+from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.raced import raced_result, raced_status
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import check_initial, grown

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
-from sysid.estimation.networks.provider import BLOCK, AbstractProvider, Experiment, Linearisation
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.networks.provider import BLOCK
 from sysid.kernels import neural_state_space as kernel
 from sysid.models import NeuralForm
 

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from sysid.errors import ConfigError
+from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
-from sysid.estimation.networks.provider import Experiment, experiments_of, unit_range
 from sysid.estimation.networks.raced import raced_result, raced_status
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import FitResult, Loop

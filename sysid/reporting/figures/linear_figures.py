@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import signal
 
-from sysid.estimation.linear.uncertainty import Uncertainty
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.models.to_control import state_space
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
 from sysid.reporting.linear_view import LinearModel, LinearView, linear_views

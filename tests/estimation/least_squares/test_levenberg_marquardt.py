@@ -9,8 +9,8 @@ from scipy.optimize import least_squares
 
 from sysid.estimation.least_squares.evidence import Group, Prior, update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.least_squares.termination import Termination
-from sysid.estimation.networks.provider import AbstractProvider, Linearisation
 from sysid.estimation.result import Status
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space
+from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import linear_start
-from sysid.estimation.networks.provider import experiments_of
 from sysid.models import Mapping, NeuralForm, NeuralStateSpace, Scaling, Start, StartKind
 from sysid.traces import Channel, Role, Trace
 from sysid.validation import evaluate_case

@@ -9,10 +9,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.estimation import Training, fit_narx
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.basis import RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.pretraining import SHARPEST, SMOOTHEST, StepSamples, space_filling
-from sysid.estimation.networks.provider import Experiment, RecursionProvider
+from sysid.estimation.networks.provider import RecursionProvider
 from sysid.models import NARX, History, Mapping, NARXModel, Scaling
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace

@@ -46,8 +46,9 @@ from numpy.typing import NDArray
 from scipy import linalg, stats
 
 from sysid.errors import ConfigError
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.levenberg_marquardt import State
-from sysid.estimation.networks.provider import Experiment, RecursionProvider
+from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.result import Loop
 from sysid.models import AbstractModel, Recursion
 

@@ -1,0 +1,245 @@
+"""One record as an estimator sees it: inputs, output, what came before, and what each sample counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import TraceError
+from sysid.models import (
+    AbstractModel,
+    Beginning,
+    History,
+    Lags,
+    Mapping,
+    Scaling,
+    Start,
+    StartKind,
+    beginning,
+)
+from sysid.traces import Trace
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Experiment:
+    """One record as an estimator sees it.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+        output: Measured output, shape ``(n_samples,)``.
+        history: The samples before the first.
+        weights: Weight of each squared residual, shape ``(n_samples,)``; zero where a sample does not count.
+            ``None`` for all ones.
+        usable: Which samples are not masked, shape ``(n_samples,)``; ``None`` for all.
+        past: Which samples of the history are measured and not masked, shape ``(n_past,)``; nothing is known of what
+            came before them. ``None`` where the history is declared: the system had stood there for ever.
+    """
+
+    inputs: NDArray[np.float64]
+    output: NDArray[np.float64]
+    history: History
+    weights: NDArray[np.float64] | None = None
+    usable: NDArray[np.bool_] | None = None
+    past: NDArray[np.bool_] | None = None
+
+    @classmethod
+    def from_trace(cls, trace: Trace, mapping: Mapping, start: Start, rest_output: float) -> Experiment:
+        """The record of one trace.
+
+        Args:
+            trace: The trace.
+            mapping: Which channels go in, which comes out.
+            start: Where its history comes from.
+            rest_output: Output at rest.
+
+        Returns:
+            The experiment, without the samples that became history. For an estimated start it is the whole record,
+            before which nothing is known.
+
+        Raises:
+            ChannelError: If the trace lacks a channel of the mapping.
+            TraceError: If the trace is not longer than a measured start.
+        """
+        inputs, output = trace.columns(mapping.inputs), trace.columns([mapping.output])[:, 0]
+        history = start.history(inputs, output, rest_output, trace.usable_samples)
+        if start.kind is StartKind.ESTIMATED:
+            return cls._of(trace, inputs, output, Beginning(history=history, first=0), np.zeros(1, dtype=np.bool_))
+        n = start.n_measured
+        past = trace.usable_samples[:n] if n else None
+        return cls._of(trace, inputs, output, Beginning(history=history, first=n), past)
+
+    @classmethod
+    def for_model(cls, trace: Trace, model: AbstractModel, start: Start) -> Experiment:
+        """The record of one trace as the free run of a model goes over it, from where that begins.
+
+        Args:
+            trace: The trace.
+            model: The model, whose initial state is estimated where the start says so.
+            start: Where its history comes from.
+
+        Returns:
+            The experiment, without the samples before the first that is scored.
+
+        Raises:
+            ChannelError: If the trace lacks a channel of the model's mapping.
+            TraceError: If the trace is not longer than a measured start.
+        """
+        inputs, output = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
+        begun = beginning(model, inputs, output, start, trace.usable_samples)
+        return cls._of(trace, inputs, output, begun, trace.usable_samples[: begun.first] if begun.first else None)
+
+    @classmethod
+    def _of(
+        cls,
+        trace: Trace,
+        inputs: NDArray[np.float64],
+        output: NDArray[np.float64],
+        begun: Beginning,
+        past: NDArray[np.bool_] | None,
+    ) -> Experiment:
+        n = begun.first
+        usable = trace.usable_samples[n:]
+        weights = None if usable.all() else usable.astype(np.float64)
+        if trace.weights is not None:
+            weights = usable * trace.weights[n:]
+        return cls(
+            inputs=inputs[n:],
+            output=output[n:],
+            history=begun.history,
+            weights=weights,
+            usable=None if usable.all() else usable,
+            past=past,
+        )
+
+    @property
+    def free(self) -> bool:
+        """Whether the state before the record is estimated: nothing was declared of what came before it."""
+        return self.past is not None
+
+    def from_measured(self, lags: Lags) -> Experiment:
+        """The same record from where all lags of a row are in it, its first samples being the history.
+
+        Args:
+            lags: What a row looks at.
+
+        Returns:
+            The record; as it is where its history is declared or measured.
+
+        Raises:
+            TraceError: If the record is no longer than the lags.
+        """
+        n = max(lags.depth, 1)
+        if self.past is None or self.past.any():
+            return self
+        if len(self.output) <= n:
+            raise TraceError(
+                "the record is too short for its lags",
+                expected=f"more than {n} samples",
+                got=f"{len(self.output)} samples",
+                remedy="use fewer or shorter lags, or a longer record",
+            )
+        usable = np.ones(len(self.output), dtype=np.bool_) if self.usable is None else self.usable
+        return Experiment(
+            inputs=self.inputs[n:],
+            output=self.output[n:],
+            history=History(inputs=self.inputs[:n], output=self.output[:n]),
+            weights=None if self.weights is None else self.weights[n:],
+            usable=None if self.usable is None else self.usable[n:],
+            past=usable[:n],
+        )
+
+    def one_step(self, lags: Lags) -> Experiment:
+        """The same record as rows that are fitted one step ahead see it.
+
+        A row that looks at a sample which is masked, or which came before the record and was not declared, does not
+        count: what stands there is a filling, and nobody's regressor.
+
+        Args:
+            lags: What a row looks at.
+
+        Returns:
+            The record with the weights of its rows.
+        """
+        known = self._known_rows(lags.depth, {*lags.output, *(lag for of in lags.inputs for lag in of)})
+        if known.all():
+            return self
+        return replace(self, weights=self._weighted(known))
+
+    def within(self, horizon: int, lags: Lags) -> Experiment:
+        """The same record as free runs over a horizon see it, each beginning at measured outputs.
+
+        Args:
+            horizon: Samples after which a run begins anew.
+            lags: What a row looks at.
+
+        Returns:
+            The record; runs that would begin at a masked output do not count.
+        """
+        known = self._known_rows(lags.depth, set(lags.output))
+        if known.all():
+            return self
+        begins = np.arange(len(known)) // horizon * horizon
+        return replace(self, weights=self._weighted(known[begins]))
+
+    def _weighted(self, known: NDArray[np.bool_]) -> NDArray[np.float64]:
+        weights = np.ones(len(known)) if self.weights is None else self.weights
+        return np.where(known, weights, 0.0)
+
+    def _known_rows(self, depth: int, lags: set[int]) -> NDArray[np.bool_]:
+        """Rows whose samples at some lags are measured, or declared to have stood there before the record."""
+        n = len(self.output)
+        usable = np.ones(n, dtype=np.bool_) if self.usable is None else self.usable
+        past = np.ones(depth, dtype=np.bool_) if self.past is None else np.concatenate([np.zeros(depth), self.past])
+        known = np.concatenate([past[len(past) - depth :].astype(np.bool_), usable])
+        rows = np.ones(n, dtype=np.bool_)
+        for lag in lags:
+            rows &= known[depth - lag : depth - lag + n]
+        return rows
+
+    @property
+    def past_weights(self) -> NDArray[np.float64]:
+        """Weights of the history's samples where they are fitted too: zero for those that are masked."""
+        return np.ones(len(self.history.output)) if self.past is None else self.past.astype(np.float64)
+
+    @property
+    def n_counted(self) -> int:
+        """Samples that count."""
+        return len(self.output) if self.weights is None else int(np.count_nonzero(self.weights))
+
+
+def experiments_of(
+    traces: Sequence[Trace], mapping: Mapping, start: Start, rest_output: float
+) -> tuple[Experiment, ...]:
+    """The experiments of several traces.
+
+    Args:
+        traces: The traces; never concatenated.
+        mapping: Which channels go in, which comes out.
+        start: Where each history comes from.
+        rest_output: Output at rest.
+
+    Returns:
+        One experiment per trace.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If a trace is not longer than a measured start.
+    """
+    return tuple(Experiment.from_trace(trace, mapping, start, rest_output) for trace in traces)
+
+
+def unit_range(experiments: Sequence[Experiment]) -> Scaling:
+    """The scaling that maps what the samples range over, but for masked ones, onto -1 to 1.
+
+    Args:
+        experiments: The records.
+
+    Returns:
+        The scaling.
+    """
+    seen = [(e.inputs, e.output) if e.usable is None else (e.inputs[e.usable], e.output[e.usable]) for e in experiments]
+    kept = [pair for pair in seen if len(pair[1])] or [(e.inputs, e.output) for e in experiments]
+    return Scaling.to_unit_range([inputs for inputs, _ in kept], [output for _, output in kept])

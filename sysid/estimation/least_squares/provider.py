@@ -1,0 +1,61 @@
+"""The seam of every fit: what gives residuals and Jacobians, and what a Gauss-Newton method needs to know of them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linearisation:
+    r"""What a Gauss-Newton method needs to know at one point.
+
+    Args:
+        loss: :math:`\frac12 \sum w e^2` in scaled numbers.
+        gradient: :math:`J^T W e` with :math:`e = \hat y - y`, shape ``(n_parameters,)``.
+        gauss_newton: :math:`J^T W J`, shape ``(n_parameters, n_parameters)``.
+        correlation_time: Counted samples after which the residuals count as new information, at least 1 (see
+            :func:`correlation_time`).
+    """
+
+    loss: float
+    gradient: NDArray[np.float64]
+    gauss_newton: NDArray[np.float64]
+    correlation_time: float = 1.0
+
+    @property
+    def finite(self) -> bool:
+        """Whether the matrix can be used: the sensitivities of an unstable free run grow beyond all numbers."""
+        return bool(np.isfinite(self.gauss_newton).all() and np.isfinite(self.gradient).all())
+
+
+class AbstractProvider(ABC):
+    """Residuals of a model over experiments, as a function of its flat parameters."""
+
+    n_samples: int
+    """Samples that count."""
+
+    @abstractmethod
+    def loss(self, theta: NDArray[np.float64]) -> float:
+        """Half the weighted sum of squared residuals; ``inf`` where it is not finite.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            The loss in scaled numbers.
+        """
+
+    @abstractmethod
+    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+        """Loss, gradient and Gauss-Newton matrix.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            All three.
+        """
