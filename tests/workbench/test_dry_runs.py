@@ -8,7 +8,7 @@ import pytest
 
 from sysid.workbench.cli import run_cli
 from sysid.workbench.kinds import RunRequest, kind_of, kinds
-from sysid.workbench.runner.listeners import foresee
+from sysid.workbench.listeners import foresee
 from tests.workbench.test_bad_inputs import contents
 
 PIPELINES = sorted((Path(__file__).resolve().parents[2] / "pipelines").glob("*.yaml"))

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.attempts import Attempt
-from sysid.estimation.least_squares.basis import RebasedProvider
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.networks.basis import RebasedProvider
 from sysid.estimation.networks.joint_provider import CascadeProvider
 from sysid.estimation.networks.member_layout import JointLayout
 from sysid.estimation.networks.multistart import INITIAL_ALPHA

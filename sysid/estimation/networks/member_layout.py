@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from sysid.estimation.least_squares.basis import RegressorBasis
 from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.models import Ends, Lags, Member
 from sysid.models.cascade_program import Part

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range
-from sysid.estimation.least_squares.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks import ensemble as committee
 from sysid.estimation.networks import multistart as starts
+from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views

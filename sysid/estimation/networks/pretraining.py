@@ -29,9 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.least_squares.basis import RegressorBasis
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.linear.regression import lagged
+from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.estimation.networks.provider import BLOCK
 from sysid.models import NARXModel

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.kinds import RunRequest, kind_of, kinds
+from sysid.workbench.listeners import foresee, perform
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.dry_run import together
-from sysid.workbench.runner.listeners import foresee, perform
 from sysid.workbench.runner.screen import duration, table_of_steps
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from sysid.errors import ConfigError
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.kinds import KINDS, RunRequest, kind_of
-from sysid.workbench.runner.listeners import perform
+from sysid.workbench.listeners import perform
 from sysid.workbench.sweep.run import program, read_sweep_file
 from sysid.workbench.sweep.store import TRIALS, TrialStore
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.estimation import Training, fit_narx
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.least_squares.basis import RegressorBasis
+from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.pretraining import SHARPEST, SMOOTHEST, StepSamples, space_filling
 from sysid.estimation.networks.provider import RecursionProvider

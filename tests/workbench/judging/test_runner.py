@@ -18,7 +18,7 @@ from sysid.models import History
 from sysid.reporting.results import read_results
 from sysid.workbench.judging import runner
 from sysid.workbench.kinds import RunRequest
-from sysid.workbench.runner.listeners import perform
+from sysid.workbench.listeners import perform
 from sysid.workbench.tracking.mlflow_store import connect
 
 PIPELINE = """\

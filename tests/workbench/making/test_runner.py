@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict
 
 from sysid.ingest import load_dataset
 from sysid.workbench.kinds import RunRequest
+from sysid.workbench.listeners import perform
 from sysid.workbench.making import runner
-from sysid.workbench.runner.listeners import perform
 
 PIPELINE = "kind: ramps\nname: ramp\ndescription: two of them\noptions: {heights: [1, 2]}\n"
 

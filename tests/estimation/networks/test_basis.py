@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.least_squares.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.least_squares.correlation import correlation_time
+from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.models import History, Lags, Recursion, Scaling
