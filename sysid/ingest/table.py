@@ -219,9 +219,15 @@ class RawTable:
             )
         part = slice(first - 1, stop)
         columns = tuple(replace(column, values=column.values[part]) for column in self.columns)
+        reach = first if last is None else last
+        others = tuple(
+            replace(column, values=column.values[first - 1 : last])
+            for column in self.others
+            if len(column.values) >= reach
+        )
         lines = self.lines[part] if self.lines is not None else np.arange(first, stop + 1)
         note = f"rows {first} to {stop} of {len(self)}"
-        return replace(self, columns=columns, others=(), records=(), lines=lines, notes=(*self.notes, note))
+        return replace(self, columns=columns, others=others, records=(), lines=lines, notes=(*self.notes, note))
 
     def place(self, row: int) -> str:
         """Where a row is, for messages.
@@ -244,16 +250,32 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
     Returns:
         Its name, or ``None`` if no column is plainly one.
     """
-    for column in columns:
-        whole = column.name.casefold().strip()
-        # In whatever group it stands: "rig/time", "run{2}.t".
-        for plain in (whole, re.split(r"[/.]", whole)[-1]):
-            # "t_ms", "time.s": the unit at the end of the name
-            stem = next((plain[: -len(u) - 1] for u in _TIME_UNITS if plain.endswith((f"_{u}", f".{u}"))), plain)
-            if plain in _TIME_NAMES or stem in _TIME_NAMES:
-                return column.name
+    named = [column for column in columns if _is_called_time(column.name)]
+    # A capital T may be a temperature: only where nothing else is called time, and it rises.
+    plain = [column for column in named if re.split(r"[/.]", column.name.strip())[-1] != "T"]
+    alone = [column for column in named if _may_be_clock(column)]
+    if plain or alone:
+        return (plain or alone)[0].name
     timed = [column.name for column in columns if column.unit is not None and time_unit(column.unit) in _TIME_UNITS]
     return timed[0] if timed else None
+
+
+def _may_be_clock(column: RawColumn) -> bool:
+    if column.unit is not None and time_unit(column.unit) not in _TIME_UNITS:
+        return False
+    steps = np.diff(column.values)
+    return not len(steps) or bool(np.mean(steps > 0.0) > 0.5)
+
+
+def _is_called_time(name: str) -> bool:
+    whole = name.casefold().strip()
+    # In whatever group it stands: "rig/time", "run{2}.t".
+    for plain in (whole, re.split(r"[/.]", whole)[-1]):
+        # "t_ms", "time.s": the unit at the end of the name
+        stem = next((plain[: -len(u) - 1] for u in _TIME_UNITS if plain.endswith((f"_{u}", f".{u}"))), plain)
+        if plain in _TIME_NAMES or stem in _TIME_NAMES:
+            return True
+    return False
 
 
 def is_time_unit(unit: str) -> bool:

@@ -89,6 +89,26 @@ def test_what_unpacks_to_more_than_a_file_may_hold_is_refused(
         read_table(tmp_path / name)
 
 
+def test_a_lone_cell_far_out_does_not_make_a_sheet_of_empty_ones(tmp_path: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active["A1"], book.active["A2"], book.active["XFD50000"] = "u", 1.0, 2.0
+    book.save(tmp_path / "a.xlsx")
+    with pytest.raises(ReaderError, match=r"8\.19e\+08 cells in the sheet Sheet"):
+        read_table(tmp_path / "a.xlsx")
+
+
+def test_a_link_into_another_file_is_not_followed(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["secret"] = U
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["u"], file["link"] = U, h5py.ExternalLink(str(tmp_path / "other.h5"), "/secret")
+    assert read_table(tmp_path / "a.h5").names == ("u",)
+
+
 def test_json_is_counted_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a.json").write_text(json.dumps([[]] * 10_000))
     monkeypatch.setattr(json_text, "_MOST_BYTES", 10_000)

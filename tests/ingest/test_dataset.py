@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sysid.content import content_folders
-from sysid.errors import ConfigError, ReaderError
+from sysid.errors import ConfigError, ReaderError, UserError
 from sysid.ingest import find_dataset, load_dataset
 from sysid.traces import Role
 
@@ -209,3 +209,37 @@ cases:
     lost = [100_000 * k for k in range(1439) if any(a < 100_000 * k < b for a, b in gaps)]
     assert len(gaps) == 3
     np.testing.assert_allclose(trace.time[~trace.usable_samples], np.array(lost) / 1e6, atol=1e-9)
+
+
+TWO_RECORDS = """
+name: two
+sample_time: 0.1
+channels: [{name: u, unit: V}, {name: y, unit: V}]
+source: {files: {time: {step: 0.1}, units: V}}
+cases:
+  EST: {role: estimation, file: a.npz, columns: {u: uEst, y: yEst}}
+  VAL: {role: validation, file: a.npz, columns: {u: uVal, y: yVal}}
+  END: {role: test, file: a.npz, columns: {u: uVal, y: yVal}, rows: [3, null]}
+  MID: {role: test, file: a.npz, columns: {u: uEst, y: yEst}, rows: [3, 14]}
+"""
+
+
+def test_cases_of_one_file_have_columns_and_rows_of_their_own(tmp_path: Path) -> None:
+    u, y = np.arange(20.0), np.arange(20.0) ** 2
+    np.savez(tmp_path / "a.npz", uEst=u, yEst=y, uVal=-u[:13], yVal=-y[:13])
+    (tmp_path / "dataset.yaml").write_text(TWO_RECORDS)
+    traces = load_dataset(tmp_path)
+    assert {trace.name: len(trace) for trace in traces} == {"EST": 20, "VAL": 13, "END": 11, "MID": 12}
+    np.testing.assert_array_equal(traces["VAL"]["y"], -y[:13])
+    np.testing.assert_array_equal(traces["END"]["u"], -u[2:13])
+    np.testing.assert_array_equal(traces["MID"]["y"], y[2:14])
+    assert "rows 3 to 14 of 20" in traces["MID"].provenance
+
+
+@pytest.mark.parametrize("rows", ["[0, 4]", "[5, 30]", "[9, 4]"])
+def test_rows_that_are_not_there_are_refused(tmp_path: Path, rows: str) -> None:
+    np.savez(tmp_path / "a.npz", uEst=np.arange(20.0), yEst=np.arange(20.0))
+    text = TWO_RECORDS.split("  VAL", maxsplit=1)[0].replace("y: yEst}", f"y: yEst}}, rows: {rows}")
+    (tmp_path / "dataset.yaml").write_text(text)
+    with pytest.raises(UserError, match="rows"):
+        load_dataset(tmp_path)

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from sysid.errors import MissingExtraError, ReaderError
 from sysid.ingest.headers import Header, is_unit, parse_header, split_reference
 from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.readers.bounds import check_zip
+from sysid.ingest.readers.bounds import check_zip, too_large
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.table import RawColumn, RawTable, RecordChoice, array_column, recognise_time
 
 _ZIP, _OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _BIFF = (b"\x09\x00", b"\x09\x02", b"\x09\x04", b"\x09\x08")
+_MOST_CELLS = 40_000_000
 _FIRST = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/")
 
 
@@ -80,6 +81,10 @@ def _sheets(path: Path, engine: str) -> dict[str, NDArray[Any]]:
         raise
     except Exception as error:  # xlrd and openpyxl raise classes of their own and any others on damaged files
         raise damaged(path, "Excel", error) from error
+    for name, rows in sheets.items():
+        cells = len(rows) * max((len(row) for row in rows), default=0)
+        if cells > _MOST_CELLS:
+            raise too_large(path, f"{cells:.3g} cells in the sheet {name}", 8 * _MOST_CELLS)
     return {name: _grid(rows) for name, rows in sheets.items()}
 
 

@@ -136,6 +136,8 @@ def _group(group: Any, notes: list[str], seen: set[int]) -> dict[str, Any]:
     steps = {key: group.attrs[key] for key in group.attrs if np.size(group.attrs[key]) == 1}
     tree.update({f"{key}": value for key, value in steps.items() if isinstance(value, np.generic | int | float)})
     for name in group:
+        if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+            continue  # what another file holds is not asked for
         item = group.get(name)
         identity = h5py.h5o.get_info(item.id).addr if item is not None else 0
         if isinstance(item, h5py.Group) and identity not in seen:  # a link may lead back
@@ -146,7 +148,7 @@ def _group(group: Any, notes: list[str], seen: set[int]) -> dict[str, Any]:
 
 
 def _dataset(name: str, item: Any, notes: list[str]) -> Any:
-    if item.shape is None or item.is_virtual:
+    if item.shape is None or item.is_virtual or item.external:
         return None
     if item.dtype.names:  # a table: one column per field
         table = item[()]

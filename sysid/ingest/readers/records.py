@@ -22,7 +22,7 @@ _ROLES = {
 }
 _WORDS = {word: role for role, words in _ROLES.items() for word in words}
 _SHORT = {"e": "estimation", "v": "validation"}
-_ENDINGS = ("est", "val", "train", "test", "id")
+_ENDINGS = ("train", "test", "est", "val", "id")
 _NUMBERED = re.compile(
     r"(?:exp|experiment|run|record|rec|recording|trial|test|case|seg|segment|sweep|set|measurement|meas|log|data|"
     r"part|session|batch|shot)[ _.-]?\d+",
