@@ -109,7 +109,7 @@ def plain_unit(unit: str) -> str | None:
         ('N', 'm^3/h', None)
     """
     text = unit.strip()
-    if text in _USUAL:
+    if text in USUAL_UNITS:
         return text
     if not text or len(text) > _LONGEST_UNIT or _TOWER.search(text) or _NORMAL_VOLUME.match(text):
         return None
@@ -128,7 +128,7 @@ def _is_pint(text: str) -> bool:
     return True
 
 
-_USUAL = frozenset(
+USUAL_UNITS = frozenset(
     {
         "1",
         "s",
@@ -168,7 +168,7 @@ def is_pressure(unit: str) -> bool:
     Returns:
         True if it is.
     """
-    if unit in _USUAL:
+    if unit in USUAL_UNITS:
         return unit in _PRESSURES
     return plain_unit(unit) is not None and _parsed(unit).is_compatible_with(_parsed("Pa"))
 

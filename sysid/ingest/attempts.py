@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import ReaderError, UserError
-from sysid.ingest.numbers import USUAL_MISSING
+from sysid.ingest.numbers import usually_missing
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.reading import read_table
 from sysid.ingest.table import RawColumn, RawTable
@@ -111,7 +111,7 @@ def _missing(table: RawTable) -> dict[str, Any] | None:
     """Texts that mostly stand for a missing value, where they are all that a column of numbers holds beside them."""
     found: dict[str, None] = {}
     for column in table.columns:
-        if column.strange and all(text.casefold() in USUAL_MISSING for text in column.strange):
+        if column.strange and all(map(usually_missing, column.strange)):
             found |= dict.fromkeys(column.strange)
     return {"missing": tuple(found)} if found else None
 
@@ -134,6 +134,8 @@ def _long(table: RawTable) -> dict[str, Any] | None:
     """A table of (time, signal, value): one column of names, one of numbers, and times that come again."""
     words = [c for c in table.columns if c.words is not None and c.problem is not None and len(c.words.texts) > 1]
     numbers = [c for c in table.columns if c.name != table.time and c.problem is None and np.isfinite(c.values).any()]
+    if table.time is not None and not words and len(numbers) == 2:
+        return _numbered(table, numbers)
     if table.time is None or not words or len(numbers) != 1:
         return None
     time = next(column for column in table.columns if column.name == table.time)
@@ -142,6 +144,18 @@ def _long(table: RawTable) -> dict[str, Any] | None:
         return None
     units = next((c.name for c in words if c is not names and _follows(c, names)), None)
     return {"long": {"names": names.name, "values": numbers[0].name} | ({"units": units} if units else {})}
+
+
+def _numbered(table: RawTable, numbers: Sequence[RawColumn]) -> dict[str, Any] | None:
+    """A long table whose signals have numbers: each of them once at each time."""
+    time = next(column.values for column in table.columns if column.name == table.time)
+    for names, values in (numbers, numbers[::-1]):
+        found = np.unique(names.values)
+        whole = len(found) > 1 and np.isfinite(found).all() and (found == np.rint(found)).all()
+        pairs = np.unique(np.column_stack([time, names.values]), axis=0)
+        if whole and len(pairs) == len(table) == len(np.unique(time)) * len(found):
+            return {"long": {"names": names.name, "values": values.name}}
+    return None
 
 
 def _names_rows(names: RawColumn, time: RawColumn) -> bool:

@@ -78,6 +78,12 @@ def clock_of(values: NDArray[np.float64], name: str, *, origin: int = 0) -> Cloc
     dated = any(word in name.casefold() for word in _DATE_NAMES)
     for clock in CLOCKS:
         possible = clock.low <= low and high <= clock.high and step * clock.seconds <= _DAY
-        if possible and (not clock.by_name or dated or step * clock.seconds <= 2.0):
+        if possible and (not clock.by_name or dated or step * clock.seconds <= 2.0 or _is_in_days(step)):
             return clock
     return None
+
+
+def _is_in_days(step: float) -> bool:
+    """Whether a step is a whole number of seconds if it is in days, and no short number if it is not."""
+    seconds = step * _DAY
+    return abs(seconds - round(seconds)) < 1e-4 * seconds and abs(step - float(f"{step:.3g}")) > 1e-6 * step

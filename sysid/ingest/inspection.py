@@ -122,6 +122,8 @@ class FileFinding:
     def problems(self) -> tuple[str, ...]:
         """What a data set of this file has to deal with, one phrase each."""
         found = list(self.notes)
+        given = self.files.model_dump(exclude_none=True)
+        found += [f"{name}: {given[name]} is a guess" for name in sorted(self.guessed - {"zone"}) if name in given]
         found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
         timing = self.timing
         if timing is None:
@@ -192,6 +194,8 @@ def _written_down(files: FileOptions, table: RawTable) -> FileOptions:
 def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
     files, repairs = attempt.files, attempt.repairs
     time, told = _time(table, files)
+    if "zone" in attempt.guessed:
+        told = f"guessed: the clock on the wall of {time.zone}, as it jumps by an hour"
     timing, unstamped, step = None, 0, time.step or 1.0
     needs: dict[str, object] = {}
     if time.step is None:
@@ -343,7 +347,8 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     # Few records are sampled slower than every 5 s, and few clocks count finer than they sample.
     guess = "s" if step < 5.0 else "ms" if step < 5e3 else "us"
     why = f"the file says {said}, which is no unit of time" if said else "the file does not say its unit"
-    return TimeOptions(column=column.name, unit=guess), f"guessed: {by_rising or name} in {guess}; {why}"
+    first = f"{by_rising}; " if by_rising else ""
+    return TimeOptions(column=column.name, unit=guess), f"guessed: {first}{name} in {guess}; {why}"
 
 
 def _step_in_a_column(columns: Sequence[RawColumn]) -> float | None:

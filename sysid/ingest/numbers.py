@@ -24,6 +24,19 @@ USUAL_MISSING = frozenset(
 )
 """Texts that mostly stand for a missing value: proposed as ``missing``, and never taken so by themselves."""
 
+
+def usually_missing(text: str) -> bool:
+    """Whether a text mostly stands for a missing value, as ``n/a``, ``---`` and ``****`` do.
+
+    Args:
+        text: A cell that is no number.
+
+    Returns:
+        True if it does.
+    """
+    return text.casefold() in USUAL_MISSING or (len(text) > 0 and not text.strip("*#?-_."))
+
+
 MOST_WORDS = 64
 """Different texts that are no numbers, above which a column is one of remarks."""
 
@@ -38,12 +51,14 @@ class NumberFormat:
             last one in a number is the decimal one: some loggers write 1003 ms as ``1.003.000``.
         missing: Further texts that stand for a missing value.
         states: Words that stand for numbers.
+        suffix: The unit behind every number, which is taken off.
     """
 
     decimal: str = "."
     thousands: str | None = None
     missing: tuple[str, ...] = ()
     states: Mapping[str, float] = field(default_factory=dict)
+    suffix: str = ""
 
     def parse(self, cell: str) -> float | None:
         """One cell.
@@ -61,6 +76,8 @@ class NumberFormat:
             True
         """
         text = cell.strip()
+        if self.suffix:
+            text = text.removesuffix(self.suffix).rstrip()
         if text.lower() in MISSING or text in self.missing:
             return float("nan")
         if text in self.states:
@@ -113,7 +130,7 @@ class NumberFormat:
     def _fast(self, cells: Sequence[str]) -> NDArray[np.float64] | None:
         # float() knows more than the pattern does (1_0, 1.5 with a decimal comma, other scripts'
         # digits); a column without such characters can go through it at once.
-        if self.thousands is not None or not cells:
+        if self.thousands is not None or self.suffix or not cells:
             return None
         joined = "\n".join(cells)
         foreign = ("_", "." if self.decimal == "," else ",", "n", "N")

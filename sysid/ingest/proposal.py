@@ -102,7 +102,7 @@ def _files(finding: FileFinding) -> list[str]:
     else:
         pairs = {"column": time.column, "unit": time.unit, "format": time.format, "zone": time.zone}
         shown = _mapping({key: value for key, value in pairs.items() if value is not None})
-    told = finding.time_told or ("guessed: zone" if "zone" in finding.guessed else "")
+    told = finding.time_told
     told = told if not told or "guess" in told else f"guessed: {told}"
     lines = [] if own else [f"    time: {shown}" + (f"  # {_comment(told)}" if told else "")]
     options = finding.files.model_dump(

@@ -97,7 +97,8 @@ def _second_time(local: NDArray[np.int64], twice: NDArray[np.bool_], shift: int)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], twice, [False]]).astype(np.int8)))
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        back = np.flatnonzero(steps[start : stop - 1] < -shift // 4)
+        inside = steps[start : stop - 1]
+        back = np.flatnonzero((inside <= 0) & (np.abs(inside + shift - usual) < np.abs(inside - usual)))
         if len(back):
             second[start + int(back[0]) + 1 : stop] = True
             continue

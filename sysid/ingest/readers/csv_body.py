@@ -18,7 +18,7 @@ from sysid.errors import ReaderError
 from sysid.ingest.calendar import Calendar
 from sysid.ingest.numbers import MISSING, NumberFormat
 from sysid.ingest.options import RepairOptions
-from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, kind_of, split_rows, trimmed
+from sysid.ingest.readers.csv_cells import BLANKS, DATA, TOUCHING, Kind, Row, kind_of, split_rows, trimmed
 from sysid.ingest.readers.csv_layout import Layout
 from sysid.ingest.readers.growing import Growing
 from sysid.ingest.readers.text_source import Block, TextFile
@@ -32,6 +32,7 @@ _QUOTED = re.compile(rb'"([^"\n,;\t| ]*)"')
 _PLUS = re.compile(rb"(?<![eEdD0-9])\+(?=[0-9.])")
 _BLANKS = re.compile(rb"[ \t]+")
 _ENDS = re.compile(rb"^ | $", re.MULTILINE)
+_TOUCHING = re.compile(TOUCHING.pattern.encode())
 _FORTRAN = re.compile(rb"(?<=[0-9.,])[dD](?=[-0-9])")
 
 
@@ -256,6 +257,7 @@ class Body:
             data = _PLUS.sub(b"", data)
         if self.layout.separator == BLANKS:
             data = _ENDS.sub(b"", _BLANKS.sub(b" ", data))
+            data = _TOUCHING.sub(b" -", data) if b"-" in data else data
         if (b"D" in data or b"d" in data) and all(isinstance(column, Numbers) for column in self.columns):
             data = _FORTRAN.sub(b"e", data)
         return data
@@ -265,6 +267,7 @@ class Body:
         ended = io.StringIO(block.text, newline="\n")
         found = split_rows(ended, self.layout.separator, line=block.line, comment=self.comment, path=self.file.path)
         rows = [Row(line=row.line, cells=trimmed(row.cells, width)) for row in found]
+        rows = self._without_headers(rows)
         footer = self._footer(rows) if last else 0
         if footer:
             cut = rows[len(rows) - footer :]
@@ -280,6 +283,15 @@ class Body:
         self._lines.extend(lines)
         for index, column in enumerate(self.columns):
             column.add([row.cells[index] for row in whole], lines)
+
+    def _without_headers(self, rows: list[Row]) -> list[Row]:
+        """The rows without the header, where it comes again, as after a restart of the logger."""
+        names = [name.strip() for name in self.layout.names]
+        again = [row for row in rows if names and [cell.strip() for cell in row.cells] == names]
+        if not again:
+            return rows
+        self.notes.append(f"the header comes again in line {again[0].line} and is left out there")
+        return [row for row in rows if row not in again]
 
     def _footer(self, rows: list[Row]) -> int:
         """How many rows at the end are no longer numbers."""

@@ -12,7 +12,8 @@ from pathlib import Path
 from sysid.errors import ReaderError
 from sysid.ingest.calendar import is_calendar
 from sysid.ingest.headers import is_unit
-from sysid.ingest.numbers import MISSING, USUAL_MISSING
+from sysid.ingest.numbers import MISSING, usually_missing
+from sysid.units import USUAL_UNITS
 
 BLANKS = " "
 """The separator that stands for a run of blanks and tabs."""
@@ -34,6 +35,9 @@ _NUMBER = re.compile(
     r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+|[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]*)?)(?:[eEdD][+-]?[0-9]+)?"
     r"|[+-]?(?i:inf(?:inity)?)"
 )
+_WITH_UNIT = re.compile(r"[+-]?[0-9]*[.,]?[0-9]+(?:[eE][+-]?[0-9]+)?\s?(?P<unit>[A-Za-z%°][A-Za-z/^0-9°]{0,5})")
+# Fortran's columns may touch where a number is negative: 1.0000E+00-2.0000E+00.
+TOUCHING = re.compile(r"(?<=[0-9])-(?=[0-9]*\.[0-9])")
 _WHOLE = re.compile(r"[+-]?[0-9]{16,19}")
 
 
@@ -61,11 +65,26 @@ def kind_of(cell: str, missing: Sequence[str] = ()) -> Kind:
         The kind; what usually stands for a missing value is nothing.
     """
     text = cell.strip()
-    if text.casefold() in MISSING or text.casefold() in USUAL_MISSING or text in missing:
+    if text.casefold() in MISSING or usually_missing(text) or text in missing:
         return Kind.NOTHING
     if _NUMBER.fullmatch(text):
         return Kind.WHOLE if _WHOLE.fullmatch(text) and not is_calendar(text) else Kind.NUMBER
-    return Kind.TIME if is_calendar(text) else Kind.WORD
+    if is_calendar(text):
+        return Kind.TIME
+    return Kind.NUMBER if suffix_of(text) else Kind.WORD
+
+
+def suffix_of(text: str) -> str:
+    """The unit behind a number in a cell.
+
+    Args:
+        text: For example ``"12.5 V"``.
+
+    Returns:
+        For example ``"V"``; empty where there is none, or the text is no number with a usual unit.
+    """
+    match = _WITH_UNIT.fullmatch(text)
+    return match["unit"] if match and (match["unit"] in USUAL_UNITS or match["unit"] in "%°°C°F") else ""
 
 
 def trimmed(cells: list[str], width: int) -> list[str]:
@@ -105,7 +124,7 @@ def split_rows(
     # A comment becomes a blank line, so that the line numbers in messages stay those of the file.
     kept = ("\n" if text.startswith(comment) else text for text in lines)
     if separator == BLANKS:
-        kept = (text.replace("\t", " ").strip() + "\n" for text in kept)
+        kept = (TOUCHING.sub(" -", text.replace("\t", " ").strip()) + "\n" for text in kept)
     parser = csv.reader(kept, delimiter=separator, strict=True, skipinitialspace=separator == BLANKS)
     try:
         for cells in parser:

@@ -12,9 +12,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sysid.errors import ReaderError
+from sysid.ingest.headers import parse_header
 from sysid.ingest.numbers import NumberFormat
 from sysid.ingest.options import FileOptions
-from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, is_units, kind_of, split_rows, trimmed
+from sysid.ingest.readers.csv_cells import (
+    BLANKS,
+    DATA,
+    Kind,
+    Row,
+    is_units,
+    kind_of,
+    split_rows,
+    suffix_of,
+    trimmed,
+)
 
 SEPARATORS = ("\t", ";", ",", "|", BLANKS)
 """What may stand between cells; the earlier one wins where two fit."""
@@ -40,6 +51,7 @@ class Layout:
         header: Line of the header, or ``None``.
         preamble: Rows before the header.
         comments: Comments before the numbers, without their mark.
+        suffixes: The unit behind every number of a column, or the empty text.
         notes: What was recognised and should be told.
     """
 
@@ -52,6 +64,7 @@ class Layout:
     header: int | None
     preamble: tuple[Row, ...]
     comments: tuple[str, ...]
+    suffixes: tuple[str, ...]
     notes: tuple[str, ...] = ()
 
 
@@ -61,6 +74,7 @@ class _Split:
 
     separator: str
     rows: list[Row]
+    lines: Sequence[str] = ()
     kinds: tuple[Kind, ...] = ()
     score: float = 0.0
 
@@ -80,6 +94,7 @@ class _Header:
     names: Sequence[str] = ()
     units: Sequence[str] | None = None
     line: int | None = None
+    units_line: int | None = None
     notes: list[str] = field(default_factory=list)
 
 
@@ -106,14 +121,15 @@ def recognise(lines: Sequence[str], options: FileOptions, path: Path, *, whole: 
     _check_width(split, path)
     first = _first(split, options)
     numbers = NumberFormat(
-        decimal=options.decimal or _decimal(split.rows[first:], path, options),
+        decimal=options.decimal or _decimal([row for row in split.rows[first:] if split.fits(row)], path, options),
         thousands=options.thousands,
         missing=options.missing,
     )
     top = split.rows[first].first_line - 1
     above = [(line, text) for line, text in comments if line <= top]
     header = _header(split, first, above, options)
-    preamble = [row for row in split.rows[:first] if header.line is None or row.line < header.line]
+    above_header = [row for row in split.rows[:first] if header.line is None or row.line < header.line]
+    preamble = [row for row in above_header if row.line != header.units_line]
     if preamble:
         shown = split.separator.join(preamble[0].cells).strip()[:60]
         header.notes.append(f"{_lines(len(preamble))} before the header left out, the first: {shown!r}")
@@ -127,6 +143,7 @@ def recognise(lines: Sequence[str], options: FileOptions, path: Path, *, whole: 
         header=header.line,
         preamble=tuple(preamble),
         comments=tuple(text for _, text in above),
+        suffixes=_suffixes(split, first),
         notes=tuple(header.notes),
     )
 
@@ -155,12 +172,15 @@ def _best(lines: list[str], given: str | None, options: FileOptions, path: Path,
         try:
             ended = (f"{text}\n" for text in lines)
             rows = split_rows(ended, separator, line=1, comment=options.comment, path=path, whole=whole)
-            found = _runs(separator, list(rows), options)
+            found = replace(_runs(separator, list(rows), options), lines=lines)
         except ReaderError as error:
             problem = problem or error
             continue
         if best is None or found.score > best.score + 1e-9:
             best = found
+    if best is not None and _has_decimal_commas(best):
+        rows = split_rows((f"{t}\n" for t in lines), ";", line=1, comment=options.comment, path=path, whole=whole)
+        best = replace(_runs(";", list(rows), options), lines=lines)
     if best is None or (best.width < 2 and problem is not None):
         raise problem or ReaderError("the file cannot be split into cells", where=path)
     if not best.kinds:
@@ -173,6 +193,15 @@ def _best(lines: list[str], given: str | None, options: FileOptions, path: Path,
             remedy="check that the recording was saved, and the options separator, decimal, comment and skip_lines",
         )
     return best
+
+
+def _has_decimal_commas(split: _Split) -> bool:
+    """Whether what looks like two columns of whole numbers is one with a decimal comma, as its header has one cell."""
+    first = next((i for i, row in enumerate(split.rows) if split.fits(row)), 0)
+    if split.separator != "," or split.width != 2 or first == 0 or len(split.rows[first - 1].cells) != 1:
+        return False
+    plain = all("." not in cell and '"' not in cell for row in split.rows[first:] for cell in row.cells)
+    return plain and parse_header(split.rows[first - 1].cells[0]).unit is not None
 
 
 def _runs(separator: str, rows: list[Row], options: FileOptions) -> _Split:
@@ -252,6 +281,15 @@ def _is_spoilt(split: _Split, index: int) -> bool:
     return above == 0 and 2 * here >= sum(kind in DATA for kind in split.kinds)
 
 
+def _suffixes(split: _Split, first: int) -> tuple[str, ...]:
+    found: list[set[str]] = [set() for _ in split.kinds]
+    for row in filter(split.fits, split.rows[first:]):
+        for index, cell in enumerate(trimmed(row.cells, split.width)):
+            if cell.strip() and kind_of(cell) is Kind.NUMBER:
+                found[index].add(suffix_of(cell.strip()))
+    return tuple(suffixes.pop() if len(suffixes) == 1 else "" for suffixes in found)
+
+
 def _decimal(rows: Sequence[Row], path: Path, options: FileOptions) -> str:
     if options.thousands == ",":
         return "."
@@ -274,13 +312,16 @@ def _header(split: _Split, first: int, comments: list[tuple[int, str]], options:
     if options.header is False:
         return found
     above = list(split.rows[:first])
-    if options.units_line or (options.units_line is None and len(above) > 1 and _is_units(above, split)):
-        found.units = _to_width(above.pop().cells, split)
+    if options.units_line is None and len(above) > 1 and _units_above(above, split):
+        found.units_line = above[-2].line
+        found.units = _to_width(above.pop(-2), split)
+    elif options.units_line or (options.units_line is None and len(above) > 1 and _is_units(above, split)):
+        found.units = _to_width(above.pop(), split)
     if above:
         row = above[-1]
-        cells = _to_width(row.cells, split)
+        cells = _to_width(row, split)
         repeats = cells is not None and len({cell.strip() for cell in cells if cell.strip()}) < sum(map(_filled, cells))
-        upper = _to_width(above[-2].cells, split) if repeats and len(above) > 1 else None
+        upper = _to_width(above[-2], split) if repeats and len(above) > 1 else None
         if upper is not None:  # a line of types or of numbers of channels below the names
             row, cells = above[-2], upper
         if cells is not None:
@@ -292,7 +333,8 @@ def _header(split: _Split, first: int, comments: list[tuple[int, str]], options:
                 "which are numbered; names: [...] names them"
             )
     for line, text in comments[-1:]:
-        cells = _to_width(text.split(split.separator) if split.separator != BLANKS else text.split(), split, text)
+        bare = text.split(split.separator) if split.separator != BLANKS else text.split()
+        cells = _to_width(Row(line=line, cells=bare), split)
         if cells is not None and (split.width > 1 or len(text.split()) == 1):
             found.names, found.line = [cell.strip(_MARKS) for cell in cells], line
             found.notes.append(f"names from the comment in line {line}")
@@ -304,22 +346,31 @@ def _filled(cell: str) -> bool:
 
 
 def _is_units(above: list[Row], split: _Split) -> bool:
-    units, names = (_to_width(row.cells, split) for row in (above[-1], above[-2]))
+    units, names = (_to_width(row, split) for row in (above[-1], above[-2]))
     if units is None or names is None or not is_units(units):
         return False
     # Short names are units too (t, u, V): without brackets it is the line above that must look like names.
     return sum(map(_filled, names)) >= sum(map(_filled, units)) and not any(kind_of(cell) in DATA for cell in names[:1])
 
 
-def _to_width(cells: list[str], split: _Split, text: str | None = None) -> list[str] | None:
+def _units_above(above: list[Row], split: _Split) -> bool:
+    """Whether the line of units stands above the names: names as short as t and u are units too."""
+    names, units = (_to_width(row, split) for row in (above[-1], above[-2]))
+    if names is None or units is None:
+        return False
+    shares = [sum(is_units([cell]) for cell in cells) / max(sum(map(_filled, cells)), 1) for cells in (units, names)]
+    return shares[0] == 1.0 and shares[1] < 1.0
+
+
+def _to_width(row: Row, split: _Split) -> list[str] | None:
     """A header brought to the width of the numbers, or ``None`` if it does not fit them."""
-    cells, width = trimmed(cells, split.width), split.width
+    cells, width = trimmed(row.cells, split.width), split.width
     if split.separator == BLANKS and len(cells) != width:
-        text = " ".join(cells) if text is None else text
+        text = split.lines[row.line - 1].strip().strip(_MARKS)
         for cut in (
-            re.sub(r"\s+(?=[\[(<])", "", text.strip()).split(),  # t [s]  u [V]
-            re.split(r"\t|\s{2,}", text.strip()),
-            text.strip().strip(_MARKS).split(),
+            re.sub(r"\s+(?=[\[(<])", "", text).split(),  # t [s]  u [V]
+            re.split(r"\t|\s{2,}", text),
+            text.split(),
         ):
             if len(cut) == width:
                 return cut

@@ -89,6 +89,10 @@ def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
     if options.names is not None:
         texts = _given_names(options.names, layout, path)
     headers = [parse_header(text) for text in texts]
+    headers = [
+        Header(name=header.name, unit=split_reference(suffix)[0]) if suffix and header.unit is None else header
+        for header, suffix in zip(headers, layout.suffixes, strict=True)
+    ]
     if layout.units is not None:
         units = [split_reference(unit_text(cell)) for cell in layout.units]
         headers = [
@@ -149,7 +153,8 @@ def _column(
         return Texts(collector=WordCollector(layout.numbers.missing))
     if kind is Kind.WHOLE:
         return Counts()
-    return Numbers(numbers=replace(layout.numbers, states=states_for(options.states, header.name)))
+    states = states_for(options.states, header.name)
+    return Numbers(numbers=replace(layout.numbers, states=states, suffix=layout.suffixes[index]))
 
 
 def _finished(
