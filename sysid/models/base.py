@@ -168,6 +168,7 @@ class AbstractModel(ABC):
             Predicted output of shape ``(n_samples,)``, in its unit.
 
         Raises:
+            ConfigError: If the model has no prediction from measured output: its noise is added to the output.
             TraceError: If the number of inputs is not the mapping's.
         """
         return self.recursion.predict(inputs, output, history or self._rest(inputs), steps)

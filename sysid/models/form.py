@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import ConfigError
 from sysid.models.history import History
 from sysid.models.scaling import Scaling
 
@@ -20,6 +21,8 @@ class AbstractForm(ABC):
     """Lower bound of the output in scaled numbers; ``-inf`` for none."""
     high: float
     """Upper bound of the output in scaled numbers; ``inf`` for none."""
+    predicts: bool = True
+    """Whether there is a prediction from measured output that is not the free run itself."""
 
     @property
     @abstractmethod
@@ -73,5 +76,23 @@ class AbstractForm(ABC):
             Predicted output of shape ``(n_samples,)``; its first ``steps`` samples start from the history.
 
         Raises:
+            ConfigError: If the form does not predict.
             TraceError: If the number of inputs is not the model's.
         """
+
+
+def no_prediction(kind: str) -> ConfigError:
+    """Why a model with noise on its output alone does not predict.
+
+    Args:
+        kind: What kind of model, with its article.
+
+    Returns:
+        The error.
+    """
+    return ConfigError(
+        f"{kind} has no prediction from measured output",
+        expected="a model whose regressors are past outputs: ARX or NARX",
+        got="one whose noise is added to its output, so that measured output says nothing about what follows",
+        remedy="use simulate: its free run is what it predicts any number of steps ahead",
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from scipy import linalg
 
 from sysid.errors import TraceError
 from sysid.kernels import neural_state_space as kernel
-from sysid.models.form import AbstractForm
+from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
 from sysid.models.scaling import Scaling
 
@@ -136,6 +136,7 @@ class NeuralForm(AbstractForm):
     bound: float = STATE_BOUND
     low: float = -np.inf
     high: float = np.inf
+    predicts: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         theta = np.array(self.theta, dtype=np.float64)
@@ -166,13 +167,13 @@ class NeuralForm(AbstractForm):
 
     def predict(
         self,
-        inputs: NDArray[np.float64],
-        output: NDArray[np.float64],  # noqa: ARG002 - the noise is added to the output and says nothing about the next
-        history: History,
-        steps: int,  # noqa: ARG002 - for the same reason
+        inputs: NDArray[np.float64],  # noqa: ARG002 - nothing is predicted from any of them
+        output: NDArray[np.float64],  # noqa: ARG002
+        history: History,  # noqa: ARG002
+        steps: int,  # noqa: ARG002
     ) -> NDArray[np.float64]:
-        """The free run: with white noise on the output alone the best prediction does not use past output."""
-        return self.simulate(inputs, history)
+        """None: the noise is added to the output, and says nothing about the next; see the base class."""
+        raise no_prediction("a neural state space")
 
     def state(self, history: History) -> NDArray[np.float64]:
         """The state after some samples.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy import linalg
 
 from sysid.errors import TraceError
 from sysid.kernels import linear as kernel
-from sysid.models.form import AbstractForm
+from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
 from sysid.models.scaling import Scaling
 
@@ -59,6 +59,7 @@ class StateSpace(AbstractForm):
     scaling: Scaling
     low: float = -np.inf
     high: float = np.inf
+    predicts: bool = field(default=False, init=False)
 
     @property
     def n_state(self) -> int:
@@ -134,13 +135,13 @@ class StateSpace(AbstractForm):
 
     def predict(
         self,
-        inputs: NDArray[np.float64],
-        output: NDArray[np.float64],  # noqa: ARG002 - the noise is added to the output and says nothing about the next
-        history: History,
-        steps: int,  # noqa: ARG002 - for the same reason
+        inputs: NDArray[np.float64],  # noqa: ARG002 - nothing is predicted from any of them
+        output: NDArray[np.float64],  # noqa: ARG002
+        history: History,  # noqa: ARG002
+        steps: int,  # noqa: ARG002
     ) -> NDArray[np.float64]:
-        """The free run: with white noise on the output alone the best prediction does not use past output."""
-        return self.simulate(inputs, history)
+        """None: the noise is added to the output, and says nothing about the next; see the base class."""
+        raise no_prediction("a transfer function")
 
     def _run(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled output over some scaled inputs; ``x`` becomes the state after them."""

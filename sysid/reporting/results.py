@@ -72,6 +72,7 @@ class CaseRecord(Record):
     one_step: FiguresRecord = Field(description="One step ahead from measured output: open loop.")
     run_time_s: Number = Field(description="Seconds that the free run took: median of repeats, warm.")
     n_samples: int = Field(ge=1, description="Samples that were scored.")
+    predicts: bool = Field(default=True, description="Whether the model has a prediction from measured output.")
     begins_at: int = Field(default=0, description="Sample of the case at which the free run begins and is scored.")
     simulated_s: Number = Field(description="Length of the case in seconds.")
     coverage: dict[str, CoverageRecord] | None = Field(

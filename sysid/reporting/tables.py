@@ -190,14 +190,15 @@ def accuracy_table(fits: Sequence[FitRecord], kind: str, best: str | None) -> Ta
         for name in columns:
             case = fit.cases.get(name)
             cells.append(Cell(text="not run") if case is None else _mse_cell(case, kind))
-        cells.append(figure_cell(mean_mse(fit, kind), missing=_missing_mean(fit)))
+        cells.append(figure_cell(mean_mse(fit, kind), missing=_missing_mean(fit, kind)))
         rows.append(tuple(cells))
     published = _published_row(fits, kind, list(columns), lambda figure: figure_cell(figure.value, mark="published"))
     rows.extend(published)
     words = {"free_run": "Free run", "one_step": "One step ahead"}[kind]
     note = {
         "free_run": "The model runs on its own past output: the figure that counts.",
-        "one_step": "Each step starts from measured output: this says little about a free run.",
+        "one_step": "Each step starts from measured output: this says little about a free run. A model whose noise is "
+        "added to its output (a transfer function, a neural state space) has no such prediction: -.",
     }[kind]
     return Table(
         caption=f"{words}: mean squared error [{fits[0].unit}²] by case. {fits[0].mapping}.",
@@ -270,7 +271,10 @@ def quality_table(fit: FitRecord, kind: str) -> Table:
             (
                 Cell(text=name, header=True),
                 Cell(text=case.role.value),
-                *(column.cell(getattr(figures, column.key), missing=_word(figures)) for column in columns),
+                *(
+                    column.cell(getattr(figures, column.key), missing=_word(figures, _missing(case, kind)))
+                    for column in columns
+                ),
             )
             for name, case in fit.cases.items()
             for figures in (getattr(case, kind),)
@@ -278,9 +282,9 @@ def quality_table(fit: FitRecord, kind: str) -> Table:
     )
 
 
-def _word(figures: FiguresRecord) -> str:
+def _word(figures: FiguresRecord, missing: str) -> str:
     """Why a figure is not a number: a free run that diverged, or a target that does not vary."""
-    return "-" if math.isfinite(figures.mse) else DIVERGED
+    return "-" if math.isfinite(figures.mse) else missing
 
 
 def ranking_table(results: Results) -> Table:
@@ -414,11 +418,17 @@ def _mark(fit: FitRecord, best: str | None) -> str:
 def _mse_cell(case: CaseRecord, kind: str) -> Cell:
     published = (case.published or {}).get(kind)
     below = times(published.ratio) if published is not None and math.isfinite(published.ratio) else ""
-    return figure_cell(getattr(case, kind).mse, missing=DIVERGED, below=below)
+    return figure_cell(getattr(case, kind).mse, missing=_missing(case, kind), below=below)
 
 
-def _missing_mean(fit: FitRecord) -> str:
-    return DIVERGED if scored_cases(fit) else "no such case"
+def _missing(case: CaseRecord, kind: str) -> str:
+    """Why there is no figure: a run that is lost, or a model that predicts nothing from measured output."""
+    return "-" if kind == "one_step" and not case.predicts else DIVERGED
+
+
+def _missing_mean(fit: FitRecord, kind: str) -> str:
+    cases = scored_cases(fit)
+    return _missing(next(iter(cases.values())), kind) if cases else "no such case"
 
 
 def _count_cell(parameters: int, effective: float | None) -> Cell:

@@ -15,7 +15,7 @@ from sysid.estimation.experiment import Experiment
 from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.intervals import CaseIntervals, case_intervals
-from sysid.validation.metrics import Figures, figures
+from sysid.validation.metrics import Figures, figures, none
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,12 +26,12 @@ class CaseResult:
         case: Name of the trace.
         role: What the trace was used for.
         free_run: Figures of the free run, the one that counts.
-        one_step: Figures of the prediction one step ahead from measured output.
+        one_step: Figures of the prediction one step ahead from measured output; NaN where the model has none.
         run_time_s: Seconds that the free run took: median of repeats, warm.
         time: Seconds, shape ``(n_samples,)``.
         target: Measured output, shape ``(n_samples,)``.
         simulated: Free run, shape ``(n_samples,)``.
-        predicted: One step ahead, shape ``(n_samples,)``.
+        predicted: One step ahead, shape ``(n_samples,)``; NaN where the model does not predict.
         first: Sample of the trace at which the free run begins; those before gave it its history and are not scored.
         intervals: Of the output, where the fit has a posterior.
         by_state: By the name of a state: figures of the free run while it lasts, and its share of the samples that
@@ -63,6 +63,7 @@ class CaseResult:
                 "run_time_s": self.run_time_s,
                 "n_samples": len(self.target),
                 "begins_at": self.first,
+                "predicts": not bool(np.isnan(self.predicted).all()),
                 "simulated_s": float(self.time[-1] - self.time[0]),
             }
             | ({} if self.intervals is None else {"coverage": self.intervals.to_dict()})
@@ -151,7 +152,8 @@ def evaluate_case(
         began = time.perf_counter()
         model.simulate(inputs, history)
         seconds.append(time.perf_counter() - began)
-    predicted = model.predict(inputs, target, history)
+    predicts = model.recursion.predicts
+    predicted = model.predict(inputs, target, history) if predicts else np.full(len(target), np.nan)
     intervals = None
     if posterior is not None:
         experiment = Experiment.for_model(trace, model, start)
@@ -160,7 +162,7 @@ def evaluate_case(
         case=trace.name,
         role=role,
         free_run=figures(target, simulated, model.output_unit, counted),
-        one_step=figures(target, predicted, model.output_unit, counted),
+        one_step=figures(target, predicted, model.output_unit, counted) if predicts else none(model.output_unit),
         run_time_s=float(np.median(seconds)),
         first=begun.first,
         time=trace.time[scored],

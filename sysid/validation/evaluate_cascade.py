@@ -15,7 +15,7 @@ from sysid.errors import ChannelError
 from sysid.models import Activity, Cascade, CascadeRun, Ends, History, VectorNARXModel
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.evaluate import CaseResult, Evaluation
-from sysid.validation.metrics import figures
+from sysid.validation.metrics import figures, none
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,7 +126,7 @@ def _case(cascade: Cascade, trace: Trace, role: Role, timed: _Timed, name: str) 
         case=trace.name,
         role=role,
         free_run=figures(target, run[name], unit, counted),
-        one_step=figures(target, predicted, unit, counted),
+        one_step=none(unit) if np.isnan(predicted).all() else figures(target, predicted, unit, counted),
         run_time_s=timed.seconds,
         time=trace.time,
         target=target,
@@ -145,7 +145,7 @@ def one_step_ahead(cascade: Cascade, trace: Trace, run: CascadeRun, output: str)
         output: The output.
 
     Returns:
-        Shape ``(n_samples,)``.
+        Shape ``(n_samples,)``; NaN where the member does not predict.
 
     Raises:
         ChannelError: If no member writes the output.
@@ -158,4 +158,6 @@ def one_step_ahead(cascade: Cascade, trace: Trace, run: CascadeRun, output: str)
         return model.predict(known, rest)[output]
     inputs = np.column_stack([known[name] for name in ends.inputs])
     history = History.at_rest(inputs=[rest[name] for name in ends.inputs], output=rest[output])
+    if not model.recursion.predicts:
+        return np.full(len(inputs), np.nan)
     return model.predict(inputs, known[output], history)

@@ -113,7 +113,7 @@ def figures(
     if counted is not None:
         target, output = target[counted], output[counted]
     if len(target) == 0:
-        return Figures(mse=np.nan, nrmse_fit=np.nan, max_abs_error=np.nan, r=np.nan, unit=unit)
+        return none(unit)
     still = is_constant(target)
     if not np.isfinite(output).all():
         return Figures(mse=np.inf, nrmse_fit=np.nan if still else -np.inf, max_abs_error=np.inf, r=np.nan, unit=unit)
@@ -126,6 +126,18 @@ def figures(
         r=np.nan if still or is_constant(output) else float(np.corrcoef(target, output)[0, 1]),
         unit=unit,
     )
+
+
+def none(unit: str) -> Figures:
+    """The figures of what there is not.
+
+    Args:
+        unit: The output's unit.
+
+    Returns:
+        NaN throughout.
+    """
+    return Figures(mse=np.nan, nrmse_fit=np.nan, max_abs_error=np.nan, r=np.nan, unit=unit)
 
 
 def is_constant(signal: NDArray[np.float64]) -> bool:

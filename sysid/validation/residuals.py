@@ -211,6 +211,8 @@ def _record(model: AbstractModel, trace: Trace, start: Start, free_run: bool) ->
     begun = beginning(model, inputs, target, start, trace.usable_samples)
     history, scored = begun.history, slice(begun.first, None)
     inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
+    # With noise added to the output alone the free run is the best prediction, any number of steps ahead.
+    free_run = free_run or not model.recursion.predicts
     output = model.simulate(inputs, history) if free_run else model.predict(inputs, target, history)
     return _Record(np.where(counted, target - output, 0.0), inputs, counted)
 

@@ -91,10 +91,11 @@ def test_a_history_shows_the_sign_that_a_rectified_output_hides():
     assert form.state(History(inputs=u[:5], output=y[:5]))[0] == pytest.approx(1.0 - 1.8 * 0.9**5, abs=1e-3)
 
 
-def test_prediction_is_the_free_run():
-    model = a_model(NeuralStateSpace(states=2, neurons=4))
-    u = signals(50)
-    np.testing.assert_array_equal(model.predict(u, np.zeros(50), steps=3), model.simulate(u))
+def test_there_is_no_prediction_that_is_not_the_free_run():
+    model, u = a_model(NeuralStateSpace(states=2, neurons=4)), signals(50)
+    assert not model.recursion.predicts
+    with pytest.raises(ConfigError, match="no prediction"):
+        model.predict(u, np.ones(len(u)), steps=3)
 
 
 def test_inputs_that_do_not_fit_are_refused():

@@ -99,9 +99,11 @@ def test_a_run_in_pieces_equals_one_long_run(domain: Domain) -> None:
     np.testing.assert_array_equal(pieces, build(domain).simulate(u))
 
 
-def test_prediction_is_the_free_run() -> None:
+def test_there_is_no_prediction_that_is_not_the_free_run() -> None:
     model, u = build(), inputs()
-    np.testing.assert_array_equal(model.predict(u, np.ones(len(u)), steps=3), model.simulate(u))
+    assert not model.recursion.predicts
+    with pytest.raises(ConfigError, match="no prediction"):
+        model.predict(u, np.ones(len(u)), steps=3)
 
 
 @DOMAINS

@@ -213,7 +213,9 @@ def _case(model: AbstractModel, trace: Trace, start: Start, repeats: int) -> dic
     begun = beginning(model, inputs, target, start, trace.usable_samples)
     history, n = begun.history, begun.first
     inputs, target, counted = inputs[n:], target[n:], trace.usable_samples[n:]
-    simulated, predicted = model.simulate(inputs, history), model.predict(inputs, target, history)
+    simulated, predicted = model.simulate(inputs, history), np.full(len(target), np.nan)
+    if model.recursion.predicts:
+        predicted = model.predict(inputs, target, history)
     figures = {
         "free_run_mse": float(np.mean((simulated - target)[counted] ** 2)),
         "one_step_mse": float(np.mean((predicted - target)[counted] ** 2)),
