@@ -11,11 +11,12 @@ import dataclasses
 import inspect
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from sysid.errors import ConfigError
+from sysid.estimation.equilibrium import equilibrium_notes
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.transfer_function import fit_transfer_function
@@ -317,7 +318,7 @@ def fit(
             got=str(initial.model.mapping),
             remedy="start from a fit of this mapping, its inputs in this order, or leave initial out",
         )
-    return row.run(
+    found = row.run(
         traces,
         mapping,
         structure,
@@ -331,6 +332,8 @@ def fit(
         on_checkpoint=on_checkpoint,
         on_progress=on_progress,
     )
+    notes = equilibrium_notes(found.model, traces, start or Start())
+    return replace(found, notes=(*found.notes, *notes)) if notes else found
 
 
 def with_stability(fitted: FitResult, traces: Sequence[Trace], stability: StabilityOptions | None) -> FitResult:

@@ -1,0 +1,82 @@
+"""Does a record begin where its start says that it does? A fit that takes it for granted is told by how much not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid.errors import TraceError
+from sysid.estimation.linear.arx import fit_arx
+from sysid.models import ARX, AbstractModel, ARXModel, Start, StartKind, beginning
+from sysid.traces import Trace
+
+ESTIMATED = Start(kind=StartKind.ESTIMATED)
+BEYOND, LEAST = 5.0, 1e-3
+"""How many times the later errors, and what part of the output's range, the first ones must be to be told."""
+MOST_TOLD = 5
+
+LAGS = 10
+"""Past inputs of the ARX model that is asked."""
+
+
+def equilibrium_notes(model: AbstractModel, traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
+    """What is to be said of records that do not begin as they were declared to.
+
+    The free run from the declared start is compared with the record over the window that a start would be estimated on,
+    and that with the errors of the free run from the estimated one, after it. A model that was fitted to what the start
+    said may have bent to it: a small ARX model that takes nothing for granted is asked as well.
+
+    Args:
+        model: A model fitted to the records.
+        traces: The records.
+        start: What was declared.
+
+    Returns:
+        One sentence for each record that is off, none for an estimated or a measured start.
+    """
+    if start.kind not in {StartKind.REST, StartKind.FIRST_SAMPLE}:
+        return ()
+    asked = [model, *_plain_models(traces, model)]
+    told = []
+    for trace in traces:
+        found = [sentence for one in asked if (sentence := _of(one, trace, start))]
+        told += found[:1]
+    rest = len(told) - MOST_TOLD
+    return (*told[:MOST_TOLD], *([f"{rest} more records do not begin so."] if rest > 0 else []))
+
+
+def _plain_models(traces: Sequence[Trace], model: AbstractModel) -> list[AbstractModel]:
+    """An ARX model of the records, where they are long enough for one and it is stable."""
+    m = len(model.mapping.inputs)
+    lags = max(1, min(LAGS, min(len(trace) for trace in traces) // (4 * (1 + m))))
+    orders = ARX(na=min(2, lags), nb=(lags,) * m, nk=(0,) * m)
+    try:
+        found = fit_arx(traces, model.mapping, orders, start=ESTIMATED).model
+    except TraceError:
+        return []
+    return [found] if isinstance(found, ARXModel) and np.abs(found.poles).max(initial=0.0) < 1.0 else []
+
+
+def _of(model: AbstractModel, trace: Trace, start: Start) -> str:
+    inputs, output = trace.columns(model.mapping.inputs), trace[model.mapping.output]
+    usable = trace.usable_samples
+    begun = beginning(model, inputs, output, ESTIMATED, usable)
+    n = begun.first
+    if n == 0:
+        return ""
+    declared = model.simulate(inputs[:n], start.history(inputs, output, model.rest_output, usable))
+    after = model.simulate(inputs[n:], begun.history) - output[n:]
+    off = np.abs(declared - output[:n])[usable[:n]]
+    later = after[usable[n:]]
+    if not len(off) or not len(later) or not np.isfinite(off).all() or not np.isfinite(later).all():
+        return ""
+    level = float(np.sqrt(np.mean(later**2)))
+    if float(off.max()) <= max(BEYOND * level, LEAST * float(np.ptp(output[usable]))):
+        return ""
+    unit = model.output_unit
+    return (
+        f"{trace.name} does not begin in equilibrium, as start: {start.kind.value} declares: over its first {n} "
+        f"samples the free run is up to {off.max():.3g} {unit} off, and afterwards, from an estimated state, "
+        f"{level:.3g} {unit}. For such a record write start: estimated."
+    )
