@@ -268,12 +268,15 @@ def worst(
 @app.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')
 def export(
     pipeline: Annotated[str, typer.Argument(help="Name of a pipeline that has been run, or its YAML file.")],
-    fit: Annotated[str, typer.Option(help="Name of the fit.")],
+    fit: Annotated[
+        str,
+        typer.Option(help="Name of the fit; in an assembly of a member, of a round, or assembly: the whole."),
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder of the bundle; in the run folder by default.")] = None,
     run_folder: Annotated[Path | None, typer.Option(help="The run folder; runs/<pipeline> by default.")] = None,
     pack: Annotated[bool, typer.Option("--zip", help="Pack the bundle into one file beside it.")] = False,
 ) -> None:
-    """Export a fit of a finished run as files that run elsewhere, each checked against its model."""
+    """Export a fit, a member or a whole of a finished run as files that run elsewhere, checked against the model."""
     from sysid.workbench.commands.export import export_command
 
     export_command(pipeline, fit=fit, out=out, run_folder=run_folder, pack=pack)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sysid.code_digest import code_digest
 from sysid.composite.keeper import Decision, Fit, Task
 from sysid.estimation import CascadeFit, FitResult
+from sysid.models import Cascade
 from sysid.traces import TraceSet
 from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.exporting import export_model
 from sysid.workbench.assembly.extending import Joined
 from sysid.workbench.fits.data import load_named, unmade_data
 from sysid.workbench.fits.record import is_final, read_fit, write_fit
@@ -21,6 +24,9 @@ from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Outlined, Step, Work
 from sysid.workbench.runner.store import RunFolder, digest, read_json, strict, write_json
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
 
 T = TypeVar("T")
 
@@ -35,6 +41,7 @@ class Context:
         beside: Folder of the YAML, where data sets are looked for first.
         run: Does the steps.
         digests: SHA-256 of every data set that was read, by name.
+        cases: The cases that are scored, once they are loaded.
     """
 
     config: AssemblyConfig
@@ -42,6 +49,7 @@ class Context:
     beside: Path
     run: Run
     digests: dict[str, str] = field(default_factory=dict)
+    cases: list[TraceSet] = field(default_factory=list)
 
     @property
     def store(self) -> RunFolder:
@@ -116,6 +124,8 @@ class Context:
                 outcome=lambda fit: f"{fit.train_time_s:.1f} s, {fit.status.value}",
                 final=is_final,
                 amount=lambda: task.amount,
+                called=task.name,
+                export=self.export,
             )
         )
 
@@ -126,6 +136,19 @@ class Context:
 
         self.run.then(renew)
         return done
+
+    def export(self, found: FitResult | CascadeFit | Cascade, folder: Path, provenance: dict[str, Any]) -> Bundle:
+        """Write what came of a step as a bundle.
+
+        Args:
+            found: A member's fit, or a whole.
+            folder: Where the bundle goes.
+            provenance: What it says of where it is from.
+
+        Returns:
+            The bundle.
+        """
+        return export_model(self.config, self.cases[0], found, folder, provenance)
 
     def decide(self, decision: Decision) -> dict[str, Any]:
         """What a decision of the training comes to, stored under what it depends on.
@@ -146,7 +169,7 @@ class Context:
             Step(
                 name=slug(decision.name),
                 title=decision.title,
-                make=lambda work: decision.make(work.say),
+                make=lambda work: dict(json.loads(json.dumps(strict(decision.make(work.say))))),
                 key=lambda: key,
                 write=write,
                 read=lambda _: dict(read_json(file)),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.composite.active_learning import Look, sequence_errors
+from sysid.composite.keeper import Decision
 from sysid.composite.limits_held import holding
 from sysid.composite.monte_carlo import Stress, stress
 from sysid.composite.training import TrainedComposite
@@ -23,7 +24,7 @@ from sysid.workbench.assembly.material import Material
 from sysid.workbench.assembly.member_scores import score_candidates
 from sysid.workbench.assembly.record import Outcome, assembly_results, write_signals
 from sysid.workbench.runner import events
-from sysid.workbench.runner.steps import Outlined, Work
+from sysid.workbench.runner.steps import Outlined, Step, Work
 from sysid.workbench.runner.store import digest, strict, write_json
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ ASSEMBLY, LINE = "assembly.json", "line.json"
 """In the run folder: the chosen whole, and its line."""
 
 SCORING = Outlined(name="scoring", title="Scoring every stage")
+WHOLE = Outlined(name="assembly", title="Choosing the stage that does best", called="assembly")
 STRESS = Outlined(name="stress", title="Running the whole on random sequences")
 PLACES = Outlined(name="line", title="Running every place of the line")
 EXPORT = Outlined(name="export", title="Exporting the assembly")
@@ -70,10 +72,10 @@ class Finish:
     def _outcome(self, cases: TraceSet, material: Material) -> Outcome:
         """Every stage scored, one chosen by the selection traces, proven and exported."""
         config = self.context.config
-        scores, timing = self.context.compute(SCORING, lambda work: self._scored(work, cases))
+        scored = self._scored(cases)
+        scores, timing = scored["scores"], scored["timing"]
         chosen, chosen_by = self.trained.chosen, self.trained.selection
-        whole = self.trained.model.upstream_of(config.wanted)
-        write_json(self.context.store.path / ASSEMBLY, whole.to_dict())
+        whole = self._chosen()
         stressed, worst, sequences = self._stressed(whole)
         line = self._line(whole)
         exported = self._export(whole, cases, evaluate_cascade(whole, cases), material)
@@ -88,17 +90,57 @@ class Finish:
             lessons=lessons_of(scores, members, cases, config.lessons),
         )  # fmt: skip
 
-    def _scored(self, work: Work, cases: TraceSet) -> tuple[dict[str, Any], dict[str, dict[str, float]]]:
-        """Every stage's mean squared errors by output, and the seconds of a run by case."""
-        config, stages = self.context.config, self.trained.stages
-        scores, timing = {}, {}
-        for number, (stage, cascade) in enumerate(stages.items()):
-            work.say(stage, number / len(stages))
-            # What only the training looked at is no part of the surrogate, nor of its run time.
-            evaluation = evaluate_cascade(cascade.upstream_of(config.wanted), cases, outputs=config.outputs)
-            scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
-            timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
-        return scores, timing
+    def _scored(self, cases: TraceSet) -> dict[str, Any]:
+        """Of every stage ``scores``, errors by output and case, and ``timing``, seconds of a run by case."""
+        config = self.context.config
+        # What only the training looked at is no part of the surrogate, nor of its run time.
+        stages = {stage: whole.upstream_of(config.wanted) for stage, whole in self.trained.stages.items()}
+
+        def make(say: Callable[[str], None]) -> dict[str, Any]:
+            scores, timing = {}, {}
+            for stage, whole in stages.items():
+                say(stage)
+                evaluation = evaluate_cascade(whole, cases, outputs=config.outputs)
+                scores[stage] = {name: evaluation.mse(name) for name in config.outputs}
+                timing[stage] = {n: c.run_time_s for n, c in evaluation.outputs[config.outputs[0]].cases.items()}
+            return {"scores": scores, "timing": timing}
+
+        return self.context.decide(
+            Decision(
+                name=SCORING.name,
+                title=SCORING.title,
+                terms={
+                    "stages": {stage: whole.to_dict() for stage, whole in stages.items()},
+                    "cases": cases.digest,
+                    "outputs": list(config.outputs),
+                },
+                runs=(evaluate_cascade, *{type(one) for whole in stages.values() for one in whole.models}),
+                make=make,
+                outcome=lambda _: f"{len(stages)} stages",
+            )
+        )
+
+    def _chosen(self) -> Cascade:
+        """The whole that does best, which is what a run leaves."""
+        whole = self.trained.model.upstream_of(self.context.config.wanted)
+        file, key = self.context.store.path / ASSEMBLY, digest(strict(whole.to_dict()))
+
+        def write(found: Cascade) -> list[Path]:
+            write_json(file, found.to_dict())
+            return [file]
+
+        step = Step(
+            name=WHOLE.name,
+            title=WHOLE.title,
+            make=lambda _: whole,
+            key=lambda: key,
+            write=write,
+            read=lambda _: whole,
+            outcome=lambda _: self.trained.chosen,
+            called=WHOLE.called,
+            export=self.context.export,
+        )
+        return self.context.run.do(step).value
 
     def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...], tuple[Trace, ...]]:
         """What came of the random sequences, those that the whole did worst on, and all of them."""

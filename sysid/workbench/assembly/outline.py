@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name, candidate_title
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.finish import EXPORT, MEMBERS, PLACES, SCORING, STRESS
+from sysid.workbench.assembly.finish import EXPORT, MEMBERS, PLACES, SCORING, STRESS, WHOLE
 from sysid.workbench.fits.data import unmade_data
 from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.run import REPORT
@@ -63,7 +63,7 @@ def _members(config: AssemblyConfig) -> Iterator[Outlined]:
         many = many or len(variants) > 1 or member.output in swept
         for index, variant in enumerate(variants):
             name, title = candidate_name(variant, index), candidate_title(variant, index)
-            yield Outlined(name=f"fit-{slug(name)}", title=title)
+            yield Outlined(name=f"fit-{slug(name)}", title=title, called=name)
             if plan.one_step is not None:
                 yield Outlined(name=f"fit-{slug(f'{name} one step')}", title=f"{title}, one step ahead")
     if many:
@@ -78,6 +78,7 @@ def _members(config: AssemblyConfig) -> Iterator[Outlined]:
 
 def _proof(config: AssemblyConfig, beside: Path) -> Iterator[Outlined]:
     yield SCORING
+    yield WHOLE
     if config.stress is not None:
         yield from (_loading(config.stress.data, beside), STRESS)
     if config.line is not None:

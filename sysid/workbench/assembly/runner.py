@@ -62,7 +62,9 @@ def _run(context: Context) -> AssemblyResults:
     config, notes = context.config, list[str]()
     if config.published_models is not None:
         read_published(config.published_models)  # a wrong name is said now, not when all is trained
-    cases, material, begin = context.load(config.data), Material.of(context), None
+    cases = context.load(config.data)
+    context.cases.append(cases)
+    material, begin = Material.of(context), None
     if config.begin is not None:
         begin, said = read_whole(context.beside / config.begin)
         notes.append(said)

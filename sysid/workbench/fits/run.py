@@ -15,7 +15,7 @@ from sysid.reporting.comparing.published import read_published
 from sysid.reporting.results import Results, parse_results
 from sysid.reporting.sweep.record import has_sweep, read_sweep
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig, read_pipeline
+from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, PipelineConfig, read_pipeline
 from sysid.workbench.fits.data import Data, load_data, unmade_data
 from sysid.workbench.fits.estimates import how_long
 from sysid.workbench.fits.evidence import residuals
@@ -37,6 +37,7 @@ from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, St
 from sysid.workbench.runner.store import strict, write_bytes
 
 if TYPE_CHECKING:
+    from sysid.export import Bundle
     from sysid.workbench.kinds import RunRequest
 
 LOADING = Outlined(name="data", title="Loading the traces")
@@ -202,7 +203,7 @@ class FitSteps:
         found = [LOADING]
         for fit in self.config.fits:
             found += [
-                Outlined(name=f"fit-{fit.slug}", title=fit_title(fit)),
+                Outlined(name=f"fit-{fit.slug}", title=fit_title(fit), called=fit.name),
                 Outlined(name=f"scores-{fit.slug}", title=f"Scoring {fit.name}", estimate=SCORING_TIME),
             ]
         if self.config.export is not None:
@@ -292,7 +293,15 @@ class FitSteps:
             final=is_final,
             amount=lambda: _amount(fit, loaded.value),
             how_long=lambda: how_long(fit, config, loaded.value),
+            called=fit.name,
+            export=lambda result, into, provenance: self._bundle(result, loaded.value, into, provenance),
         )
+
+    def _bundle(self, fit: FitResult, data: Data, folder: Path, provenance: dict[str, Any]) -> Bundle:
+        """Any fit as a bundle, whether or not it is the one that the pipeline exports."""
+        config = self.config.model_copy(update={"export": self.config.export or ExportConfig()})
+        scores = steps.score(fit, data, config)
+        return steps.export(fit, scores, data, config, folder=folder, provenance=provenance)
 
     def _score(self, run: Run, made: Done[FitResult], loaded: Done[Data], fit: FitConfig) -> Step[steps.Scores]:
         config, folder, found = self.config, run.store.fit(fit.slug), list[dict[str, Any]]()

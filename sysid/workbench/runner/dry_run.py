@@ -46,9 +46,17 @@ class PlannedStep:
 
 @dataclass(kw_only=True, eq=False)
 class DryRun(Run):
-    """Goes through the steps of a pipeline as a run does, and does none of them."""
+    """Goes through the steps of a pipeline as a run does, and does none of them.
 
+    Args:
+        loads: Whether data are loaded even if their traces have to be made first; nothing is timed then.
+        planned: The steps that were come to, by name.
+        seen: The same with their results, by name.
+    """
+
+    loads: bool = False
     planned: dict[str, PlannedStep] = field(default_factory=dict)
+    seen: dict[str, Done[Any]] = field(default_factory=dict)
     began: float = field(default_factory=time.perf_counter)
 
     def tell(self, event: Event) -> None:
@@ -75,7 +83,11 @@ class DryRun(Run):
         Returns:
             Its result, if that is stored or at hand; otherwise what raises :class:`NotKnownError` when it is asked for.
         """
+        done = self._looked_at(step)
+        self.seen[step.name] = done
+        return done
 
+    def _looked_at(self, step: Step[T]) -> Done[T]:
         def find_key() -> str:
             return step.key() if step.key else ""
 
@@ -91,7 +103,7 @@ class DryRun(Run):
             return Done(
                 step=step, get=lambda: read(self.store.facts(step.name)), find_key=find_key, stored=True, final=True
             )
-        made = self._at_hand(step)
+        made = self._found(step) or self._at_hand(step)
         if made is not None:
             return made
         self._plan(step, stored=False, estimate=self._estimate(step, key))
@@ -126,10 +138,21 @@ class DryRun(Run):
         }
         return done
 
+    def _found(self, step: Step[T]) -> Done[T] | None:
+        """The result of a step that keeps it by itself."""
+        if step.peek is None or self.fresh:
+            return None
+        try:
+            value = step.peek()
+        except NotKnownError:
+            return None
+        self._plan(step, stored=True, estimate=Estimate(seconds=0.0, basis="stored"))
+        return Done(step=step, get=lambda: value, find_key=lambda: "", stored=True)
+
     def _at_hand(self, step: Step[T]) -> Done[T] | None:
         """The result of a step that takes no time to speak of."""
         try:
-            if not step.at_hand():
+            if step.at_hand is None or not (self.loads or step.at_hand()):
                 return None
             began = time.perf_counter()
             value = step.make(_Silent())
@@ -145,7 +168,7 @@ class DryRun(Run):
             seconds = self.store.last_time(step.timed_as or step.name, amount=step.amount())
             if seconds is not None:
                 found = Estimate(seconds=seconds, basis="as last time")
-            elif step.how_long and time.perf_counter() - self.began <= PATIENCE_S:
+            elif step.how_long and not self.loads and time.perf_counter() - self.began <= PATIENCE_S:
                 found = step.how_long()
             else:
                 return step.typical

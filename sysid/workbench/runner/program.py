@@ -103,9 +103,24 @@ def foretell(program: Program[Any], folder: Path, *, command: str = "", fresh: b
         UserError: If data or options cannot be used as they are: what a run would say too.
     """
     run = DryRun(store=RunFolder(path=folder.resolve()), command=command, fresh=fresh)
+    if look(program, run):
+        return tuple(run.planned.values())
+    # As far as it can be known; what comes after stands in the outline.
+    return run.with_outline(program.outline())
+
+
+def look(program: Program[Any], run: DryRun) -> bool:
+    """Go through the steps of a pipeline as far as their results are there.
+
+    Args:
+        program: The pipeline.
+        run: Looks at each step.
+
+    Returns:
+        Whether all of them are.
+    """
     try:
         program.steps(run)
     except NotKnownError:
-        # As far as it can be known; what comes after stands in the outline.
-        return run.with_outline(program.outline())
-    return tuple(run.planned.values())
+        return False
+    return True

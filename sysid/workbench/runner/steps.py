@@ -10,10 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from sysid.estimation import FitProgress
 from sysid.estimation.least_squares.checkpoints import Watch
+
+if TYPE_CHECKING:
+    from sysid.export import Bundle
 
 T = TypeVar("T")
 
@@ -82,7 +85,10 @@ class Step(Generic[T]):
         typical: How long it takes where that cannot be found out.
         timed_as: Name under which its time is kept; its own by default.
         was_found: Whether a result was found, for a step that keeps what it does by itself.
-        at_hand: Whether making it takes no time to speak of, so that a dry run does.
+        at_hand: Whether making it takes no time to speak of, so that a dry run does; not where it is not given.
+        peek: Looks for a result that the step keeps by itself; raises :class:`NotKnownError` if it is not all there.
+        called: Name by which people ask for the model that comes of it; empty where none does.
+        export: Writes that model as a bundle; given the result, the folder, and what it says of where it is from.
     """
 
     name: str
@@ -101,7 +107,10 @@ class Step(Generic[T]):
     typical: Estimate = NOT_KNOWN
     timed_as: str = ""
     was_found: Callable[[T], bool] = lambda _: False
-    at_hand: Callable[[], bool] = lambda: False
+    at_hand: Callable[[], bool] | None = None
+    peek: Callable[[], T] | None = None
+    called: str = ""
+    export: Callable[[T, Path, dict[str, Any]], Bundle] | None = None
 
     @property
     def takes(self) -> tuple[Done[Any], ...]:
@@ -158,11 +167,13 @@ class Outlined:
         name: Of the step.
         title: For people.
         estimate: How long it takes where there was no last time.
+        called: Name by which people ask for the model that comes of it.
     """
 
     name: str
     title: str
     estimate: Estimate = field(default=NOT_KNOWN)
+    called: str = ""
 
 
 def iteration_detail(entry: FitProgress) -> str:

@@ -27,10 +27,10 @@ from sysid.workbench.sweep.config import WINNER, SweepConfig
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.sampler import publish, strategy
 from sysid.workbench.sweep.search_space import Space, parse_space, trained_rows
-from sysid.workbench.sweep.store import TRIALS, TrialStore
+from sysid.workbench.sweep.store import TRIALS, Clock, TrialStore
 from sysid.workbench.sweep.table import table_of_trials
 from sysid.workbench.sweep.trial import Bench
-from sysid.workbench.sweep.workers import AbstractWorkers, LocalWorkers
+from sysid.workbench.sweep.workers import AbstractWorkers, LocalWorkers, NoWorkers
 from sysid.yaml_files import check, read_yaml
 
 if TYPE_CHECKING:
@@ -274,6 +274,7 @@ class _SweepSteps:
             name=TRIALS,
             title=self._title(),
             make=lambda _: self._found(run, self._checked(loaded.value)),
+            peek=lambda: self._stored(run, loaded.value),
             outcome=lambda found: f"{found.winner.label}, {by} {found.rank:.3g}",
             was_found=lambda found: found.done_now == 0,
             how_long=lambda: self._how_long(run, loaded.value),
@@ -300,41 +301,55 @@ class _SweepSteps:
         basis = f"{left} trials, each as long as {middle.structure.label}, {self.config.workers} at a time"
         return Estimate(seconds=left * one.seconds / self.config.workers, basis=basis)
 
-    def _found(self, run: Run, data: Data) -> _Found:
-        space = self.config.space()
-        bench = Bench(
-            pipeline=self._first(space).model_dump(mode="json"),
+    def _bench(self, run: Run, data: Data) -> Bench:
+        return Bench(
+            # Workers of a cluster may have another disk.
+            folder=run.store.path if self.config.cluster is None else None,
+            pipeline=self._first(self.config.space()).model_dump(mode="json"),
             traces=data.traces,
             selection=data.selection,
             sequences=data.sequences,
         )
+
+    def _stored(self, run: Run, data: Data) -> _Found:
+        """What came of the trials, if all of them are there."""
         trials = TrialStore(path=run.store.path / TRIALS)
+        return self._tried(run, self._bench(run, data), trials, NoWorkers(), trials.stopped_clock())
+
+    def _found(self, run: Run, data: Data) -> _Found:
+        bench, trials = self._bench(run, data), TrialStore(path=run.store.path / TRIALS)
         if run.fresh:
             shutil.rmtree(trials.path, ignore_errors=True)
         workers = self.find_workers(bench, self.config)
         try:
             with trials.clock() as clock:
-                driver = Driver(
-                    config=self.config,
-                    bench=bench,
-                    store=trials,
-                    workers=workers,
-                    clock=clock,
-                    step=self._title(),
-                    tell=run.tell,
-                )
-                plan, tried = strategy(self.config, space), []
-                while points := plan.ask():
-                    batch = driver.run(points)
-                    plan.tell(batch)
-                    tried += batch
-                beside = self._beside(driver, tried, len(space.points()))
-            found = self._choose(run, driver, bench, tried=tried, beside=beside, wall_s=clock.total)
+                found = self._tried(run, bench, trials, workers, clock)
         finally:
             workers.close()
+        write_sweep(run.store.path, found.record)
         if self.config.storage is not None:
             self._publish(run, found.record, self.config.storage)
         return found
+
+    def _tried(self, run: Run, bench: Bench, trials: TrialStore, workers: AbstractWorkers, clock: Clock) -> _Found:
+        """Try what there is to try, and choose."""
+        space, tried = self.config.space(), list[Trial]()
+        driver = Driver(
+            config=self.config,
+            bench=bench,
+            store=trials,
+            workers=workers,
+            clock=clock,
+            step=self._title(),
+            tell=run.tell,
+        )
+        plan = strategy(self.config, space)
+        while points := plan.ask():
+            batch = driver.run(points)
+            plan.tell(batch)
+            tried += batch
+        beside = self._beside(driver, tried, len(space.points()))
+        return self._choose(driver, bench, tried=tried, beside=beside, wall_s=clock.total)
 
     def _first(self, space: Space) -> PipelineConfig:
         """The pipeline of the first point: what all points share."""
@@ -369,7 +384,6 @@ class _SweepSteps:
 
     def _choose(
         self,
-        run: Run,
         driver: Driver,
         bench: Bench,
         *,
@@ -392,7 +406,6 @@ class _SweepSteps:
         unit = bench.traces.traces[0].channel(self.config.mapping.output).unit
         n_points = len(self.config.space().points())
         record = self._record(tried, beside, winner, unit=unit, n_points=n_points, wall_s=wall_s, refused=refused)
-        write_sweep(run.store.path, record)
         others = [trial for trial in beside if trial.number != winner.number]
         shown = [winner, *others]
         return _Found(

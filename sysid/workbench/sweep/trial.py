@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sysid.errors import SysidError
-from sysid.estimation import FitResult, StabilityOptions, Training, estimators
+from sysid.estimation import FitProgress, FitResult, StabilityOptions, Training, estimators
 from sysid.estimation.estimators import ESTIMATORS, Estimator, Options, estimator_of
 from sysid.estimation.least_squares.checkpoint import Checkpoint
+from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch
 from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
+from sysid.workbench.runner.store import RunFolder
 
 FAILED = "FAILED"
 """Status of a trial whose fit raised an error."""
@@ -36,12 +40,14 @@ class Bench:
         traces: Every case.
         selection: The traces that choose.
         sequences: Traces over which a free run has to stay stable, where a data set of them is declared.
+        folder: The run folder, where the workers can write there: a trial that is cut off then goes on where it was.
     """
 
     pipeline: Mapping[str, Any]
     traces: TraceSet
     selection: tuple[Trace, ...]
     sequences: tuple[Trace, ...] = ()
+    folder: Path | None = None
 
     @property
     def stability(self) -> StabilityOptions:
@@ -90,9 +96,9 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     began, cpu = time.perf_counter(), time.process_time()
     outcome: dict[str, Any] = {"key": job.key, "number": job.number, "structure": dict(job.structure)}
     try:
-        with threadpool_limits(1):
-            fit, checkpoint = train(bench, job, before)
-            trained = time.perf_counter() - began
+        with threadpool_limits(1), _kept(bench, job) as watch:
+            fit, checkpoint = train(bench, job, before, watch)
+            trained = watch.checkpoints.earlier_s + time.perf_counter() - began
             outcome |= {
                 "status": fit.status.name,
                 "usable": fit.status.usable,
@@ -111,13 +117,37 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     return outcome | {"seconds": trained, "cpu_s": time.process_time() - cpu}
 
 
-def train(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> tuple[FitResult, Checkpoint | None]:
+@contextmanager
+def _kept(bench: Bench, job: Job) -> Iterator[Watch]:
+    """Where a trial's training stands, kept until it has ended."""
+    if bench.folder is None:
+        yield Watch(report=lambda _: None, checkpoints=Checkpoints())
+        return
+    store, name = RunFolder(path=bench.folder), f"trial-{job.key[:16]}"
+    checkpoints = Checkpoints(
+        kept=store.checkpoint(name, job.key), save=lambda values: store.keep_checkpoint(name, job.key, values)
+    )
+    try:
+        yield Watch(report=lambda _: None, checkpoints=checkpoints)
+    except (SysidError, ArithmeticError, np.linalg.LinAlgError):
+        store.drop_checkpoint(name)  # that is how it ends
+        raise
+    store.drop_checkpoint(name)
+
+
+def train(
+    bench: Bench,
+    job: Job,
+    before: Mapping[str, Any] | None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> tuple[FitResult, Checkpoint | None]:
     """Train one point.
 
     Args:
         bench: Traces and conditions.
         job: What to do.
         before: The result of the job that it needs.
+        on_progress: Told after every iteration; a ``Watch`` keeps where the training stands.
 
     Returns:
         The fit, and where it can go on if it is a network's.
@@ -143,6 +173,7 @@ def train(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> tuple[Fit
         stability=_checked(bench, estimator_of(fit.structure), training),
         resume=Checkpoint(fields=before["checkpoint"]) if before and usable and job.resume else None,
         on_checkpoint=kept.append,
+        on_progress=on_progress,
     )
     return result, kept[-1] if kept else None
 

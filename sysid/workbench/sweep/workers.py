@@ -20,6 +20,7 @@ from multiprocessing import connection
 from typing import Any
 
 from sysid.errors import SysidError
+from sysid.workbench.runner.steps import NotKnownError
 from sysid.workbench.sweep.trial import Bench, Job, run_job
 
 MAX_DEATHS = 8
@@ -90,6 +91,30 @@ class InThisProcess(AbstractWorkers):
         """What was done since."""
         done, self._done = self._done, []
         return done
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+
+class NoWorkers(AbstractWorkers):
+    """Does nothing: for who looks at what is stored."""
+
+    @property
+    def free(self) -> int:
+        """As if it could."""
+        return 1
+
+    def submit(self, job: Job, before: Mapping[str, Any] | None) -> None:  # noqa: ARG002 - as all workers
+        """Refuse a job, which is not stored then.
+
+        Raises:
+            NotKnownError: Always.
+        """
+        raise NotKnownError(f"trial {job.number}")
+
+    def finished(self) -> list[tuple[Job, dict[str, Any]]]:
+        """Nothing."""
+        return []
 
     def close(self) -> None:
         """Nothing to let go of."""
