@@ -264,7 +264,7 @@ def _may_be_clock(column: RawColumn) -> bool:
     if column.unit is not None and time_unit(column.unit) not in _TIME_UNITS:
         return False
     steps = np.diff(column.values)
-    return not len(steps) or bool(np.mean(steps > 0.0) > 0.5)
+    return not len(steps) or bool(np.mean(steps > 0.0) > 0.9)
 
 
 def _is_called_time(name: str) -> bool:
