@@ -12,8 +12,8 @@ import pytest
 from sysid.workbench.cli import run_cli
 from tests.workbench.bad_inputs import CATALOGUE, Bad
 
-REWRITTEN = {"log.txt", "holder.json", "pipeline.yaml", "environment.json"}
-"""What every run writes anew: what was asked for last, and by whom."""
+REWRITTEN = {"log.txt", "holder.json", "pipeline.yaml", "environment.json", "times.json"}
+"""What every run writes anew: what was asked for last, by whom, and how long it took."""
 
 
 def contents(folder: Path) -> dict[str, str]:

@@ -283,7 +283,7 @@ class RunFolder:
             return {}
 
     def _checkpoint(self, step: str) -> Path:
-        return self.path / ".steps" / f"{step}.checkpoint.json"
+        return self.path / ".steps" / "checkpoints" / f"{step}.json"
 
     def _stamp(self, step: str) -> Path:
         return self.path / ".steps" / f"{step}.json"

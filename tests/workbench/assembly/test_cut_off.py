@@ -1,4 +1,4 @@
-"""An assembly that is cut off goes on with the very fit, or round, that it was at; its results can be exported by name."""
+"""An assembly that is cut off goes on with the fit or the round that it was at; its results are exported by name."""
 
 from __future__ import annotations
 

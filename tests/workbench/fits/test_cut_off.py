@@ -48,7 +48,7 @@ def test_a_fit_goes_on_where_it_was_cut_off(workspace: Path) -> None:
     run(workspace, "whole", whole)
     with pytest.raises(CutOffError):
         run(workspace, "parts", first)
-    kept = workspace / "parts" / ".steps" / "fit-closed-loop.checkpoint.json"
+    kept = workspace / "parts" / ".steps" / "checkpoints" / "fit-closed-loop.json"
     assert kept.is_file()
     run(workspace, "parts", second)
     assert parameters(workspace, "parts") == parameters(workspace, "whole")
