@@ -17,7 +17,7 @@ from sysid.estimation import FitProgress
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch
 from sysid.reporting.records import RunResults, write_record
 from sysid.workbench.runner.environment import environment
-from sysid.workbench.runner.events import Event, StepDone, StepProgress, StepStarted, Watcher
+from sysid.workbench.runner.events import Event, StepDone, StepProgress, StepStarted, Warned, Watcher
 from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.steps import Done, Estimate, Outlined, Step, iteration_detail
 from sysid.workbench.runner.store import RunFolder, digest
@@ -224,6 +224,7 @@ class _Working:
     key: str
     title: str
     checkpoints: Checkpoints | None = None
+    unkept: bool = False
     share: float = 0.0
     guard: threading.Lock = field(default_factory=threading.Lock)
     began: float = field(default_factory=time.perf_counter)
@@ -241,10 +242,17 @@ class _Working:
         """Whom an estimator tells of its iterations, from several threads."""
         store, name = self.run.store, self.step.name
         kept = {} if self.run.fresh or not self.key else store.checkpoint(name, self.key)
-        if self.key:
-            self.checkpoints = Checkpoints(kept=kept, save=lambda values: store.keep_checkpoint(name, self.key, values))
-        else:
-            self.checkpoints = Checkpoints()
+
+        def save(values: dict[str, Any]) -> None:
+            try:
+                store.keep_checkpoint(name, self.key, values)
+            except OSError as error:
+                # What cannot be kept costs nobody the fit; that a disk is full is said where a result is written.
+                if not self.unkept:
+                    self.run.tell(Warned(text=f"where the fit stands is not kept ({error})"))
+                self.unkept = True
+
+        self.checkpoints = Checkpoints(kept=kept, save=save if self.key else None)
 
         def report(entry: FitProgress) -> None:
             spent = (self.earlier_s + time.perf_counter() - self.began) / limit_s

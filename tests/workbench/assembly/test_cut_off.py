@@ -11,8 +11,8 @@ from sysid.models import Cascade
 from sysid.workbench.assembly.runner import program, read_assembly
 from sysid.workbench.cli import run_cli
 from sysid.workbench.kinds import RunRequest
+from sysid.workbench.listeners import foresee
 from sysid.workbench.runner.events import Event, StepProgress
-from sysid.workbench.runner.listeners import foresee
 from sysid.workbench.runner.program import carry_out
 
 
