@@ -57,6 +57,7 @@ class Estimator:
         begins: Where a fit begins that takes no initial one.
         stability: How the stability of its fits is checked.
         joins: Whether its models can be members of a whole that are trained together.
+        of_residuals: What a reader of its residuals should know; empty for nothing.
     """
 
     structure: type[AbstractStructure]
@@ -68,11 +69,17 @@ class Estimator:
     begins: str = ""
     stability: type[AbstractStabilityCheck] = FreeRunCheck
     joins: bool = False
+    of_residuals: str = ""
 
     @cached_property
     def knows(self) -> frozenset[str]:
         """Names of the arguments that its function takes."""
         return frozenset(inspect.signature(self.fit).parameters)
+
+    @property
+    def linear(self) -> bool:
+        """Whether its models are linear: they have poles and frequency responses."""
+        return self.stability.by_poles
 
     @property
     def selects(self) -> bool:
@@ -214,6 +221,8 @@ ESTIMATORS: dict[str, Estimator] = {
             name="a transfer function",
             fit=fit_transfer_function,
             training=TransferFunctionTraining,
+            of_residuals="A transfer function here has no model of the noise: one step ahead it does what it does in "
+            "free run, and its residuals need not be white, only independent of the inputs.",
             begins=LINEAR_START,
             stability=PoleCheck,
         ),

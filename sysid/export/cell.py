@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +10,10 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.export.space import SpaceCell
-from sysid.models import AbstractModel, NeuralForm, StateSpace
+from sysid.models import NeuralForm, StateSpace
 from sysid.models.cascade_program import Part
-from sysid.models.wiring import Ends, Member
+from sysid.models.ends import Ends
+from sysid.models.wiring import Member
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,8 +129,10 @@ def cell_of(model: Member) -> Cell | SpaceCell:
     Raises:
         ConfigError: If it lowers to neither kind.
     """
-    if isinstance(model, AbstractModel) and isinstance(model.recursion, StateSpace):
-        return SpaceCell.linear(model.recursion, Ends.of(model))
-    if isinstance(model, AbstractModel) and isinstance(model.recursion, NeuralForm):
-        return SpaceCell.neural(model.recursion, Ends.of(model))
-    return Cell.of(model)
+    form = getattr(model, "recursion", None)  # a network of several outputs has none
+    lowered = SPACES.get(type(form))
+    return Cell.of(model) if lowered is None else lowered(form, model.ends)
+
+
+SPACES: dict[type, Callable[..., SpaceCell]] = {StateSpace: SpaceCell.linear, NeuralForm: SpaceCell.neural}
+"""Forms with hidden states, and what they become; every other form is lagged."""

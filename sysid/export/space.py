@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models import History, NeuralForm, Scaling, StateSpace
-from sysid.models.wiring import Ends
+from sysid.models.ends import Ends
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,6 +7,7 @@ from sysid.models.cascade import Cascade
 from sysid.models.cascade_batch import simulate_family
 from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import Activity, CascadeRun
+from sysid.models.ends import Ends
 from sysid.models.form import AbstractForm
 from sysid.models.history import History, Start, StartKind
 from sysid.models.interpolation import Line
@@ -22,7 +23,7 @@ from sysid.models.state_space import StateSpace
 from sysid.models.store import cascade_from_dict, model_from_dict, structure_from_dict
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
 from sysid.models.vector_narx import VectorMapping, VectorNARX, VectorNARXModel, VectorScaling
-from sysid.models.wiring import Ends, Member, Wiring
+from sysid.models.wiring import Member, Wiring
 
 __all__ = [
     "ARX",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.lags import Lagged, Lags
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
+from sysid.models.ratio import Ratio
 from sysid.models.recursion import Recursion
 from sysid.models.scaling import Scaling
 from sysid.models.to_control import Matrices, in_powers_of_z, transfer_function
@@ -143,6 +144,17 @@ class ARXModel(AbstractModel):
     def poles(self) -> NDArray[np.complex128]:
         """Poles in the z plane, shape ``(na,)``; a free run is stable if all lie inside the unit circle."""
         return np.asarray(np.roots([1.0, *(-self.a)]), dtype=np.complex128)
+
+    def with_theta(self, theta: NDArray[np.float64]) -> ARXModel:
+        """The same model with another constant and other coefficients, in this order."""
+        return replace(self, intercept=float(theta[0]), coefficients=theta[1:])
+
+    def ratio(self, j: int) -> Ratio:
+        """From one input to the output, in ``1/z``; all inputs share the denominator."""
+        return Ratio(
+            B=self.b[j], F=np.concatenate([[1.0], -self.a]), delay=self.orders.nk[j], discrete=True,
+            of_numerator=f"b({self.mapping.inputs[j]}, ", of_denominator="a(", past_outputs=True,
+        )  # fmt: skip
 
     @property
     def pole_radius(self) -> float:

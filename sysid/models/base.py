@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.models.ends import Ends
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lagged
 from sysid.models.mapping import Mapping
+from sysid.models.ratio import Ratio
 
 
 class AbstractStructure(ABC):
@@ -116,6 +118,18 @@ class AbstractModel(ABC):
         """Magnitude of the largest pole from sample to sample; ``None`` for a model that is not linear."""
         return None
 
+    def ratio(self, j: int) -> Ratio | None:
+        """What a linear model is from one input to the output.
+
+        Args:
+            j: Which input.
+
+        Returns:
+            A ratio of polynomials; ``None`` for a model that is not linear.
+        """
+        del j
+        return None
+
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again, as JSON values."""
@@ -131,6 +145,50 @@ class AbstractModel(ABC):
         Returns:
             The model, equal in every parameter.
         """
+
+    @property
+    def ends(self) -> Ends:
+        """Its channels, as wiring sees them."""
+        return Ends(
+            inputs=self.mapping.inputs,
+            outputs=(self.mapping.output,),
+            input_units=self.input_units,
+            output_units=(self.output_unit,),
+            rest_outputs=(self.rest_output,),
+            direct=self.recursion.reads_now(self.mapping.inputs),
+        )
+
+    def with_theta(self, theta: NDArray[np.float64]) -> AbstractModel | None:
+        """The same model with other parameters.
+
+        Args:
+            theta: Flat parameters, as its recursion has them.
+
+        Returns:
+            The model; ``None`` for one that has no flat parameters.
+        """
+        del theta
+        return None
+
+    def predict_outputs(
+        self, signals: Dict[str, NDArray[np.float64]], rest: Dict[str, float]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Prediction one step ahead from measured channels, by name: what a model of several outputs has, too.
+
+        Args:
+            signals: Every input and output, in its unit, shape ``(n_samples,)`` each.
+            rest: Their values before the first sample.
+
+        Returns:
+            Every output, shape ``(n_samples,)``; NaN for a model that predicts nothing.
+        """
+        names, output = self.mapping.inputs, self.mapping.output
+        history = History.at_rest(inputs=[rest[name] for name in names], output=rest[output])
+        measured = signals[output]
+        if not self.recursion.predicts:
+            return {output: np.full(len(measured), np.nan)}
+        inputs = np.column_stack([signals[name] for name in names])
+        return {output: self.predict(inputs, measured, history)}
 
     def simulate(self, inputs: NDArray[np.float64], history: History | None = None) -> NDArray[np.float64]:
         """Free run: the model is fed its own past output.

@@ -16,7 +16,8 @@ from sysid.models.cascade_batch import simulate_records
 from sysid.models.cascade_program import Limit, Part
 from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
-from sysid.models.wiring import Ends, Member, Wiring
+from sysid.models.ends import Ends
+from sysid.models.wiring import Member, Wiring
 from sysid.traces import Trace
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import Program
+from sysid.models.ends import Ends
 from sysid.models.lags import Lags
 from sysid.models.recursion import Recursion
 from sysid.models.vector_narx import VectorNARXModel
-from sysid.models.wiring import Ends, Member
+from sysid.models.wiring import Member
 
 _Number = TypeVar("_Number", np.int64, np.float64)
 

@@ -14,8 +14,9 @@ from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, Program
 from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit, Part, program_of
+from sysid.models.ends import Ends
 from sysid.models.history import History
-from sysid.models.wiring import Ends, Member
+from sysid.models.wiring import Member
 
 _NOTHING = np.empty((0, 0))
 

@@ -24,6 +24,17 @@ class AbstractForm(ABC):
     predicts: bool = True
     """Whether there is a prediction from measured output that is not the free run itself."""
 
+    def reads_now(self, inputs: tuple[str, ...]) -> frozenset[str]:
+        """Inputs that are read at the sample of the output.
+
+        Args:
+            inputs: Their names.
+
+        Returns:
+            Some of them. What a state space reads now is not looked for: all, so that it takes no part in a circle.
+        """
+        return frozenset(inputs)
+
     @property
     @abstractmethod
     def numbers(self) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -198,6 +198,10 @@ class NARXModel(AbstractModel):
         theta.setflags(write=False)
         object.__setattr__(self, "theta", theta)
         object.__setattr__(self, "input_units", tuple(self.input_units))
+
+    def with_theta(self, theta: NDArray[np.float64]) -> NARXModel:
+        """The same network with other weights."""
+        return replace(self, theta=theta)
 
     @property
     def structure(self) -> NARX:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.kernels import recursion as kernel
+from sysid.models.ends import read_now
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lags
@@ -141,6 +142,10 @@ class Recursion(AbstractForm):
         u = self.scaling.scale_inputs(np.concatenate([past_inputs, inputs]))
         y = np.concatenate([self.scaling.scale_output(past_output), np.zeros(len(inputs))])
         return u, y
+
+    def reads_now(self, inputs: tuple[str, ...]) -> frozenset[str]:
+        """Inputs that it reads with a lag of 0."""
+        return read_now(inputs, self.lags.inputs)
 
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run: the model is fed its own past output.

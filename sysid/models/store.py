@@ -16,25 +16,23 @@ from sysid.models.transfer_function import TransferFunction, TransferFunctionMod
 from sysid.models.vector_narx import VectorNARX, VectorNARXModel
 from sysid.models.wiring import Member
 
-_MODELS: dict[str, type[AbstractModel]] = {
-    ARX.kind: ARXModel,
-    NARX.kind: NARXModel,
-    NeuralStateSpace.kind: NeuralStateSpaceModel,
-    TransferFunction.kind: TransferFunctionModel,
+_KINDS: dict[str, tuple[type[AbstractStructure], type[AbstractModel]]] = {
+    structure.kind: (structure, model)
+    for structure, model in (
+        (ARX, ARXModel),
+        (NARX, NARXModel),
+        (NeuralStateSpace, NeuralStateSpaceModel),
+        (TransferFunction, TransferFunctionModel),
+    )
 }
-_STRUCTURES: dict[str, type[AbstractStructure]] = {
-    ARX.kind: ARX,
-    NARX.kind: NARX,
-    NeuralStateSpace.kind: NeuralStateSpace,
-    TransferFunction.kind: TransferFunction,
-}
+"""By kind the structure and its models."""
 
 
 def _check_kind(kind: object) -> str:
-    if not isinstance(kind, str) or kind not in _MODELS:
+    if not isinstance(kind, str) or kind not in _KINDS:
         raise ConfigError(
             "unknown kind of model",
-            expected=f"one of {', '.join(_MODELS)}",
+            expected=f"one of {', '.join(_KINDS)}",
             got=repr(kind),
             remedy="correct the kind, or use the version of the workbench that wrote it",
         )
@@ -55,7 +53,7 @@ def model_from_dict(fields: Dict[str, Any]) -> AbstractModel:
     """
     kind = _check_kind(fields.get("structure", {}).get("kind"))
     try:
-        return _MODELS[kind].from_dict(fields)
+        return _KINDS[kind][1].from_dict(fields)
     except KeyError as error:
         raise ConfigError(
             f"the stored {kind} model lacks the field {error}", remedy="store the model again; this file is incomplete"
@@ -76,11 +74,11 @@ def structure_from_dict(fields: Dict[str, Any]) -> AbstractStructure:
     """
     kind = _check_kind(fields.get("kind"))
     try:
-        return _STRUCTURES[kind](**{key: value for key, value in fields.items() if key != "kind"})
+        return _KINDS[kind][0](**{key: value for key, value in fields.items() if key != "kind"})
     except TypeError as error:
         raise ConfigError(
             f"not the fields of the structure {kind}",
-            expected=", ".join(_STRUCTURES[kind].__dataclass_fields__),  # type: ignore[attr-defined]  # all are dataclasses
+            expected=", ".join(_KINDS[kind][0].__dataclass_fields__),  # type: ignore[attr-defined]  # all are dataclasses
             got=", ".join(fields),
             remedy="correct the field's name",
         ) from error

@@ -17,6 +17,7 @@ from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.mapping import Mapping
 from sysid.models.orthonormal_basis import Domain, Rung
 from sysid.models.ranges import IntRange
+from sysid.models.ratio import Ratio
 from sysid.models.realisation import Realisation, realise
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
@@ -201,6 +202,14 @@ class TransferFunctionModel(AbstractModel):
         """
         b = self.numerator(j)
         return np.asarray(np.roots(b if self.orders.domain is Domain.DISCRETE else b[::-1]), dtype=np.complex128)
+
+    def ratio(self, j: int) -> Ratio:
+        """From one input to the output, in ``1/z`` or in ``s``."""
+        name, discrete = self.mapping.inputs[j], self.orders.domain is Domain.DISCRETE
+        return Ratio(
+            B=self.numerator(j), F=self.denominator(j), delay=self.delays[j], discrete=discrete,
+            of_numerator=f"B({name}, ", of_denominator=f"F({name}, ",
+        )  # fmt: skip
 
     @property
     def pole_radius(self) -> float:

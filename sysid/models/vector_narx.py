@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
+from sysid.models.ends import Ends, read_now
 from sysid.models.lags import Lags, LagSpec
 from sysid.models.narx import CLAMP, NARX
 
@@ -254,7 +255,23 @@ class VectorNARXModel:
         """The regressors over inputs and outputs."""
         return self.network.lags(len(self.mapping.inputs), len(self.mapping.outputs))
 
-    def predict(
+    @property
+    def ends(self) -> Ends:
+        """Its channels, as wiring sees them."""
+        return Ends(
+            inputs=self.mapping.inputs,
+            outputs=self.mapping.outputs,
+            input_units=self.input_units,
+            output_units=self.output_units,
+            rest_outputs=self.rest_outputs,
+            direct=read_now(self.mapping.inputs, self.lags.inputs),
+        )
+
+    def with_theta(self, theta: NDArray[np.float64]) -> VectorNARXModel:
+        """The same network with other weights."""
+        return replace(self, theta=theta)
+
+    def predict_outputs(
         self, signals: Dict[str, NDArray[np.float64]], rest: Dict[str, float]
     ) -> dict[str, NDArray[np.float64]]:
         """Prediction one step ahead from measured outputs.

@@ -9,57 +9,11 @@ from itertools import pairwise
 
 from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel
-from sysid.models.recursion import Recursion
+from sysid.models.ends import Ends
 from sysid.models.vector_narx import VectorNARXModel
 
 Member = AbstractModel | VectorNARXModel
 """What can be wired: a model of one output, or of several."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ends:
-    """What goes into a model and comes out.
-
-    Args:
-        inputs: Names of the channels that it reads.
-        outputs: Names of the channels that it writes.
-        input_units: Unit of each input.
-        output_units: Unit of each output.
-        rest_outputs: Each output at rest, in its unit.
-        direct: The inputs that it reads at the sample of its output; of the others it reads past samples only.
-    """
-
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    input_units: tuple[str, ...]
-    output_units: tuple[str, ...]
-    rest_outputs: tuple[float, ...]
-    direct: frozenset[str]
-
-    @classmethod
-    def of(cls, model: Member) -> Ends:
-        """The ends of a model of one output, or of several."""
-        if isinstance(model, VectorNARXModel):
-            return cls(
-                inputs=model.mapping.inputs,
-                outputs=model.mapping.outputs,
-                input_units=model.input_units,
-                output_units=model.output_units,
-                rest_outputs=model.rest_outputs,
-                direct=_direct(model.mapping.inputs, model.lags.inputs),
-            )
-        form = model.recursion
-        return cls(
-            inputs=model.mapping.inputs,
-            outputs=(model.mapping.output,),
-            input_units=model.input_units,
-            output_units=(model.output_unit,),
-            rest_outputs=(model.rest_output,),
-            # What a state space reads now is not looked for: such a model takes no part in a circle.
-            direct=_direct(model.mapping.inputs, form.lags.inputs)
-            if isinstance(form, Recursion)
-            else frozenset(model.mapping.inputs),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,10 +102,6 @@ class Wiring:
         """
         before = self.outputs.index(ends.outputs[0])
         return any(name in self.outputs[before:] and name not in ends.outputs for name in ends.inputs)
-
-
-def _direct(inputs: Sequence[str], lags: Sequence[Sequence[int]]) -> frozenset[str]:
-    return frozenset(name for name, some in zip(inputs, lags, strict=False) if 0 in some)
 
 
 def _units(ends: Sequence[Ends]) -> tuple[dict[str, str], list[str]]:

@@ -7,15 +7,13 @@ from pathlib import Path
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
-from sysid.models import ARXModel, TransferFunctionModel
+from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.residuals import GroupRecord, read_residuals
 from sysid.reporting.results import FitRecord, LinearityRecord, Results
 from sysid.reporting.tables import Cell, Table, figure_cell
-
-LINEAR_KINDS = ("ARX", "TransferFunction")
 
 
 def evidence_sections(folder: Path, results: Results) -> list[Section]:
@@ -42,7 +40,8 @@ def evidence_sections(folder: Path, results: Results) -> list[Section]:
 
 
 def _linear(fit: FitRecord) -> bool:
-    return fit.structure.get("kind") in LINEAR_KINDS
+    row = ESTIMATORS.get(fit.structure.get("kind", ""))
+    return row is not None and row.linear
 
 
 def _linear_enough(linearity: LinearityRecord) -> Section:
@@ -70,11 +69,8 @@ def _linear_enough(linearity: LinearityRecord) -> Section:
 
 def _residuals(results: Results, residuals: dict[str, dict[str, GroupRecord]]) -> Section:
     parts: list[Part] = [_residual_table(results, residuals)]
-    if any(fit.structure.get("kind") == "TransferFunction" for fit in results.fits):
-        parts.append(
-            "A transfer function here has no model of the noise: one step ahead it does what it does in free run, and "
-            "its residuals need not be white, only independent of the inputs."
-        )
+    kinds = {fit.structure.get("kind") for fit in results.fits}
+    parts += [row.of_residuals for kind, row in ESTIMATORS.items() if kind in kinds and row.of_residuals]
     best = results.best_fit
     for fit in results.fits:
         groups = {name: group.analysis for name, group in residuals[fit.name].items() if group.analysis is not None}
@@ -129,7 +125,7 @@ def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord
 
 def _responses(folder: Path, fit: FitRecord) -> list[Part]:
     stored = _read_fit(folder / "fits" / fit.slug / "fit.json")
-    if stored is None or not isinstance(stored.model, ARXModel | TransferFunctionModel):
+    if stored is None or stored.model.pole_radius is None:
         return []
     model, uncertainty, name = stored.model, stored.uncertainty, identifier(fit.slug)
     band = "Grey: 95 % of what the covariance of the parameters allows." if uncertainty else "Uncertainty not known."

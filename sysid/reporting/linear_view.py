@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.uncertainty import Uncertainty
-from sysid.models import ARXModel, Domain, TransferFunctionModel
-
-LinearModel = ARXModel | TransferFunctionModel
+from sysid.models import AbstractModel
+from sysid.models.ratio import Ratio
 
 DRAWS = 200
 """Parameters drawn from their distribution for a band."""
@@ -59,7 +58,7 @@ class LinearView:
         return np.asarray(np.roots(polynomial if self.discrete else polynomial[::-1]), dtype=np.complex128)
 
 
-def linear_views(model: LinearModel, uncertainty: Uncertainty | None, seed: int = 0) -> list[LinearView]:
+def linear_views(model: AbstractModel, uncertainty: Uncertainty | None, seed: int = 0) -> list[LinearView]:
     """The model by input, those without any parameter left out.
 
     Args:
@@ -72,38 +71,26 @@ def linear_views(model: LinearModel, uncertainty: Uncertainty | None, seed: int 
     """
     views = []
     for j, (name, unit) in enumerate(zip(model.mapping.inputs, model.input_units, strict=True)):
-        B, F, delay = _arx(model, j) if isinstance(model, ARXModel) else _ratio(model, j)
-        if not len(B):
+        ratio = model.ratio(j)
+        if ratio is None or not len(ratio.B):
             continue
-        discrete = isinstance(model, ARXModel) or model.orders.domain is Domain.DISCRETE
-        Bs, Fs = B[np.newaxis], F[np.newaxis]
+        Bs, Fs = ratio.B[np.newaxis], ratio.F[np.newaxis]
         if uncertainty is not None:
-            drawn_B, drawn_F = _drawn(uncertainty, name, discrete=discrete, arx=isinstance(model, ARXModel), seed=seed)
+            drawn_B, drawn_F = _drawn(uncertainty, ratio, seed)
             Bs, Fs = np.concatenate([Bs, drawn_B]), np.concatenate([Fs, drawn_F])
         views.append(
-            LinearView(name=name, unit=unit, discrete=discrete, sample_time=model.sample_time, delay=delay, B=Bs, F=Fs)
-        )
+            LinearView(
+                name=name, unit=unit, discrete=ratio.discrete, sample_time=model.sample_time, delay=ratio.delay,
+                B=Bs, F=Fs,
+            )
+        )  # fmt: skip
     return views
 
 
-Ratio = tuple[NDArray[np.float64], NDArray[np.float64], int]
-
-
-def _arx(model: ARXModel, j: int) -> Ratio:
-    return model.b[j], np.concatenate([[1.0], -model.a]), model.orders.nk[j]
-
-
-def _ratio(model: TransferFunctionModel, j: int) -> Ratio:
-    return model.numerator(j), model.denominator(j), model.delays[j]
-
-
-def _drawn(
-    uncertainty: Uncertainty, name: str, *, discrete: bool, arx: bool, seed: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _drawn(uncertainty: Uncertainty, ratio: Ratio, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Numerators and denominators of one input drawn from their joint distribution, ascending powers."""
-    top, bottom = (f"b({name}, ", "a(") if arx else (f"B({name}, ", f"F({name}, ")
-    b = [i for i, text in enumerate(uncertainty.names) if text.startswith(top)]
-    f = [i for i, text in enumerate(uncertainty.names) if text.startswith(bottom)]
+    b = [i for i, text in enumerate(uncertainty.names) if text.startswith(ratio.of_numerator)]
+    f = [i for i, text in enumerate(uncertainty.names) if text.startswith(ratio.of_denominator)]
     chosen = np.array(b + f)
     covariance = np.nan_to_num(uncertainty.covariance[np.ix_(chosen, chosen)])
     draws = np.random.default_rng(seed).multivariate_normal(
@@ -111,6 +98,5 @@ def _drawn(
     )
     ones = np.ones((DRAWS, 1))
     B, rest = draws[:, : len(b)], draws[:, len(b) :]
-    # An ARX model's coefficients of past outputs stand on the other side of its equation.
-    parts = (ones, -rest if arx else rest) if discrete else (rest, ones)
+    parts = (ones, -rest if ratio.past_outputs else rest) if ratio.discrete else (rest, ones)
     return B, np.concatenate(parts, axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
-from sysid.models import Activity, Cascade, CascadeRun, Ends, History, VectorNARXModel
+from sysid.models import Activity, Cascade, CascadeRun, Ends
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.evaluate import CaseResult, Evaluation
 from sysid.validation.metrics import figures, none
@@ -154,10 +154,4 @@ def one_step_ahead(cascade: Cascade, trace: Trace, run: CascadeRun, output: str)
     ends = Ends.of(model)
     known = {n: trace[n] if n in trace.channel_names else run[n] for n in (*ends.inputs, *ends.outputs)}
     rest = dict(zip(cascade.wiring.channels, cascade.levels(trace.columns(cascade.inputs)[0]), strict=True))
-    if isinstance(model, VectorNARXModel):
-        return model.predict(known, rest)[output]
-    inputs = np.column_stack([known[name] for name in ends.inputs])
-    history = History.at_rest(inputs=[rest[name] for name in ends.inputs], output=rest[output])
-    if not model.recursion.predicts:
-        return np.full(len(inputs), np.nan)
-    return model.predict(inputs, known[output], history)
+    return model.predict_outputs(known, rest)[output]

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.kernels.cascade_layout import Program
-from sysid.models import Cascade, Ends, Member, VectorNARXModel
-from sysid.models.arx import ARXModel
+from sysid.models import Cascade, Ends, Member
 from sysid.models.cascade_program import Part, program_of
-from sysid.models.narx import NARXModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +106,10 @@ def with_theta(member: Member, theta: NDArray[np.float64]) -> Member:
     Raises:
         ConfigError: If it has no flat parameters.
     """
-    if isinstance(member, ARXModel):
-        return replace(member, intercept=float(theta[0]), coefficients=theta[1:])
-    if isinstance(member, (NARXModel, VectorNARXModel)):
-        return replace(member, theta=theta)
-    raise _cannot(member)
+    found = member.with_theta(theta)
+    if found is None:
+        raise _cannot(member)
+    return found
 
 
 def _to_run(cascade: Cascade, trained: Sequence[str] | None) -> tuple[list[Member], list[bool]]:

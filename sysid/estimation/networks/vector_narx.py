@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
 from sysid.estimation.networks.member_layout import JointLayout, MemberLayout
-from sysid.estimation.networks.trained_members import with_theta
 from sysid.estimation.networks.training import FitProgress
 from sysid.models import Cascade, Scaling, VectorMapping, VectorNARX, VectorNARXModel, VectorScaling
 from sysid.models.cascade_program import Limit, Part
@@ -105,5 +104,4 @@ def _template(traces: Sequence[Trace], mapping: VectorMapping, network: VectorNA
         rest_outputs=tuple(float(np.mean([trace[name][0] for trace in traces])) for name in mapping.outputs),
     )
     part = Part.of(model)
-    held = with_theta(model, MemberLayout.of(model, part).centre() if part else model.theta)
-    return held if isinstance(held, VectorNARXModel) else model
+    return model.with_theta(MemberLayout.of(model, part).centre()) if part else model

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import signal
 
 from sysid.estimation.uncertainty import Uncertainty
-from sysid.models.to_control import state_space
+from sysid.models import AbstractModel
+from sysid.models.to_control import Linear, state_space
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
-from sysid.reporting.linear_view import LinearModel, LinearView, linear_views
+from sysid.reporting.linear_view import LinearView, linear_views
 
 BAND = (2.5, 97.5)
 """Percentiles of a band."""
@@ -23,7 +26,7 @@ SHOWN = 400
 """Samples shown of a step response."""
 
 
-def bode_figure(model: LinearModel, uncertainty: Uncertainty | None, *, seed: int = 0, points: int = 200) -> Figure:
+def bode_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, seed: int = 0, points: int = 200) -> Figure:
     """Magnitude and phase of every input, with 95 % bands.
 
     Args:
@@ -60,7 +63,7 @@ def bode_figure(model: LinearModel, uncertainty: Uncertainty | None, *, seed: in
 
 
 def step_figure(
-    model: LinearModel, uncertainty: Uncertainty | None = None, *, samples: int | None = None, seed: int = 0
+    model: AbstractModel, uncertainty: Uncertainty | None = None, *, samples: int | None = None, seed: int = 0
 ) -> Figure:
     """Response of the output to a step of one unit in every input, through python-control, with 95 % bands.
 
@@ -75,7 +78,7 @@ def step_figure(
     """
     import control
 
-    system = state_space(model)
+    system = state_space(cast("Linear", model))
     views = linear_views(model, uncertainty, seed)
     with styled():
         figure = new_figure(7.6, 2.8)
@@ -102,7 +105,7 @@ def step_figure(
         return figure
 
 
-def pole_zero_figure(model: LinearModel, uncertainty: Uncertainty | None, *, seed: int = 0) -> Figure:
+def pole_zero_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, seed: int = 0) -> Figure:
     """Poles and zeros of every input, with the cloud of poles that the uncertainty allows.
 
     Args:

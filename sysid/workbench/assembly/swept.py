@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
-from sysid.models import Mapping, NARXModel
+from sysid.estimation.estimators import estimator_of
+from sysid.models import Mapping
 from sysid.reporting.sweep.record import read_sweep
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.member_config import MemberConfig
@@ -43,7 +44,7 @@ def swept(context: Context, member: MemberConfig) -> list[FitResult]:
             break
         stored = trials.read(trial.key)
         fit = None if stored is None else FitResult.from_dict(stored["fit"])
-        if fit is not None and isinstance(fit.model, NARXModel):
+        if fit is not None and estimator_of(fit.model.structure).joins:
             found.append(fit)
     if not found:
         raise ConfigError(
