@@ -20,6 +20,7 @@ _HEAD = 1 << 18
 _NEWLINE = 10
 _ASCII_INSIDE = {"utf-8", "utf-8-sig", "cp1252", "iso8859-1", "iso8859-15", "ascii"}
 _HEAD_LINES = 400
+_FEWEST_LINES = 8
 _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
@@ -61,11 +62,15 @@ class TextFile:
 
     def head(self) -> tuple[list[str], bool]:
         """Its first lines, and whether these are all."""
-        whole = self.path.stat().st_size <= _HEAD
+        data, lines, whole = b"", 0, True
         with closing(self.blocks(size=_HEAD)) as blocks:
-            text = b"".join(block.data for block in blocks).decode() if whole else next(blocks).text
-        lines = text.split("\n")
-        return lines[:_HEAD_LINES], whole and len(lines) <= _HEAD_LINES
+            for block in blocks:
+                data, lines = data + block.data, lines + block.lines
+                if len(data) >= _HEAD // 2 and lines >= _FEWEST_LINES:
+                    whole = False
+                    break
+        texts = data.decode().split("\n")
+        return texts[:_HEAD_LINES], whole and len(texts) <= _HEAD_LINES
 
     def blocks(self, *, skip: int = 0, size: int = _BLOCK) -> Generator[Block]:
         r"""Its lines, some millions of characters at a time.
