@@ -85,6 +85,16 @@ def test_an_example_of_the_python_page_runs_in_a_few_lines(
     assert (tmp_path / Path(name).stem / "model.json").is_file()
 
 
+def test_the_examples_of_composites_run_one_after_the_other(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, object] = {}
+    for name, block in blocks_of("composites.md"):
+        exec(compile(block, name, "exec"), names)  # noqa: S102 - our own page
+    told = capsys.readouterr().out.splitlines()
+    assert [line.split("  ")[0] for line in told[:3]] == ["each alone", "chosen together", "trained end to end"]
+    assert float(told[3].split()[-2]) < 0.2
+    assert told[-1].startswith("0 diverge")
+
+
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
