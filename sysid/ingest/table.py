@@ -348,6 +348,28 @@ def array_column(
     )
 
 
+def distinct(columns: Sequence[RawColumn]) -> tuple[list[RawColumn], list[str]]:
+    """Columns with a different name each: the second ``p`` becomes ``p (2)``.
+
+    Args:
+        columns: Columns, of which some may have the same name.
+
+    Returns:
+        The columns, and one sentence for each that was renamed.
+    """
+    taken: set[str] = set()
+    named, notes = [], []
+    for column in columns:
+        name, count = column.name, 1
+        while name in taken:
+            count += 1
+            name = f"{column.name} ({count})"
+        taken.add(name)
+        named.append(column if name == column.name else replace(column, name=name))
+        notes += [] if name == column.name else [f"a further column {column.name} is called {name}"]
+    return named, notes
+
+
 def by_length(columns: Sequence[RawColumn]) -> tuple[tuple[RawColumn, ...], tuple[RawColumn, ...]]:
     """Columns of the length of the time column, or else of the commonest length, and the others.
 

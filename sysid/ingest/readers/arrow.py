@@ -13,7 +13,7 @@ from sysid.ingest.headers import Header, parse_header
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.reader import Reader, damaged
-from sysid.ingest.table import RawColumn, RawTable, array_column, recognise_time
+from sysid.ingest.table import RawColumn, RawTable, array_column, distinct, recognise_time
 from sysid.units import Reference
 
 
@@ -57,13 +57,14 @@ def _reads(kind: str, opened: Callable[[Path], tuple[Any, int, Iterator[Any]]]) 
         except (pa.ArrowException, OSError) as error:
             raise damaged(path, kind, error) from error
         pa.default_memory_pool().release_unused()
-        columns = [_column(field, array, path) for field, array in zip(schema, arrays, strict=True)]
+        columns, notes = distinct([_column(field, array, path) for field, array in zip(schema, arrays, strict=True)])
         meta = {key.decode(): value.decode() for key, value in (schema.metadata or {}).items() if key == b"sysid"}
         return RawTable(
             source=path,
             reader=kind.lower(),
             columns=tuple(columns),
             time=recognise_time(columns),
+            notes=tuple(notes),
             metadata=meta,
         )
 

@@ -22,7 +22,7 @@ from sysid.ingest.headers import Header, is_unit, parse_header, split_reference
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_zip, too_large
 from sysid.ingest.readers.reader import Reader, damaged
-from sysid.ingest.table import RawColumn, RawTable, RecordChoice, array_column, recognise_time
+from sysid.ingest.table import RawColumn, RawTable, RecordChoice, array_column, distinct, recognise_time
 
 _ZIP, _OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _BIFF = (b"\x09\x00", b"\x09\x02", b"\x09\x04", b"\x09\x08")
@@ -154,8 +154,8 @@ def _table(path: Path, sheet: str, cells: NDArray[Any]) -> RawTable:
     texts = (filled & ~numbers)[:, numbers[first]].any(axis=1)
     last = int(np.flatnonzero(filled[:, used].any(axis=1) & ~texts).max()) + 1
     below = int(filled[last:].any(axis=1).sum())
-    columns = tuple(
-        _column(header, cells[first:last, at], where=where) for header, at in zip(headers, used, strict=True)
+    columns, renamed = distinct(
+        [_column(header, cells[first:last, at], where=where) for header, at in zip(headers, used, strict=True)]
     )
     notes = tuple(
         f"{count} {'line' if count == 1 else 'lines'} {where_} the table passed over"
@@ -165,10 +165,10 @@ def _table(path: Path, sheet: str, cells: NDArray[Any]) -> RawTable:
     return RawTable(
         source=path,
         reader="excel",
-        columns=columns,
+        columns=tuple(columns),
         time=recognise_time(columns),
         lines=np.arange(first, last, dtype=np.int64) + 1,
-        notes=notes,
+        notes=(*notes, *renamed),
     )
 
 

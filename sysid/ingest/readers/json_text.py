@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
@@ -22,6 +23,7 @@ _MOST_BYTES = 2**30
 """Of Python objects, which JSON becomes before it is numbers."""
 _OPENING, _ITEM = 96, 40  # bytes that a list or a mapping takes, and an item in one
 _DEEPEST = 64
+_OPENS = re.compile(rb'(?:\xef\xbb\xbf)?\s*(?:\{\s*"|\[\s*(?:\{\s*"|\[\s*["\d\[-]))')
 _VALUES = {"values", "data", "samples", "value"}
 
 
@@ -44,6 +46,7 @@ READER = Reader(
     suffixes=(".json", ".jsonl", ".ndjson"),
     read=_read,
     options=frozenset({"group", "transpose"}),
+    is_mine=lambda head: _OPENS.match(head) is not None,
 )
 
 

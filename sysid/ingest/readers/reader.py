@@ -74,7 +74,8 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
         where=path,
         expected=f"a name that ends in {', '.join(suffix for reader in readers for suffix in reader.suffixes)}",
         got=path.suffix or "a name without an ending",
-        remedy="export the traces to one of these, or name the reader (reader: csv)",
+        remedy="export the traces to one of these"
+        + ("" if b"\0" in head else ", or, as it is text, name the reader (reader: csv)"),
     )
 
 

@@ -20,7 +20,7 @@ from sysid.ingest.options import FileOptions
 from sysid.ingest.readers.forms import understood
 from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, step_in
 from sysid.ingest.readers.records import Found, joined, records_of
-from sysid.ingest.table import RawTable, array_column, by_length, recognise_time
+from sysid.ingest.table import RawTable, array_column, by_length, distinct, recognise_time
 
 _DEEPEST = 40
 
@@ -63,6 +63,8 @@ def table_of(
     found = list(walk.columns(shown, (), outer))
     found, head = _without_common_prefix(found, separator) if short else (found, "")
     named = [walk.named(item) for item in found]
+    columns, renamed = distinct([item.column for item in named])
+    named = [replace(item, column=column) for item, column in zip(named, columns, strict=True)]
     # A saved record is taken by itself: whatever stands beside it may have another clock.
     inside = [item for item in named if item.whole] or named
     alike, others = by_length([item.column for item in inside])
@@ -81,7 +83,7 @@ def table_of(
         others=others,
         time=time,
         step=step,
-        notes=(*notes, *turned, *told),
+        notes=(*notes, *turned, *told, *renamed),
         metadata=metadata or {},
         settings=settings,
     )
