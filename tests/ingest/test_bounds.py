@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import tracemalloc
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -83,7 +82,6 @@ def test_what_unpacks_to_more_than_a_file_may_hold_is_refused(
     make(tmp_path / name)
     assert len(read_table(tmp_path / name)) > 1
     monkeypatch.setattr(bounds, "MOST_BYTES", 2**10)
-    monkeypatch.setattr("sysid.ingest.readers.matlab.MOST_BYTES", 2**10)
     monkeypatch.setattr(bounds, "MOST_TIMES", 0.01)
     with pytest.raises(ReaderError, match=r"(?s)far more than its size.*export it uncompressed or in several files"):
         read_table(tmp_path / name)
@@ -179,7 +177,3 @@ def test_packed_numbers_are_unpacked_and_those_that_stand_for_nothing_are_missin
     assert np.flatnonzero(~trace.usable_samples).tolist() == [7]
     kept = trace.usable_samples
     np.testing.assert_allclose(trace["y"][kept], Y[kept], atol=5e-4)
-
-
-def test_the_size_of_what_is_unpacked_is_counted_without_keeping_it(tmp_path: Path) -> None:
-    assert len(zlib.compress(b"\0" * MEGABYTE)) * 1100 > MEGABYTE  # as the reader of MATLAB files takes for granted

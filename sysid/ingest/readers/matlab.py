@@ -7,25 +7,24 @@ from __future__ import annotations
 
 import struct
 import warnings
-import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers import hdf5
-from sysid.ingest.readers.bounds import MOST_BYTES, allowed, check_claim, too_large
+from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.leaves import Leaf, number_of, refused
+from sysid.ingest.readers.mat5_check import check_mat5
 from sysid.ingest.readers.modelica import is_result, result_tree
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_COMPRESSED = 15
 _OBJECT = 0xDD000000
 _NOT_NUMBERS = {"cell", "struct", "char", "function_handle", "opaque", "object"}
 
@@ -87,9 +86,9 @@ def _load(path: Path) -> dict[str, Any]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it cannot read comes back as an object, which is refused by name
+            check_mat5(path)
             there = whosmat(path)
             check_claim(path, ((name, shape) for name, (shape, kind) in there.items() if kind not in _NOT_NUMBERS))
-            _check_compressed(path)
             try:
                 loaded = load_from_mat(path, add_table_attrs=True)
             except (NotImplementedError, ValueError, KeyError, TypeError, AttributeError):
@@ -123,36 +122,6 @@ def _one_by_one(path: Path, there: Mapping[str, Any], load: Callable[..., dict[s
     if all(isinstance(value, Leaf) for name, value in found.items() if not name.startswith("__")):
         raise next(value.problem for value in found.values() if isinstance(value, Leaf) and value.problem)
     return found
-
-
-def _check_compressed(path: Path) -> None:
-    """Refuse a version 5 file whose variables unpack to more than a file may hold."""
-    limit = allowed(path)
-    with path.open("rb") as file:
-        head = file.read(128)
-        if not head.startswith(b"MATLAB 5.0") or 1100 * path.stat().st_size < MOST_BYTES:
-            return  # deflate packs at most some 1,030 times
-        order = "<" if head[126:128] == b"IM" else ">"
-        total = 0
-        for size in _unpacked_sizes(file, order):
-            total += size
-            if total > limit:
-                raise too_large(path, "more than that, unpacked", limit)
-
-
-def _unpacked_sizes(file: BinaryIO, order: str) -> Iterator[int]:
-    """Sizes of the pieces of the compressed elements of a version 5 file, as they are unpacked."""
-    while len(tag := file.read(8)) == 8:
-        kind, length = struct.unpack(f"{order}II", tag)
-        if kind != _COMPRESSED:
-            file.seek(length, 1)
-            continue
-        unpack, left = zlib.decompressobj(), length
-        while left > 0 and (raw := file.read(min(left, 2**16))):
-            left -= len(raw)
-            while raw:
-                yield len(unpack.decompress(raw, 2**22))
-                raw = unpack.unconsumed_tail
 
 
 def _node(value: Any, name: str, path: Path) -> Any:
