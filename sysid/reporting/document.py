@@ -71,7 +71,10 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     states = state_section(results)
     sections += ([] if states is None else [states]) + judgement_sections(folder)
     sections += [_run_times(results, published), _tried(results)]
-    exports = export_table(results)
+    exports = export_table(
+        [(fit.name, export) for fit in results.fits for export in fit.exports],
+        next((fit.unit for fit in results.fits if fit.exports), ""),
+    )
     if exports is not None:
         timed = exported_run_times(results)
         parts = (exports,) if timed is None else (exports, timed)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sysid.reporting.numbers import number, seconds, times
-from sysid.reporting.results import CaseRecord, FiguresRecord, FitRecord, PublishedRecord, Results
+from sysid.reporting.results import CaseRecord, ExportRecord, FiguresRecord, FitRecord, PublishedRecord, Results
 from sysid.traces import Role
 from sysid.validation.metrics import MERITS, Merit
 
@@ -184,14 +184,8 @@ def accuracy_table(fits: Sequence[FitRecord], kind: str, best: str | None) -> Ta
         The table.
     """
     columns = case_columns(fits)
-    rows = []
-    for fit in fits:
-        cells = [_name_cell(fit, best)]
-        for name in columns:
-            case = fit.cases.get(name)
-            cells.append(Cell(text="not run") if case is None else _mse_cell(case, kind))
-        cells.append(figure_cell(mean_mse(fit, kind), missing=_missing_mean(fit, kind)))
-        rows.append(tuple(cells))
+    means = {fit.name: figure_cell(mean_mse(fit, kind), missing=_missing_mean(fit, kind)) for fit in fits}
+    rows = [(*cells, means[fit.name]) for fit, cells in _by_case(fits, best, lambda case: _mse_cell(case, kind))]
     published = _published_row(fits, kind, list(columns), lambda figure: figure_cell(figure.value, mark="published"))
     rows.extend(published)
     words = {"free_run": "Free run", "one_step": "One step ahead"}[kind]
@@ -223,21 +217,9 @@ def run_time_table(fits: Sequence[FitRecord], best: str | None) -> Table:
         The table.
     """
     columns = case_columns(fits)
-    rows = []
-    for fit in fits:
-        cells = [_name_cell(fit, best)]
-        for name in columns:
-            case = fit.cases.get(name)
-            if case is None:
-                cells.append(Cell(text="not run"))
-                continue
-            faster = times(real_time_factor(case))
-            cells.append(figure_cell(1e3 * case.run_time_s, missing="not measured", below=faster))
-        rows.append(tuple(cells))
-    rows.extend(
-        _published_row(
-            fits, "run_time", list(columns), lambda figure: figure_cell(1e3 * figure.value, mark="published")
-        )
+    rows = [cells for _, cells in _by_case(fits, best, _run_time_cell)]
+    rows += _published_row(
+        fits, "run_time", list(columns), lambda figure: figure_cell(1e3 * figure.value, mark="published")
     )
     return Table(
         caption=f"Run time of the free run [ms] by case. {fits[0].mapping}.",
@@ -245,6 +227,27 @@ def run_time_table(fits: Sequence[FitRecord], best: str | None) -> Table:
         rows=tuple(rows),
         note="Small figures: how many times faster than real time.",
     )
+
+
+def _by_case(
+    fits: Sequence[FitRecord], best: str | None, cell: Callable[[CaseRecord], Cell]
+) -> list[tuple[FitRecord, tuple[Cell, ...]]]:
+    """Each fit with its name and a cell of every case that one of them has."""
+    columns = case_columns(fits)
+    return [
+        (
+            fit,
+            (
+                _name_cell(fit, best),
+                *(cell(fit.cases[name]) if name in fit.cases else Cell(text="not run") for name in columns),
+            ),
+        )
+        for fit in fits
+    ]
+
+
+def _run_time_cell(case: CaseRecord) -> Cell:
+    return figure_cell(1e3 * case.run_time_s, missing="not measured", below=times(real_time_factor(case)))
 
 
 def real_time_factor(case: CaseRecord) -> float:
@@ -321,34 +324,39 @@ def ranking_table(results: Results) -> Table:
     )
 
 
-def export_table(results: Results) -> Table | None:
-    """The exported files and how they compare with their models; ``None`` without any."""
-    rows = [
-        (
-            Cell(text=export.format, header=True),
-            Cell(text=fit.name),
-            Cell(text=export.file),
-            figure_cell(export.largest_difference, missing="not finite"),
-            figure_cell(export.tolerance),
-            Cell(text="within tolerance" if export.largest_difference <= export.tolerance else "OVER TOLERANCE"),
-        )
-        for fit in results.fits
-        for export in fit.exports
-    ]
-    if not rows:
+def export_table(exports: Sequence[tuple[str, ExportRecord]], unit: str) -> Table | None:
+    """Exported files and how they compare with their models.
+
+    Args:
+        exports: Each with the name of its model.
+        unit: Of the differences.
+
+    Returns:
+        The table; ``None`` without any.
+    """
+    if not exports:
         return None
-    unit = next(fit.unit for fit in results.fits if fit.exports)
     return Table(
         caption="Exported files, each run against its model on every case.",
         head=(
             ("format", ""),
-            ("fit", ""),
+            ("model", ""),
             ("file", ""),
             ("largest difference", unit),
             ("tolerance", unit),
             ("verdict", ""),
         ),
-        rows=tuple(rows),
+        rows=tuple(
+            (
+                Cell(text=export.format, header=True),
+                Cell(text=name),
+                Cell(text=export.file),
+                figure_cell(export.largest_difference, missing="not finite"),
+                figure_cell(export.tolerance),
+                Cell(text="within tolerance" if export.largest_difference <= export.tolerance else "OVER TOLERANCE"),
+            )
+            for name, export in exports
+        ),
     )
 
 

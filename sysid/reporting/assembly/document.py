@@ -23,14 +23,13 @@ from sysid.reporting.assembly.tables import (
     position_table,
     stage_table,
     time_table,
-    whole_export_table,
 )
 from sysid.reporting.charts import Chart, chart_pictures
 from sysid.reporting.comparing.published import PublishedTable, read_published
 from sysid.reporting.numbers import number, quantity, seconds
 from sysid.reporting.parts import Document, Part, Section, Verdict, data_set_section
 from sysid.reporting.signals import MONTE_CARLO_FILE, read_signals
-from sysid.reporting.tables import Table, plain_table
+from sysid.reporting.tables import Table, export_table, plain_table
 
 ANCHOR = "the-assembly"
 
@@ -67,6 +66,9 @@ def _tables(results: AssemblyResults, published: PublishedTable | None) -> list[
     """The stages first, then how they came about, and what else the whole was put to."""
     passed = None if results.limit_check is None else limit_check_table(results.limit_check)
     positions = results.interpolation
+    exported = export_table(
+        [(results.whole.stage, one) for one in results.exports], next((one.unit for one in results.exports), "")
+    )
     return [
         *(stage_table(results, output, published) for output in results.outputs),
         *(active_learning_table(one, results.whole.stage) for one in results.active_learning),
@@ -82,7 +84,7 @@ def _tables(results: AssemblyResults, published: PublishedTable | None) -> list[
         time_table(results),
         *([limit_table(results.limits)] if results.limits else []),
         *([] if passed is None else [passed]),
-        *([whole_export_table(results.exports)] if results.exports else []),
+        *([] if exported is None else [exported]),
     ]
 
 

@@ -16,7 +16,6 @@ from sysid.reporting.assembly.results import (
     SequenceErrors,
 )
 from sysid.reporting.comparing.published import PublishedTable
-from sysid.reporting.results import ExportRecord
 from sysid.reporting.tables import Table, plain_table
 
 Value = int | float | str | None
@@ -254,21 +253,3 @@ def position_table(found: PositionErrors, run_time_s: dict[str, float], output: 
 
 def _mean(values: Sequence[float]) -> float | None:
     return sum(values) / len(values) if values else None
-
-
-def whole_export_table(exports: Sequence[ExportRecord]) -> Table:
-    """The exported files, and how each compares with the whole.
-
-    Args:
-        exports: At least one.
-
-    Returns:
-        The table.
-    """
-    units = ", ".join(dict.fromkeys(one.unit for one in exports))
-    folder = exports[0].file.partition("/")[0]
-    return plain_table(
-        f"Exported to {folder}/: each file against the whole, on every case and on random input",
-        [("", ""), ("Largest difference", units), ("Tolerance", units)],
-        [[f"{one.file.partition('/')[2]} ({one.format})", one.largest_difference, one.tolerance] for one in exports],
-    )

@@ -15,9 +15,8 @@ from sysid.reporting.assembly.tables import (
     position_table,
     stage_table,
     time_table,
-    whole_export_table,
 )
-from sysid.reporting.tables import Table
+from sysid.reporting.tables import Table, export_table
 
 
 def values(table: Table | None) -> list[list[Any]]:
@@ -95,4 +94,5 @@ def test_positions_that_were_all_fitted_leave_nothing_unseen(results: AssemblyRe
 
 
 def test_exports_are_named_by_their_file(results: AssemblyResults) -> None:
-    assert values(whole_export_table(results.exports)) == [["model.c (c)", 1e-9, 1e-6]]
+    found = values(export_table([("whole", one) for one in results.exports], "cm"))
+    assert found == [["c", "whole", "bundle/model.c", 1e-9, 1e-6, "within tolerance"]]
