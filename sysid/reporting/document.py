@@ -15,6 +15,7 @@ from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.judging.document import judgement_sections
 from sysid.reporting.moments import Moment, worst_moments
 from sysid.reporting.numbers import number
+from sysid.reporting.overview import overview_section
 from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.runtime_table import exported_run_times
@@ -59,7 +60,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     if best is not None:
         judged = scored_cases(best) or best.cases
         moments = worst_moments({name: signals[best.slug][name] for name in judged}, 5)
-    sections = [_accuracy(results, published), *sweep_sections(folder, published)]
+    sections = [overview_section(results, signals), _accuracy(results, published), *sweep_sections(folder, published)]
     columns = _columns(results)
     if best is not None:
         sections.append(_best(best, signals[best.slug], moments, columns))
@@ -92,7 +93,8 @@ def _accuracy(results: Results, published: PublishedTable | None) -> Section:
     for index, (mapping, fits) in enumerate(results.mappings().items()):
         parts.append(accuracy_table(fits, "free_run", best))
         parts.append(_mse_picture(mapping, fits, f"mse-{index}"))
-        parts.append(accuracy_table(fits, "one_step", best))
+        ahead = [fit for fit in fits if fit.predicts]
+        parts += [accuracy_table(ahead, "one_step", best)] if ahead else []
     if published is not None:
         parts.append(f"Published figures: {published.reference}; {published.part}. {published.comparability}")
     return Section(anchor="accuracy", title="Accuracy by case", parts=tuple(parts))
@@ -118,7 +120,7 @@ def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
 
 
 def _best(fit: FitRecord, signals: Dict[str, CaseSignals], moments: list[Moment], columns: int) -> Section:
-    parts: list[Part] = [quality_table(fit, "free_run"), quality_table(fit, "one_step")]
+    parts: list[Part] = [*_quality(fit)]
     parts += _case_pictures(fit, signals, columns)
     output = fit.mapping.rpartition("->")[2].strip()
     if moments:
@@ -131,6 +133,12 @@ def _best(fit: FitRecord, signals: Dict[str, CaseSignals], moments: list[Moment]
     caption = "Free run against target: a perfect model lies on the line."
     parts.append(picture(drawing, f"{fit.name}: target-output regression", caption, "regression"))
     return Section(anchor="best", title=f"The chosen model: {fit.name}", parts=tuple(parts))
+
+
+def _quality(fit: FitRecord) -> list[Table]:
+    """All figures; one step ahead only of a model that has such a run."""
+    ahead = [quality_table(fit, "one_step")] if fit.predicts else []
+    return [quality_table(fit, "free_run"), *ahead]
 
 
 def _columns(results: Results) -> int:
@@ -244,8 +252,7 @@ def _others(results: Results, signals: Dict[str, Dict[str, CaseSignals]], column
             anchor=f"fit-{identifier(fit.slug)}",
             title=f"Every case: {fit.name}",
             parts=(
-                quality_table(fit, "free_run"),
-                quality_table(fit, "one_step"),
+                *_quality(fit),
                 *_case_pictures(fit, signals[fit.slug], columns),
             ),
         )

@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select
 from markupsafe import Markup
 
 import sysid
-from sysid.reporting.parts import Document, Picture
+from sysid.reporting.parts import Document, Gallery, Picture
 from sysid.reporting.tables import Table, facts
 
 
@@ -50,6 +50,7 @@ def page_template(name: str) -> Template:
         lstrip_blocks=True,
     )
     environment.filters["arrow"] = lambda text: str(text).replace("->", "→")
+    environment.tests["gallery"] = lambda part: isinstance(part, Gallery)
     environment.tests["picture"] = lambda part: isinstance(part, Picture)
     environment.tests["table"] = lambda part: isinstance(part, Table)
     # Our own drawings; every text inside them was escaped where they were made.

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sysid.errors import ConfigError
-from sysid.reporting.parts import Part, Picture, Section
+from sysid.reporting.parts import Gallery, Part, Picture, Section
 from sysid.reporting.tables import Cell, Table, facts
 
 PAGE: Final = "README.md"
@@ -143,6 +143,8 @@ def arrow(text: str) -> str:
 def _part(part: Part, drawings: Drawings) -> list[str]:
     if isinstance(part, Table):
         return [] if part.caption.startswith("Notes of the fits") else [*table_lines(part), ""]
+    if isinstance(part, Gallery):
+        return [line for drawing in part.pictures for line in drawings.draw(drawing)]
     return drawings.draw(part) if isinstance(part, Picture) else [arrow(part), ""]
 
 

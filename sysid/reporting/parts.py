@@ -25,7 +25,26 @@ class Picture:
     caption: str
 
 
-Part = Table | Picture | str
+@dataclass(frozen=True, kw_only=True)
+class Gallery:
+    """Pictures of which a reader sees one at a time, and in it the models that are chosen; without any script.
+
+    Args:
+        name: Unique within the page; letters, digits and dashes.
+        title: What is shown.
+        models: Names of the models; the lines of the one at position ``n`` have the class ``model-n``.
+        cases: What each picture is of.
+        pictures: One a case.
+    """
+
+    name: str
+    title: str
+    models: tuple[str, ...]
+    cases: tuple[str, ...]
+    pictures: tuple[Picture, ...]
+
+
+Part = Table | Picture | Gallery | str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +54,7 @@ class Section:
     Args:
         anchor: Its id in the page.
         title: Its heading.
-        parts: Tables, pictures and paragraphs, in order.
+        parts: Tables, pictures, galleries and paragraphs, in order.
     """
 
     anchor: str

@@ -21,6 +21,7 @@ from sysid.reporting.markdown import (
     refuse_others,
     section_lines,
 )
+from sysid.reporting.overview import overview_cases
 from sysid.reporting.parts import Document
 from sysid.reporting.records import RunResults
 from sysid.reporting.results import Results
@@ -140,11 +141,12 @@ def _provenance(document: Document, command: str) -> list[str]:
 
 def _belongs(drawing: str, results: RunResults) -> bool:
     """Of the pictures of single cases of fits only that of the case where the chosen fit is weakest."""
-    if not drawing.startswith("case-") or not isinstance(results, Results):
+    if not isinstance(results, Results) or not drawing.startswith(("case-", "overview-")):
         return True
     best = results.best_fit
     if best is None:
-        return False
+        return drawing.startswith("overview-") and drawing.endswith("-0")
     judged = scored_cases(best) or best.cases
     worst = max(judged, key=lambda case: judged[case].free_run.mse)
-    return drawing.endswith(f"-{list(best.cases).index(worst)}")
+    cases = overview_cases(results.mappings()[best.mapping]) if drawing.startswith("overview-") else list(best.cases)
+    return drawing.endswith(f"-{cases.index(worst)}")

@@ -187,6 +187,12 @@ class FitRecord(Record):
         return Status[self.status].value if self.status in Status.__members__ else self.status
 
     @property
+    def predicts(self) -> bool:
+        """Whether one step ahead it does anything else than in free run: a model without one of the noise does not."""
+        pairs = [(case.free_run.mse, case.one_step.mse) for case in self.cases.values()]
+        return any(free != ahead and not (math.isnan(free) and math.isnan(ahead)) for free, ahead in pairs)
+
+    @property
     def unit(self) -> str:
         """The output's unit."""
         return next((case.free_run.unit for case in self.cases.values()), "")

@@ -174,6 +174,34 @@ def test_every_figure_of_the_chosen_fit_is_the_one_in_results_json(page: Page, r
         assert [cell["value"] for cell in row[2:]] == [getattr(case, merit.key) for merit in MERITS]
 
 
+def test_the_first_picture_has_every_model_over_the_measured_output_case_by_case(page: Page, run_folder: Path) -> None:
+    text = (run_folder / "report" / "index.html").read_text(encoding="utf-8")
+    section = text[text.index('<section id="overview"') : text.index('<section id="accuracy"')]
+    results = read_results(run_folder)
+    assert section.count("<svg") == len(results.fits[0].cases)
+    for index, fit in enumerate(results.fits):
+        assert f'id="overview-0-model-{index}" checked> ' in section
+        assert section.count(f'class="model-{index}"') == len(fit.cases)
+        assert f"#overview-0:has(#overview-0-model-{index}:not(:checked)) .model-{index}" in text
+    radios = re.findall(r'id="overview-0-case-\d+"( checked)?> (\w+)', section)
+    assert radios[0] == (" checked", "VAL01"), "what nothing was fitted to comes first"
+    assert "<script" not in text
+
+
+def test_a_model_without_a_run_one_step_ahead_claims_no_figures_of_it(
+    make_run: Callable[..., Path], tmp_path: Path
+) -> None:
+    def output_error(document: dict[str, Any]) -> None:
+        for case in document["fits"][0]["cases"].values():
+            case["one_step"] = case["free_run"]
+
+    folder = make_run(tmp_path / "run", samples=100, names=("ARX", "NARX free run"), edit=output_error)
+    assert [fit.predicts for fit in read_results(folder).fits] == [False, True]
+    tables = Page(write_report(folder).read_text(encoding="utf-8"))
+    assert len(tables.table("One step ahead")) == 1 + 1
+    assert not [table for table in tables.tables if table["caption"].startswith("ARX, one step ahead")]
+
+
 def test_run_times_are_those_of_results_json_in_milliseconds(page: Page, run_folder: Path) -> None:
     rows = page.table("Run time of the free run [ms]")
     for fit, row in zip(read_results(run_folder).fits, rows[1:], strict=True):

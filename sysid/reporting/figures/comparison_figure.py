@@ -40,35 +40,41 @@ class Overlay:
     fits: dict[str, float] = field(default_factory=dict)
 
 
-def comparison_figure(panels: Sequence[Overlay]) -> Figure:
+def comparison_figure(
+    panels: Sequence[Overlay], *, columns: int = COLUMNS, numbers: Sequence[int] | None = None
+) -> Figure:
     """All models over the measured output.
 
     Args:
         panels: One for each output and case; none gives an empty figure.
+        columns: How finely lines are drawn: up to four points in each of so many columns.
+        numbers: Which number each model has, for its colour and for a page that hides some; their order by default.
 
     Returns:
         The figure, not known to pyplot; nothing outside it was touched.
     """
     with styled():
-        columns = 1 if len(panels) < 4 else 2
-        rows = max(1, -(-len(panels) // columns))
-        figure = new_figure(7.6, 2.6 * rows)
-        grid = figure.subplots(rows, columns, squeeze=False)
+        across = 1 if len(panels) < 4 else 2
+        rows = max(1, -(-len(panels) // across))
+        figure = new_figure(7.6, 2.6 * rows if len(panels) > 1 else 3.6)
+        grid = figure.subplots(rows, across, squeeze=False)
         for axes, panel in zip(grid.flat, panels, strict=False):
-            _draw(axes, panel)
+            _draw(axes, panel, columns, numbers or range(len(panel.runs)))
         for axes in list(grid.flat)[len(panels) :]:
             axes.set_visible(False)
         return figure
 
 
-def _draw(axes: Axes, panel: Overlay) -> None:
-    axes.plot(*thin(panel.time, panel.target, COLUMNS), color=TARGET, linewidth=1.3, label="measured")
-    for number, (label, run) in enumerate(panel.runs.items()):
+def _draw(axes: Axes, panel: Overlay, columns: int, numbers: Sequence[int]) -> None:
+    axes.plot(*thin(panel.time, panel.target, columns), color=TARGET, linewidth=1.3, label="measured")
+    for number, (label, run) in zip(numbers, panel.runs.items(), strict=True):
         style = {**series_style(number), "marker": ""}
         fit = panel.fits[label]
         text = label if np.isnan(fit) else f"{label}: {fit:.1f} %"
         finite = np.where(np.isfinite(run), run, np.nan)
-        axes.plot(*thin(panel.time[-len(run) :], finite, COLUMNS), **style, linewidth=1.2, label=text)
+        axes.plot(
+            *thin(panel.time[-len(run) :], finite, columns), **style, linewidth=1.2, label=text, gid=f"model-{number}"
+        )
     low, high = float(panel.target.min()), float(panel.target.max())
     span = max(high - low, 1e-6 * max(abs(low), abs(high)), 1e-12)
     # A free run that runs away must not squeeze the measurement into a line.

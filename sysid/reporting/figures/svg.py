@@ -19,6 +19,8 @@ _PAIRS: Final = {"M": 1, "L": 1, "Q": 2, "C": 3}
 FAR: Final = 1e6
 """Points; nothing farther off is drawn, and an outline that runs away may come with 300 digits."""
 _SHARED: Final = ("style", "clip-path")
+MODEL: Final = "model-"
+"""What is called so is a line that a page may hide: its name becomes a class."""
 
 
 def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
@@ -93,6 +95,8 @@ def _short_ids(root: ET.Element, name: str) -> None:
                 used.setdefault(found.group(1), f"{name}-{len(used)}")
     for element in root.iter():
         own = element.attrib.pop("id", None)
+        if own is not None and own.startswith(MODEL):
+            element.set("class", own)
         if own in used:
             element.set("id", used[own])
         for key in ("href", "clip-path"):
