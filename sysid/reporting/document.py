@@ -93,8 +93,7 @@ def _accuracy(results: Results, published: PublishedTable | None) -> Section:
     for index, (mapping, fits) in enumerate(results.mappings().items()):
         parts.append(accuracy_table(fits, "free_run", best))
         parts.append(_mse_picture(mapping, fits, f"mse-{index}"))
-        ahead = [fit for fit in fits if fit.predicts]
-        parts += [accuracy_table(ahead, "one_step", best)] if ahead else []
+        parts += [accuracy_table(fits, "one_step", best)] if any(fit.predicts for fit in fits) else []
     if published is not None:
         parts.append(f"Published figures: {published.reference}; {published.part}. {published.comparability}")
     return Section(anchor="accuracy", title="Accuracy by case", parts=tuple(parts))

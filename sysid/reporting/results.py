@@ -188,9 +188,8 @@ class FitRecord(Record):
 
     @property
     def predicts(self) -> bool:
-        """Whether one step ahead it does anything else than in free run: a model without one of the noise does not."""
-        pairs = [(case.free_run.mse, case.one_step.mse) for case in self.cases.values()]
-        return any(free != ahead and not (math.isnan(free) and math.isnan(ahead)) for free, ahead in pairs)
+        """Whether the model has a prediction from measured output."""
+        return any(case.predicts for case in self.cases.values())
 
     @property
     def unit(self) -> str:
