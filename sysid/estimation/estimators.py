@@ -174,7 +174,13 @@ class Estimator:
         checked = NoCheck() if stability is None else self.stability.of(stability, mapping, traces)
         chosen = () if self.training is None else (options,)
         known = {name: value for name, value in given.items() if name in self.knows}
-        return checked.fitted(self.fit, traces, mapping, structure, *chosen, **known)
+
+        def noted(*args: Any, **named: Any) -> FitResult:
+            """The fit with what its records say of how they begin, before what its check says."""
+            found = self.fit(*args, **named)
+            return replace(found, notes=(*found.notes, *equilibrium_notes(found.model, traces, named["start"])))
+
+        return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
 
     def takes_none(self, training: object) -> ConfigError:
         """The refusal of options where there is nothing to choose.
@@ -327,7 +333,7 @@ def fit(
             got=str(initial.model.mapping),
             remedy="start from a fit of this mapping, its inputs in this order, or leave initial out",
         )
-    found = row.run(
+    return row.run(
         traces,
         mapping,
         structure,
@@ -341,8 +347,6 @@ def fit(
         on_checkpoint=on_checkpoint,
         on_progress=on_progress,
     )
-    notes = equilibrium_notes(found.model, traces, start or Start())
-    return replace(found, notes=(*found.notes, *notes)) if notes else found
 
 
 def with_stability(fitted: FitResult, traces: Sequence[Trace], stability: StabilityOptions | None) -> FitResult:
