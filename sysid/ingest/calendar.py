@@ -7,7 +7,7 @@ which of two numbers is the day, whether midnight passes, which of two like hour
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
@@ -44,6 +44,8 @@ _CLOCK = re.compile(
     r"(?:[.,:](?P<f>[0-9]+))?\s?(?P<half>[AaPp]\.?[Mm]\.?)?\s?(?P<zone>Z|UTC|GMT|[+-][0-9]{2}(?::?[0-9]{2})?)?"
 )
 _LONGEST = 40
+_FEW = 32
+_ZERO = 48
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,6 +110,60 @@ def _with_clock(code: int, clock: re.Match[str]) -> _Stamp | None:
     return _Stamp(date=code, micros=micros, offset=_minutes(clock["zone"]))
 
 
+def _all_alike(cells: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[np.int64], int] | None:
+    """Cells that differ in nothing but the digits of date and time, taken apart as one; ``None`` if they do not."""
+    text = "".join(cells)
+    width = len(cells[0]) if cells else 0
+    if len(cells) < _FEW or len(text) != width * len(cells) or not text.isascii() or {*map(len, cells)} != {width}:
+        return None
+    letters = np.frombuffer(text.encode(), dtype=np.uint8).reshape(len(cells), width)
+    found = _DATE.match(cells[0])
+    start = 0 if found is None else found.end()
+    clock = _CLOCK.fullmatch(cells[0], start)
+    if clock is None or clock["h"] is None or clock["s"] is None or (found and _date_code(found) is None):
+        return None
+    spans = [match.span(name) for match, names in ((found, "abc"), (clock, "hmsf")) if match for name in names]
+    spans += [found.span(name) for name in ("day", "year", "packed")] if found else []
+    varies = np.zeros(width, dtype=np.bool_)
+    for low, high in spans:
+        varies[max(low, 0) : max(high, 0)] = True
+    digits = letters[:, varies]
+    if (letters[:, ~varies] != letters[0, ~varies]).any() or (digits < _ZERO).any() or (digits > _ZERO + 9).any():
+        return None
+
+    def number(match: re.Match[str], name: str, most: int = 9) -> NDArray[np.int64]:
+        low, high = match.span(name)
+        high = min(high, low + most)
+        powers = 10 ** np.arange(high - low - 1, -1, -1, dtype=np.int64)
+        return (letters[:, low:high].astype(np.int64) - _ZERO) @ powers
+
+    hours, minutes, seconds = (number(clock, name) for name in "hms")
+    if clock["half"]:
+        hours = hours % 12 + (12 if clock["half"][0] in "pP" else 0)
+    if (minutes > 59).any() or (seconds > 60).any() or (found is not None and (hours > 24).any()):
+        return None
+    micros = ((hours * 60 + minutes) * 60 + seconds) * 1_000_000
+    if clock["f"]:
+        micros += number(clock, "f", 6) * 10 ** max(6 - len(clock["f"]), 0)
+    return _codes(found, number, len(cells)), micros, _minutes(clock["zone"])
+
+
+def _codes(
+    found: re.Match[str] | None, number: Callable[[re.Match[str], str], NDArray[np.int64]], count: int
+) -> NDArray[np.int64]:
+    """The dates of cells that differ in nothing but digits."""
+    if found is None:
+        return np.zeros(count, dtype=np.int64)
+    if found["packed"]:
+        packed = number(found, "packed")
+        return packed // 10_000 * 100_000_000 + packed // 100 % 100 * 10_000 + packed % 100
+    if found["month"]:
+        years = number(found, "year")
+        years += np.where(years > 99, 0, np.where(years < 70, 2000, 1900))
+        return years * 100_000_000 + _MONTHS[found["month"].casefold()] * 10_000 + number(found, "day")
+    return number(found, "a") * 100_000_000 + number(found, "b") * 10_000 + number(found, "c")
+
+
 def _minutes(zone: str | None) -> int:
     if not zone:
         return _ZONELESS
@@ -150,6 +206,14 @@ class Calendar:
         Raises:
             ReaderError: If a cell is not a date and time of the pattern.
         """
+        alike = _all_alike(cells) if self.pattern is None else None
+        if alike is not None:
+            dates, micros, offset = alike
+            self._dates.append(dates)
+            self._micros.append(micros)
+            self._offsets.append(np.full(len(cells), offset, dtype=np.int64))
+            self._clocks += len(cells)
+            return
         stamps = []
         for cell, line in zip(cells, lines, strict=True):
             stamp = self._stamp(cell.strip())

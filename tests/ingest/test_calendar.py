@@ -120,3 +120,28 @@ def test_an_hour_that_does_not_exist_is_refused_with_what_helps() -> None:
 def test_an_unknown_zone_is_refused() -> None:
     with pytest.raises(ReaderError, match=r"(?s)no time zone Berlin.*Europe/Berlin"):
         seconds("2024-03-31 01:30", zone="Berlin")
+
+
+FORMS = [
+    "%Y-%m-%d %H:%M:%S.%f",
+    "%Y-%m-%dT%H:%M:%SZ",
+    "%d.%m.%Y %H:%M:%S",
+    "%d %b %Y %H:%M:%S",
+    "%Y%m%d %H:%M:%S",
+    "%H:%M:%S,%f",
+    "%Y-%m-%d %H:%M:%S+02:00",
+]
+
+
+@given(
+    st.sampled_from(FORMS),
+    st.datetimes(datetime(2001, 1, 1), datetime(2030, 1, 1)),
+    st.sampled_from([0.25, 1.0, 60.0, 3600.0, 86400.0]),
+)
+def test_many_cells_at_once_are_what_each_of_them_is(form: str, start: datetime, step: float) -> None:
+    cells = [(start + timedelta(seconds=step * k)).strftime(form) for k in range(60)]
+    together = seconds(*cells)
+    one_by_one = Calendar(where="a")
+    for row, cell in enumerate(cells):
+        one_by_one.add([cell], np.array([row]))
+    np.testing.assert_array_equal(together, one_by_one.finish()[0])
