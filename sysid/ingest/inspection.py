@@ -84,6 +84,7 @@ class FileFinding:
         sample_time: Seconds between samples as proposed.
         samples: How many rows the file has.
         unstamped: How many of them have no time stamp.
+        distinct: How many different time stamps there are; rows without stamps are all different.
         needed: The repairs that the file needs, with the gentlest choice of each.
         files: The reader options that the file was read with, where they are not recognised by itself.
         guessed: The reader options among them that are guesses.
@@ -101,6 +102,7 @@ class FileFinding:
     sample_time: float
     samples: int
     unstamped: int
+    distinct: int
     needed: RepairOptions
     files: FileOptions
     table: RawTable = field(repr=False)
@@ -225,12 +227,17 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         sample_time=step,
         samples=len(table),
         unstamped=unstamped,
+        distinct=len(table) if timing is None else _distinct(known, timing),
         needed=RepairOptions.model_validate(needed),
         files=files,
         table=table,
         guessed=attempt.guessed,
         notes=table.notes,
     )
+
+
+def _distinct(known: NDArray[np.float64], timing: Timing) -> int:
+    return len(known) if timing.in_order else len(np.unique(known))
 
 
 def _other(column: RawColumn, usual: int) -> str:
@@ -342,7 +349,8 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
         return TimeOptions(column=column.name, unit=unit), by_rising and f"guessed: {by_rising}"
     if clock is not None:
         return TimeOptions(column=column.name, unit=clock.unit), f"guessed: {name} counts {clock.told}, by its size"
-    steps = np.diff(column.values[:100_000])
+    with np.errstate(invalid="ignore"):
+        steps = np.diff(column.values[:100_000])
     step = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
     # Few records are sampled slower than every 5 s, and few clocks count finer than they sample.
     guess = "s" if step < 5.0 else "ms" if step < 5e3 else "us"
@@ -370,7 +378,8 @@ def _finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _rising(columns: Sequence[RawColumn]) -> str | None:
     """A column that rises like a clock: nearly always, and by much the same step."""
     for column in columns:
-        steps = np.diff(column.values)
+        with np.errstate(invalid="ignore"):
+            steps = np.diff(column.values)
         if column.problem is not None or not len(steps) or np.mean(steps > 0.0) < _RISING_SHARE:
             continue
         usual = np.median(steps)

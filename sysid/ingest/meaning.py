@@ -66,8 +66,8 @@ def _with_clock(table: RawTable, files: FileOptions) -> RawTable:
     if clock is None:
         return table
     columns = tuple(replace(c, unit=clock.unit) if c is column else c for c in table.columns)
-    settings = {**table.settings, "clock": f"{column.name} counts {clock.told}"}
-    return replace(table, columns=columns, settings=settings)
+    told = f"{column.name} counts {clock.told}, told by its size"
+    return replace(table, columns=columns, settings={**table.settings, "clock": told}, notes=(*table.notes, told))
 
 
 def _wide(table: RawTable, long: LongOptions) -> RawTable:

@@ -123,8 +123,8 @@ def _grid(finding: FileFinding) -> list[str]:
     pairs: dict[str, object] = {}
     if finding.needed.jitter is not None:
         pairs["method"] = "linear"
-    if finding.samples < GridOptions().fewest_samples:
-        pairs["fewest_samples"] = max(finding.samples, 2)
+    if finding.distinct < GridOptions().fewest_samples:
+        pairs["fewest_samples"] = max(finding.distinct, 2)
     return [f"  grid: {_mapping(pairs)}"] if pairs else []
 
 

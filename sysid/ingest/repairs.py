@@ -114,8 +114,8 @@ def backward(record: Record, repairs: RepairOptions) -> Record:
             where=record.where(first),
             expected=f"a time after {record.stamps[first - 1]:g} s",
             got=f"{record.stamps[first]:g} s",
-            remedy="split the file where a new recording starts, or ask for "
-            "repairs: {backward: sort} or {backward: drop}",
+            remedy=_zone(record)
+            or "split the file where a new recording starts, or ask for repairs: {backward: sort} or {backward: drop}",
         )
     told = f"{len(bad)} backward time stamps, first at {record.at(first)}"
     if repairs.backward == "sort":
@@ -123,6 +123,14 @@ def backward(record: Record, repairs: RepairOptions) -> Record:
     keep = np.ones(len(record.stamps), dtype=np.bool_)
     keep[bad] = False
     return record.keep(keep, f"dropped: {told}")
+
+
+def _zone(record: Record) -> str | None:
+    """What to do where a clock on the wall explains the stamps."""
+    zone = record.table.settings.get("zone")
+    if not zone:
+        return None
+    return f"an hour comes twice, as on a clock on the wall: write time: {{column: {record.table.time}, zone: {zone}}}"
 
 
 def duplicates(record: Record, repairs: RepairOptions) -> Record:
@@ -148,7 +156,7 @@ def duplicates(record: Record, repairs: RepairOptions) -> Record:
             where=record.where(first),
             expected=f"a time after {record.stamps[first]:g} s",
             got=f"{record.stamps[first]:g} s again",
-            remedy="ask for repairs: {duplicates: drop} or {duplicates: average}",
+            remedy=_zone(record) or "ask for repairs: {duplicates: drop} or {duplicates: average}",
         )
     keep = np.ones(len(record.stamps), dtype=np.bool_)
     keep[bad] = False

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sysid.errors import ChannelError, ConfigError, ReaderError
-from sysid.ingest import FileOptions, read_table
+from sysid.errors import ChannelError, ConfigError, ReaderError, TraceError
+from sysid.ingest import FileOptions, read_table, read_trace
 from sysid.ingest.blanks import blanks_mean
 from sysid.ingest.clocks import clock_of
 from sysid.ingest.words import PAIRS, known_states, quoted
@@ -127,3 +127,14 @@ def test_blanks_are_held_where_they_stand_for_no_change() -> None:
     slow = np.full(200, NAN)
     slow[::10] = rng.normal(size=20)
     assert [blanks_mean(values) for values in (held, noisy, dead, slow)] == ["hold", "mask", "mask", "hold"]
+
+
+def test_an_hour_that_comes_twice_is_refused_with_the_zone_that_helps(write: Write) -> None:
+    hours = [*range(90, 180, 10), *range(120, 240, 10)]
+    path = write(
+        "run.csv", "time,y [V]\n" + "".join(f"2024-10-27 {m // 60:02d}:{m % 60:02d},{k}\n" for k, m in enumerate(hours))
+    )
+    with pytest.raises(TraceError, match=r"(?s)step back.*zone: Europe/Berlin"):
+        read_trace(path)
+    trace = read_trace(path, files=FileOptions.model_validate({"time": {"column": "time", "zone": "Europe/Berlin"}}))
+    assert (trace.sample_time, trace["y"].tolist()) == (600.0, [float(k) for k in range(len(hours))])
