@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -104,8 +105,27 @@ def _time_short(value: Any) -> Any:
 
 ColumnOption = Annotated[ColumnOptions, BeforeValidator(_column_short, json_schema_input_type=str | ColumnOptions)]
 TimeOption = Annotated[TimeOptions, BeforeValidator(_time_short, json_schema_input_type=str | TimeOptions)]
-Rows = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)] | None]
-"""First and last row, counted from 1."""
+
+
+def _rows_short(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    match = re.fullmatch(r"\s*(\d{1,18})\s*[:,-]\s*(\d{1,18})?\s*", value)
+    if match is None:
+        raise FieldError(
+            "rows is not a first and a last row",
+            expected="rows: [101, 200], '101:200', or '101:' up to the end",
+            got=value,
+            remedy="write first and last row, counted from 1",
+        )
+    return [int(match[1]), int(match[2]) if match[2] else None]
+
+
+Rows = Annotated[
+    tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)] | None],
+    BeforeValidator(_rows_short, json_schema_input_type=str | tuple[int, int | None]),
+]
+"""First and last row, counted from 1; the short form is ``101:200``."""
 
 
 def _state_words(value: Any) -> Any:

@@ -236,7 +236,15 @@ def test_cases_of_one_file_have_columns_and_rows_of_their_own(tmp_path: Path) ->
     assert "rows 3 to 14 of 20" in traces["MID"].provenance
 
 
-@pytest.mark.parametrize("rows", ["[0, 4]", "[5, 30]", "[9, 4]"])
+@pytest.mark.parametrize("rows", ["3:14", "'3:14'", "[3, 14]"])
+def test_rows_have_a_short_form(tmp_path: Path, rows: str) -> None:
+    np.savez(tmp_path / "a.npz", uEst=np.arange(20.0), yEst=np.arange(20.0))
+    text = TWO_RECORDS.split("  VAL", maxsplit=1)[0].replace("y: yEst}", f"y: yEst}}, rows: {rows}")
+    (tmp_path / "dataset.yaml").write_text(text)
+    np.testing.assert_array_equal(load_dataset(tmp_path)["EST"]["u"], np.arange(2.0, 14.0))
+
+
+@pytest.mark.parametrize("rows", ["[0, 4]", "[5, 30]", "[9, 4]", "some", "1e3:2"])
 def test_rows_that_are_not_there_are_refused(tmp_path: Path, rows: str) -> None:
     np.savez(tmp_path / "a.npz", uEst=np.arange(20.0), yEst=np.arange(20.0))
     text = TWO_RECORDS.split("  VAL", maxsplit=1)[0].replace("y: yEst}", f"y: yEst}}, rows: {rows}")
