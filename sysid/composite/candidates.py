@@ -11,17 +11,20 @@ import numpy as np
 
 from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_members import fixed_model
-from sysid.composite.keeper import Decision, Keeper, MakeAll, Task
+from sysid.composite.keeper import Decision, Keeper, MakeAll, Report, Sample, Task
 from sysid.composite.members import Members, assembled, geometric_mean, own_traces
 from sysid.composite.plan import TrainingPlan
 from sysid.composite.stages import Choice, choose_together, fit_member, model_of, one_step_of
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult
+from sysid.estimation import FitResult, Training
 from sysid.models import NARXModel
 from sysid.traces import Trace
 
 SEEDS_OF_A_CANDIDATE = 1000
 """How far the seeds of one candidate are from the next one's of the same structure."""
+
+SAMPLED = 4
+"""Traces on which a fit is timed."""
 
 CHOOSING, CHOOSING_TITLE = "choosing", "Choosing the members by the error of the whole"
 
@@ -244,7 +247,18 @@ def _task(
             "training": str(replace(member.training, seed=0)),
             "samples": [len(trace) for trace in own],
         },
+        sample=_sample(member, estimation[: member.traces], selection[:1]),
     )
+
+
+def _sample(member: Member, estimation: Sequence[Trace], selection: Sequence[Trace]) -> Sample:
+    """A fit of a member on a few of its traces."""
+    some = estimation[:SAMPLED]
+
+    def fit(training: Training, report: Report) -> FitResult:
+        return fit_member(replace(member, training=training), some, selection, report)
+
+    return Sample(training=member.training, fit=fit, share=sum(map(len, some)) / sum(map(len, estimation)))
 
 
 def _alone(member: Member, model: NARXModel, selection: Sequence[Trace]) -> float:

@@ -6,12 +6,27 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
-from sysid.estimation import CascadeFit, FitProgress, FitResult
+from sysid.estimation import CascadeFit, FitProgress, FitResult, Training
 
 Report = Callable[[FitProgress], None]
 """Told after every iteration of a training."""
 
 Fit = TypeVar("Fit", FitResult, CascadeFit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sample:
+    """A piece of a training that can be timed.
+
+    Args:
+        training: Of the whole.
+        fit: Fits with other options on a part of the samples; given whom to tell after every iteration.
+        share: That part.
+    """
+
+    training: Training
+    fit: Callable[[Training, Report], FitResult]
+    share: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +43,7 @@ class Task(Generic[Fit]):
         put: What a stored result comes to here: the same part of a whole may stand in another whole now.
         limit_s: Seconds after which it ends in any case.
         amount: JSON values that say how much work it is, for who tells how long it will take.
+        sample: A small piece of the same work, for the same purpose.
     """
 
     name: str
@@ -39,6 +55,7 @@ class Task(Generic[Fit]):
     put: Callable[[Fit], Fit] = lambda fit: fit
     limit_s: float = float("inf")
     amount: Any = None
+    sample: Sample | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -62,7 +62,7 @@ def test_figures_are_split_by_state_and_add_up() -> None:
         case="a", role=Role.TEST, free_run=whole, one_step=whole, run_time_s=1.0, time=np.arange(4.0), target=target,
         simulated=output, predicted=output,
     )  # fmt: skip
-    split = by_state(Evaluation(cases={"a": case}), traces, Halves(), Start()).cases["a"]
+    split = by_state(Evaluation(cases={"a": case}), traces, Halves()).cases["a"]
     assert split.by_state is not None
     assert {name: (one.mse, share) for name, (one, share) in split.by_state.items()} == {
         "low": (4.0, 0.25),

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sysid.code_digest import code_digest
-from sysid.composite.keeper import Decision, Fit, Task
+from sysid.composite.keeper import Decision, Fit, Sample, Task
 from sysid.estimation import CascadeFit, FitResult
 from sysid.models import Cascade
 from sysid.traces import TraceSet
@@ -17,12 +17,13 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.exporting import export_model
 from sysid.workbench.assembly.extending import Joined
 from sysid.workbench.fits.data import load_named, unmade_data
+from sysid.workbench.fits.estimates import network_time
 from sysid.workbench.fits.record import is_final, read_fit, write_fit
 from sysid.workbench.fits.steps import STORED_BY
 from sysid.workbench.runner import events
 from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.run import Run
-from sysid.workbench.runner.steps import NOT_KNOWN, Done, Outlined, Step, Work
+from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
 from sysid.workbench.runner.store import RunFolder, digest, read_json, strict, write_json
 
 if TYPE_CHECKING:
@@ -124,6 +125,7 @@ class Context:
                 outcome=lambda fit: f"{fit.train_time_s:.1f} s, {fit.status.value}",
                 final=is_final,
                 amount=lambda: task.amount,
+                how_long=lambda: _how_long(task.sample),
                 called=task.name,
                 export=self.export,
             )
@@ -211,6 +213,10 @@ class Context:
             What came of it.
         """
         return self.run.do(Step(name=step.name, title=step.title, make=make, outcome=outcome)).value
+
+
+def _how_long(sample: Sample | None) -> Estimate:
+    return NOT_KNOWN if sample is None else network_time(sample.training, sample.fit, share=sample.share)
 
 
 def _key(runs: Iterable[Callable[..., Any] | str], terms: Mapping[str, Any]) -> str:

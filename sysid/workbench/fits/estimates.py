@@ -10,10 +10,10 @@ import itertools
 import os
 import statistics
 import time
-from typing import Any
+from collections.abc import Callable, Sequence
 
 from sysid.errors import ConfigError
-from sysid.estimation import FitProgress, Training
+from sysid.estimation import FitProgress, FitResult, Training
 from sysid.estimation.networks.multistart import planned_iterations
 from sysid.traces import Trace, TraceSet
 from sysid.workbench.fields import TrainingConfig, given_options
@@ -28,6 +28,9 @@ CALIBRATION_ITERATIONS = 6
 
 CALIBRATION_LIMIT_S = 10.0
 """Seconds that the timing of one fit may take."""
+
+FEW = ("max_iterations", "prelude_iterations", "starts", "committee", "leave_out", "max_time_s")
+"""Options that make a training short."""
 
 SHARE = 8
 """A linear fit is timed on this part of the samples: its work is proportional to them."""
@@ -47,33 +50,59 @@ def how_long(fit: FitConfig, config: PipelineConfig, data: Data) -> Estimate:
     training = fit.training_options(config.seed)
     if not isinstance(training, Training):
         return Estimate(seconds=_linear(fit, config, data), basis=f"measured now on 1/{SHARE} of the samples")
-    around, iteration = _calibrate(fit, config, data)
-    iterations = planned_iterations(training)
-    side_by_side = min(training.workers, training.starts, os.cpu_count() or 1)
-    seconds = around + min(iterations * iteration / side_by_side, training.max_time_s)
-    trained = f"{iterations:.0f} iterations of {1e3 * iteration:.1f} ms, {side_by_side} at a time"
-    return Estimate(seconds=seconds, basis=f"at most: {duration(around)}, then {trained}")
+    return network_time(training, lambda few, note: _fitted(fit, config, data, few, note))
 
 
-def _calibrate(fit: FitConfig, config: PipelineConfig, data: Data) -> tuple[float, float]:
-    """Seconds around the iterations, which are spent once, and seconds of one iteration of one start."""
-    few = {"max_iterations": CALIBRATION_ITERATIONS, "starts": 1, "max_time_s": CALIBRATION_LIMIT_S}
-    moments: list[float] = []
+def network_time(
+    training: Training, fit: Callable[[Training, Callable[[FitProgress], None]], object], *, share: float = 1.0
+) -> Estimate:
+    """How long the training of a network takes, from a few iterations of it.
 
-    def note(_: FitProgress) -> None:
-        moments.append(time.perf_counter())
+    Args:
+        training: The training.
+        fit: Fits with other options, those that take few iterations; given whom to tell of each.
+        share: Part of the samples that this fit is on.
 
+    Returns:
+        At most so long.
+    """
+    few = dataclasses.replace(
+        training,
+        max_iterations=CALIBRATION_ITERATIONS,
+        prelude_iterations=min(training.prelude_iterations, CALIBRATION_ITERATIONS),
+        starts=1,
+        committee=1,
+        leave_out=(),
+        max_time_s=CALIBRATION_LIMIT_S,
+    )
+    moments: list[tuple[str, float]] = []
     began = time.perf_counter()
-    short = fit.model_copy(update={"training": _with(fit, few), "initial": None})
-    steps.fit_traces(short, config, data, None, note)
+    fit(few, lambda entry: moments.append((entry.stage, time.perf_counter())))
     total = time.perf_counter() - began
-    taken = [after - before for before, after in itertools.pairwise(moments)] or [total]
-    iteration = statistics.median(taken)
-    return max(total - len(moments) * iteration, 0.0), iteration
+    # What is trained last is the free run, or one step ahead; what comes before it has stages of its own.
+    last = moments[-1][0] if moments else ""
+    each = {main: _median([when for stage, when in moments if (stage == last) is main]) for main in (True, False)}
+    iteration, earlier = (each[True] or total) / share, each[False] or 0.0
+    around = max(total - sum((each[stage == last] or 0.0) for stage, _ in moments), 0.0)
+    iterations, side_by_side = planned_iterations(training), min(training.workers, training.starts, os.cpu_count() or 1)
+    before = earlier * training.prelude_iterations * training.starts if training.prelude else 0.0
+    seconds = around + min((before + iterations * iteration) / side_by_side, training.max_time_s)
+    trained = f"{iterations:.0f} iterations of {1e3 * iteration:.1f} ms, {side_by_side} at a time"
+    ahead = f", {duration(before / side_by_side)} one step ahead" if before else ""
+    return Estimate(seconds=seconds, basis=f"at most: {duration(around)}{ahead}, then {trained}")
 
 
-def _with(fit: FitConfig, changes: dict[str, Any]) -> TrainingConfig:
-    return TrainingConfig(**{**(given_options(fit.training) or {}), **changes})
+def _median(moments: Sequence[float]) -> float | None:
+    """Seconds from one moment to the next; ``None`` of fewer than two."""
+    taken = [after - before for before, after in itertools.pairwise(moments)]
+    return statistics.median(taken) if taken else None
+
+
+def _fitted(
+    fit: FitConfig, config: PipelineConfig, data: Data, training: Training, note: Callable[[FitProgress], None]
+) -> FitResult:
+    given = TrainingConfig(**{**(given_options(fit.training) or {}), **{name: getattr(training, name) for name in FEW}})
+    return steps.fit_traces(fit.model_copy(update={"training": given, "initial": None}), config, data, None, note)
 
 
 def _linear(fit: FitConfig, config: PipelineConfig, data: Data) -> float:

@@ -61,3 +61,13 @@ def test_members_and_rounds_go_on_where_they_were_cut_off(
     assert exported.outputs == expected.outputs
     assert run_cli(["export", "tanks", "--fit", "togethr"]) == 2
     assert "did you mean together?" in capsys.readouterr().err
+
+
+def test_members_that_were_never_fitted_are_timed(workspace: Path) -> None:
+    request = RunRequest(path=Path("pipelines/tanks.yaml"), typed="tanks")
+    planned = {step.name: step for step in foresee(program(request), request)}
+    fits = [step for name, step in planned.items() if name.startswith("fit-") and "retrained" not in name]
+    assert len(fits) == 3
+    assert all(step.seconds and "one step ahead, then 10 iterations of" in step.basis for step in fits)
+    assert planned["together"].basis == "not known before it is run"
+    assert not (workspace / "runs").exists()
