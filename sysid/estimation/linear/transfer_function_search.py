@@ -37,6 +37,8 @@ AT_EDGE = (
     "The slowest pole stands at the end of its range, a time constant of five records: the plant may integrate, and "
     "these records cannot tell."
 )
+FASTEST = 30.0
+"""Rate, times the sample time, of a pole that is there for no sample to see."""
 SIGNIFICANT = 6.6
 """Drop of twice the log-likelihood that one more free parameter has by chance in one case of a hundred."""
 MOST_COMBINATIONS = 30
@@ -297,7 +299,7 @@ class AbstractProblem(ABC):
             run = min(runs, key=lambda one: one.loss)
             if np.isfinite(run.loss):
                 end = smaller._long_run(run, time.perf_counter(), _ignore)
-                sections = _filled_up(inner.poles.sections(end.theta), self.orders)
+                sections = _filled_up(inner.poles.sections(end.theta), self.orders, self.terms.sample_time)
                 found.append(self._short_run(PoleStart(name=f"{orders.label}", sections=sections), delays, provider))
         return found
 
@@ -521,13 +523,17 @@ def _next_smaller(orders: TransferFunction) -> list[TransferFunction]:
     return found
 
 
-def _filled_up(sections: Sections, orders: TransferFunction) -> Sections:
+def _filled_up(sections: Sections, orders: TransferFunction, sample_time: float) -> Sections:
     """The same poles, and fast ones where some are missing."""
     filled = []
     for part, n in zip(sections, orders.poles, strict=True):
         poles = np.concatenate([section_poles(d, orders.domain) for d in part])
-        fastest = float(np.abs(poles).max()) if orders.domain is Domain.CONTINUOUS else 0.0
-        extra = np.full(n - len(poles), -10.0 * fastest if orders.domain is Domain.CONTINUOUS else 0.01)
+        extra = np.full(n - len(poles), 0.01)
+        if orders.domain is Domain.CONTINUOUS:
+            # Faster than any sample shows, and one that has run away is brought back to there.
+            limit = FASTEST / sample_time
+            poles = np.where(np.abs(poles) < limit, poles, -limit)
+            extra = np.full(n - len(poles), -limit)
         filled.append(sections_of(np.concatenate([poles, extra]).astype(np.complex128), orders.domain))
     return tuple(filled)
 
