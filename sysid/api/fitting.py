@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from pathlib import Path
+from typing import Any
 
 from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit, SystemFit
@@ -42,7 +44,7 @@ def load(source: str | Path) -> TraceSet:
 
 def fit(
     traces: TraceSet,
-    mapping: str | Mapping,
+    mapping: str | Mapping | Dict[str, Any],
     structure: AbstractStructure,
     training: Options | None = None,
     *,
@@ -56,7 +58,8 @@ def fit(
     Args:
         traces: The data set.
         mapping: Which channels go in, which come out: ``"u1+u2 -> y"``, or ``"u1+u2 -> y1+y2"``, where each output gets
-            a model of the structure and all of them are run as one.
+            a model of the structure and all of them are run as one. As lists, ``{"inputs": ["P+"], "output": "V->C"}``,
+            names may hold anything.
         structure: What is fitted.
         training: How a network is trained, or a transfer function; an ARX model has nothing to choose.
         start: How each free run begins.
@@ -74,7 +77,7 @@ def fit(
             apply to it.
         ChannelError: If a channel of the mapping is missing.
     """
-    chosen = _single(VectorMapping.parse(mapping)) if isinstance(mapping, str) else (mapping,)
+    chosen = _single(VectorMapping.of(mapping))
     estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)
     if not estimation:
         raise ConfigError(

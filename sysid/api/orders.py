@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -163,7 +164,7 @@ class OrderSearch:
 
 def search_orders(
     traces: TraceSet,
-    mapping: str | Mapping,
+    mapping: str | Mapping | Dict[str, Any],
     *,
     max_na: int | None = None,
     max_nb: int | None = None,
@@ -200,7 +201,7 @@ def search_orders(
         >>> sysid.search_orders(sysid.data((u, y), sample_time=1.0, split=0.6), "u -> y").best("BIC").label
         'ARX [2; 1; 3]'
     """
-    chosen = Mapping.parse(mapping) if isinstance(mapping, str) else mapping
+    chosen = Mapping.of(mapping)
     estimation = traces.with_role(Role.ESTIMATION)
     if not estimation:
         raise ConfigError(

@@ -23,6 +23,7 @@ from sysid.export.flags import MEANING
 from sysid.export.fmi_units import unit_definitions
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import c_real, render
+from sysid.names import distinct, xml_name
 
 HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
@@ -97,18 +98,21 @@ def fmu_variables(surrogate: Surrogate) -> list[dict[str, Any]]:
     Returns:
         Inputs, outputs, outputs at rest, flags.
     """
-    taken = {port.name for port in (*surrogate.inputs, *surrogate.outputs)}
+    names = distinct((port.name for port in (*surrogate.inputs, *surrogate.outputs)), xml_name)
+    taken = set(names.values())
     rows: list[dict[str, Any]] = []
     for port in surrogate.inputs:
         told = "no range declared" if port.range is None else f"declared from {port.low!r} to {port.high!r}"
         kind = {"causality": "input", "variability": "continuous", "initial": ""}
-        rows.append({"name": port.name, **kind, "unit": port.unit, "start": c_real(port.start), "description": told})
+        rows.append(
+            {"name": names[port.name], **kind, "unit": port.unit, "start": c_real(port.start), "description": told}
+        )
     for port in surrogate.outputs:
         kind = {"causality": "output", "variability": "continuous", "initial": "calculated"}
         text = "of the sample before" + (f"; begins at {port.level}" if isinstance(port.level, str) else "")
-        rows.append({"name": port.name, **kind, "unit": port.unit, "start": None, "description": text})
+        rows.append({"name": names[port.name], **kind, "unit": port.unit, "start": None, "description": text})
     for port in surrogate.outputs:
-        name, kind = _free(f"{port.name}_at_rest", taken), {"causality": "parameter", "variability": "fixed"}
+        name, kind = _free(f"{names[port.name]}_at_rest", taken), {"causality": "parameter", "variability": "fixed"}
         text = f"{port.name} before the first sample: the system has stood at it and at the inputs for ever"
         start = None if isinstance(port.level, str) else c_real(port.level)
         rows.append({"name": name, **kind, "initial": "exact", "unit": port.unit, "start": start, "description": text})

@@ -9,7 +9,6 @@ whatever can be written as stages runs in every format. How models are wired is 
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from sysid.export.layout import DelayLine, SpaceState
 from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
 from sysid.models import AbstractModel, Cascade, History
 from sysid.models.wiring import Wiring
+from sysid.names import c_identifier, distinct, written_side
 
 LONGEST_IDENTIFIER = 60
 """Characters. A file's name may have 255, with its folders 260 on Windows, and a cascade may have eighty outputs."""
@@ -85,7 +85,7 @@ class Surrogate:
                 remedy="run it in Python: fit.simulate(n_samples, initial=...)",
             )
         ranges, starts = ranges or {}, starts or {}
-        identifiers, levels = _identifiers(wiring.channels), _levels(source, wiring)
+        identifiers, levels = distinct(wiring.channels, c_identifier), _levels(source, wiring)
         inputs = tuple(
             Port(
                 name=name,
@@ -146,7 +146,7 @@ class Surrogate:
     @property
     def mapping(self) -> str:
         """What goes in and comes out, such as ``BP+AR -> BC``."""
-        return f"{'+'.join(p.name for p in self.inputs)} -> {', '.join(p.name for p in self.outputs)}"
+        return f"{written_side([p.name for p in self.inputs])} -> {', '.join(p.name for p in self.outputs)}"
 
     @property
     def label(self) -> str:
@@ -297,17 +297,3 @@ def _levels(source: AbstractModel | Cascade, wiring: Wiring) -> dict[str, Level]
     for ends in (cell_of(model).ends for model in models):
         levels |= dict(zip(ends.outputs, ends.rest_outputs, strict=True))
     return levels | dict(source.rest if isinstance(source, Cascade) else {})
-
-
-def _identifiers(names: Sequence[str]) -> dict[str, str]:
-    """Channel names as different C identifiers."""
-    found: dict[str, str] = {}
-    for name in names:
-        plain = re.sub(r"[^0-9a-z]+", "_", name.lower()).strip("_") or "channel"
-        plain = f"c{plain}" if plain[0].isdigit() else plain
-        number = 2
-        unique = plain
-        while unique in found.values():
-            unique, number = f"{plain}_{number}", number + 1
-        found[name] = unique
-    return found

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from functools import cache
 from typing import Any
-from xml.sax.saxutils import quoteattr
+
+from sysid.names import c_comment, c_string, markdown_inline, read_sides, xml_attribute
 
 
 @cache
-def environment() -> Any:
-    """The jinja environment: what a template names and is not given is an error."""
+def environment(*, markdown: bool = False) -> Any:
+    """The jinja environment: what a template names and is not given is an error.
+
+    Args:
+        markdown: Whether every text that is filled in becomes one of Markdown.
+
+    Returns:
+        The environment.
+    """
     import jinja2
 
     found = jinja2.Environment(
@@ -20,15 +27,17 @@ def environment() -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,  # noqa: S701 - Markdown and C; XML attributes go through their own filter
+        autoescape=False,  # noqa: S701 - C; XML attributes and Markdown go through what is their own
+        finalize=_markdown if markdown else None,
     )
     found.filters |= {
         "number": _number,
         "real": c_real,
         "table": _table,
-        "comment": _comment,
-        "attribute": _attribute,
-        "c_string": _c_string,
+        "comment": c_comment,
+        "attribute": xml_attribute,
+        "c_string": c_string,
+        "sides": read_sides,
     }
     return found
 
@@ -43,7 +52,12 @@ def render(template: str, **values: Any) -> str:
     Returns:
         The text; the same for the same values.
     """
-    return str(environment().get_template(template).render(**values))
+    found = environment(markdown=template.endswith(".md.j2"))
+    return str(found.get_template(template).render(**values))
+
+
+def _markdown(value: Any) -> Any:
+    return markdown_inline(value) if isinstance(value, str) else value
 
 
 def c_real(value: float) -> str:
@@ -71,21 +85,6 @@ def _table(values: Iterable[float], width: int = 110) -> str:
             line = ""
         line += f"{text}, "
     return "\n".join(f"        {one.rstrip()}" for one in [*lines, line]).rstrip(",")
-
-
-def _comment(text: str) -> str:
-    """Text that cannot end a C comment, nor begin one within it."""
-    return re.sub(r"\s+", " ", str(text)).replace("*/", "* /").replace("/*", "/ *").replace("\\", "/")
-
-
-def _attribute(text: object) -> str:
-    """An XML attribute's value with its quotes."""
-    return quoteattr(str(text))
-
-
-def _c_string(text: str) -> str:
-    """A C string literal of printable ASCII."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _number(value: float | None, digits: int = 4) -> str:

@@ -18,6 +18,7 @@ from sysid.export.flags import expected_flags
 from sysid.export.parity import ParityCase
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import render
+from sysid.names import csv_cell
 
 FOLDER = "verify"
 SAMPLES = 200
@@ -85,7 +86,7 @@ def _record(surrogate: Surrogate, inputs: NDArray[np.float64]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     ports = (*surrogate.inputs, *surrogate.outputs)
-    writer.writerow(["time [s]", *(f"{port.name} [{port.unit}]" for port in ports), "flags"])
+    writer.writerow(["time [s]", *(csv_cell(f"{port.name} [{port.unit}]") for port in ports), "flags"])
     for i, (row, output, flag) in enumerate(zip(inputs.tolist(), outputs.tolist(), flags.tolist(), strict=True)):
         writer.writerow([repr(round(i * surrogate.sample_time, 12)), *map(repr, [*row, *output]), flag])
     return text.getvalue()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, UserError
 from sysid.ingest.headers import parse_header
+from sysid.names import csv_cell
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
 
@@ -65,7 +66,7 @@ def write_csv(trace: Trace, path: str | Path) -> Path:
     text.write(f"# sysid: {_head(trace)}\n")
     writer = csv.writer(text, lineterminator="\n")
     columns = _columns(trace)
-    writer.writerow([label for label, _ in columns])
+    writer.writerow([csv_cell(label) for label, _ in columns])
     writer.writerows(zip(*(map(repr, values.tolist()) for _, values in columns), strict=True))
     try:
         with replacing(path) as draft:

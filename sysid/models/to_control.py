@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models.mapping import Mapping
+from sysid.names import distinct, signal_name
 
 Polynomials = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Numerator and denominator."""
@@ -54,8 +55,7 @@ def transfer_function(ratios: Sequence[Polynomials], mapping: Mapping, sample_ti
         [[num for num, _ in ratios]],
         [[den for _, den in ratios]],
         sample_time,
-        inputs=list(mapping.inputs),
-        outputs=[mapping.output],
+        **_signals(mapping),
     )
 
 
@@ -71,9 +71,13 @@ def state_space(model: Linear) -> Any:
     import control
 
     A, B, C, D = model.matrices
-    return control.StateSpace(
-        A, B, C, D, model.sample_time, inputs=list(model.mapping.inputs), outputs=[model.mapping.output]
-    )
+    return control.StateSpace(A, B, C, D, model.sample_time, **_signals(model.mapping))
+
+
+def _signals(mapping: Mapping) -> dict[str, list[str]]:
+    """The names of the channels as python-control takes them, which has no dots in names."""
+    names = distinct((*mapping.inputs, mapping.output), signal_name)
+    return {"inputs": [names[name] for name in mapping.inputs], "outputs": [names[mapping.output]]}
 
 
 def delayed(ratio: Polynomials, seconds: float, order: int) -> Polynomials:

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError
 from sysid.models.ends import Ends, read_now
 from sysid.models.lags import Lags, LagSpec
+from sysid.models.mapping import LISTS, Mapping, check_fields, listed
 from sysid.models.narx import CLAMP, NARX
+from sysid.names import read_sides, written_side
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +50,31 @@ class VectorMapping:
             )
 
     def __str__(self) -> str:
-        return f"{'+'.join(self.inputs)} -> {'+'.join(self.outputs)}".lstrip()
+        return f"{written_side(self.inputs)} -> {written_side(self.outputs)}".lstrip()
+
+    @classmethod
+    def of(cls, value: object) -> VectorMapping:
+        """A mapping from what people write.
+
+        Args:
+            value: A mapping of one output or of several, its text, or its lists:
+                ``{"inputs": ["STP"], "outputs": ["BP", "AR"]}``.
+
+        Returns:
+            The mapping.
+
+        Raises:
+            ConfigError: If it is none of these.
+        """
+        if isinstance(value, VectorMapping):
+            return value
+        if isinstance(value, Mapping) or (isinstance(value, Dict) and "output" in value):
+            one = Mapping.of(value)
+            return cls(inputs=one.inputs, outputs=(one.output,))
+        if not isinstance(value, Dict):
+            return cls.parse(str(value))
+        check_fields(value, ("inputs", "outputs"), "{inputs: [STP], outputs: [BP, AR]}")
+        return cls(inputs=listed(value["inputs"], what="inputs"), outputs=listed(value["outputs"], what="outputs"))
 
     @classmethod
     def parse(cls, text: str) -> VectorMapping:
@@ -63,16 +89,16 @@ class VectorMapping:
         Raises:
             ConfigError: If the text does not have that form.
         """
-        left, arrow, right = text.partition("->")
-        if not arrow:
+        sides = read_sides(text)
+        if len(sides) != 2:
             raise ConfigError(
                 "not a mapping",
                 expected="input channels, an arrow and output channels, as in STP -> BP+AR",
                 got=text,
-                remedy="write -> between inputs and outputs",
+                remedy="write -> between inputs and outputs" if len(sides) < 2 else f"write {LISTS}",
             )
-        inputs, outputs = (tuple(name.strip() for name in side.split("+")) for side in (left, right))
-        return cls(inputs=inputs if left.strip() else (), outputs=outputs)
+        inputs, outputs = sides
+        return cls(inputs=tuple(inputs), outputs=tuple(outputs))
 
 
 @dataclass(frozen=True, kw_only=True)

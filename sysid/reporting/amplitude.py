@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from sysid.names import output_side
 from sysid.reporting.figures.style import PALETTE, new_figure, styled
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, picture
@@ -100,7 +101,7 @@ def amplitude_section(fit: FitRecord, signals: Dict[str, CaseSignals]) -> Sectio
         )
         for band in found
     )
-    unit, output = fit.unit, fit.mapping.rpartition("->")[2].strip()
+    unit, output = fit.unit, output_side(fit.mapping)
     table = Table(
         caption=caption,
         head=(("target", unit), ("samples", ""), ("rms error", unit), ("mean error", unit), ("largest error", unit)),

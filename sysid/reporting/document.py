@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sysid.names import output_side
 from sysid.reporting.amplitude import amplitude_section
 from sysid.reporting.comparing.published import PublishedTable
 from sysid.reporting.evidence import evidence_sections
@@ -121,7 +122,7 @@ def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
 def _best(fit: FitRecord, signals: Dict[str, CaseSignals], moments: list[Moment], columns: int) -> Section:
     parts: list[Part] = [*_quality(fit)]
     parts += _case_pictures(fit, signals, columns)
-    output = fit.mapping.rpartition("->")[2].strip()
+    output = output_side(fit.mapping)
     if moments:
         title = f"{fit.name}: the {len(moments)} worst moments"
         drawing = figures.moments_figure(moments, signals, title=title, label=output, unit=fit.unit)
@@ -147,7 +148,7 @@ def _columns(results: Results) -> int:
 
 
 def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int) -> list[Part]:
-    output = fit.mapping.rpartition("->")[2].strip()
+    output = output_side(fit.mapping)
     parts: list[Part] = []
     for index, (name, case) in enumerate(fit.cases.items()):
         signal = signals[name]

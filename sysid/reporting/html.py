@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 
 import sysid
+from sysid.names import visible
 from sysid.reporting.parts import Document, Gallery, Picture
 from sysid.reporting.tables import Table, facts
 
@@ -46,6 +48,7 @@ def page_template(name: str) -> Template:
         loader=PackageLoader("sysid.reporting"),
         autoescape=select_autoescape(["j2"], default=True),
         undefined=StrictUndefined,
+        finalize=_shown,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -56,6 +59,11 @@ def page_template(name: str) -> Template:
     # Our own drawings; every text inside them was escaped where they were made.
     environment.filters["drawing"] = lambda part: Markup(part.svg)  # noqa: S704
     return environment.get_template(name)
+
+
+def _shown(value: Any) -> Any:
+    """What is filled in: plain text without control characters; what is markup already stays."""
+    return visible(value, lines=True) if type(value) is str else value
 
 
 def readable(created: str) -> str:

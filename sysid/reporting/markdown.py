@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sysid.errors import ConfigError
+from sysid.names import markdown, markdown_cell
 from sysid.reporting.parts import Gallery, Part, Picture, Section
 from sysid.reporting.tables import Cell, Table, facts
 
@@ -46,7 +47,7 @@ class Drawings:
             return []
         self.room -= len(text)
         (self.folder / f"{name}.svg").write_text(text + "\n", encoding="utf-8", newline="\n")
-        return [f"![{escape(part.caption)}]({name}.svg)", "", f"*{arrow(part.caption)}*", ""]
+        return [f"![{markdown_cell(part.caption)}]({name}.svg)", "", f"*{markdown(part.caption)}*", ""]
 
 
 def section_lines(section: Section, drawings: Drawings) -> list[str]:
@@ -59,7 +60,7 @@ def section_lines(section: Section, drawings: Drawings) -> list[str]:
     Returns:
         Lines of Markdown.
     """
-    lines = [f"## {arrow(section.title)}", ""]
+    lines = [f"## {markdown(section.title)}", ""]
     for part in section.parts:
         lines += _part(part, drawings)
     return lines
@@ -74,10 +75,10 @@ def table_lines(table: Table) -> list[str]:
     Returns:
         Lines of Markdown.
     """
-    head = [escape(" ".join(filter(None, (name, f"({below})" if below else "")))) for name, below in table.head]
+    head = [markdown_cell(" ".join(filter(None, (name, f"({below})" if below else "")))) for name, below in table.head]
     rows = [[_cell(cell) for cell in row] for row in table.rows]
-    lines = [arrow(table.caption), "", *rows_lines([head, ["---"] * len(head), *rows])]
-    lines += ["", f"*{arrow(table.note)}*"] if table.note else []
+    lines = [markdown(table.caption), "", *rows_lines([head, ["---"] * len(head), *rows])]
+    lines += ["", f"*{markdown(table.note)}*"] if table.note else []
     return [*lines, "", *_folded(table.folded)] if table.folded else lines
 
 
@@ -130,27 +131,17 @@ def refuse_others(target: Path) -> None:
     )
 
 
-def escape(text: str) -> str:
-    """Text as it may stand in a cell."""
-    return arrow(text).replace("|", "\\|").replace("\n", " ")
-
-
-def arrow(text: str) -> str:
-    """Text as it may stand in a paragraph."""
-    return text.replace("->", "→").replace("<", "&lt;")
-
-
 def _part(part: Part, drawings: Drawings) -> list[str]:
     if isinstance(part, Table):
         return [] if part.caption.startswith("Notes of the fits") else [*table_lines(part), ""]
     if isinstance(part, Gallery):
         return [line for drawing in part.pictures for line in drawings.draw(drawing)]
-    return drawings.draw(part) if isinstance(part, Picture) else [arrow(part), ""]
+    return drawings.draw(part) if isinstance(part, Picture) else [markdown(part), ""]
 
 
 def _folded(sentences: Sequence[str]) -> list[str]:
     """Sentences that open when they are asked for; the empty lines keep them Markdown."""
-    inside = [line for sentence in sentences for line in ("", arrow(sentence))]
+    inside = [line for sentence in sentences for line in ("", markdown(sentence))]
     return ["<details><summary>In words</summary>", *inside, "", "</details>"]
 
 
@@ -160,5 +151,5 @@ def _name(part: Picture) -> str:
 
 
 def _cell(cell: Cell) -> str:
-    text = f"**{escape(cell.text)}**" if cell.mark == "best" and cell.text else escape(cell.text)
-    return f"{text}<br><sub>{escape(cell.below)}</sub>" if cell.below else text
+    text = f"**{markdown_cell(cell.text)}**" if cell.mark == "best" and cell.text else markdown_cell(cell.text)
+    return f"{text}<br><sub>{markdown_cell(cell.below)}</sub>" if cell.below else text

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Final
 
 from sysid.errors import ConfigError
+from sysid.names import markdown, markdown_cell, markdown_code
 from sysid.reporting.html import readable
 from sysid.reporting.kinds import read_run, run_document, run_scores
 from sysid.reporting.markdown import (
     MARK,
     PAGE,
     Drawings,
-    arrow,
-    escape,
     facts_lines,
     machine,
     refuse_others,
@@ -113,10 +112,10 @@ def _frozen(run_folder: Path) -> list[Path]:
 
 
 def _page(document: Document, name: str, command: str, folder: Path) -> str:
-    lines = [MARK, f"# {name}", "", document.results.description, ""]
-    lines += [f"**{arrow(document.verdict.headline)}**", ""]
-    lines += [f"- **{arrow(word)}.** {arrow(sentence)}" for word, sentence in document.verdict.points]
-    lines += [f"- **Warning.** {warning}" for warning in document.verdict.warnings]
+    lines = [MARK, f"# {markdown(name)}", "", markdown(document.results.description), ""]
+    lines += [f"**{markdown(document.verdict.headline)}**", ""]
+    lines += [f"- **{markdown(word)}.** {markdown(sentence)}" for word, sentence in document.verdict.points]
+    lines += [f"- **Warning.** {markdown(warning)}" for warning in document.verdict.warnings]
     lines += ["", *_provenance(document, command), ""]
     drawings = Drawings(folder=folder, shown=lambda drawing: _belongs(drawing, document.results))
     for section in document.sections:
@@ -128,15 +127,14 @@ def _page(document: Document, name: str, command: str, folder: Path) -> str:
 
 def _provenance(document: Document, command: str) -> list[str]:
     results = document.results
+    commands = {"run": markdown_code(results.command), "published": markdown_code(command)}
     rows = {
-        "run": f"`{results.command}`",
-        "published": f"`{command}`",
         "date": readable(results.created),
         "seed": "none" if results.seed is None else str(results.seed),
         **machine(results.environment),
         "data": f"{results.data.name}, SHA-256 {results.data.digest}" if results.data.digest else results.data.name,
     }
-    return facts_lines({key: escape(text) for key, text in rows.items()})
+    return facts_lines(commands | {key: markdown_cell(text) for key, text in rows.items()})
 
 
 def _belongs(drawing: str, results: RunResults) -> bool:

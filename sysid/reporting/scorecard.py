@@ -15,9 +15,10 @@ from typing import Final
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError
+from sysid.names import markdown_cell
 from sysid.reporting.benchmarks.findings import FINDINGS_FILE, Finding, read_findings
 from sysid.reporting.kinds import read_run, run_scores
-from sysid.reporting.markdown import escape, rows_lines
+from sysid.reporting.markdown import rows_lines
 from sysid.reporting.numbers import number
 from sysid.reporting.records import RESULTS_FILE
 from sysid.reporting.scores import SCORES_FILE, Score, read_scores
@@ -98,13 +99,18 @@ def _errors(ours: Sequence[Score], peers: Sequence[Score]) -> list[str]:
     for score in ours:
         scale, squared = _scale(score), f"{score.unit}²"
         unit = squared if scale == 1.0 else f"10⁻³ {squared}"
-        rows.append([f"**{escape(score.mapping)}** [{unit}]: {escape(score.model)}", *_cells(score.mse, cases, scale)])
+        rows.append(
+            [
+                f"**{markdown_cell(score.mapping)}** [{unit}]: {markdown_cell(score.model)}",
+                *_cells(score.mse, cases, scale),
+            ]
+        )
         if score.published:
-            rows.append([f"published ({escape(score.source)})", *_cells(score.published, cases, scale)])
+            rows.append([f"published ({markdown_cell(score.source)})", *_cells(score.published, cases, scale)])
         rivals = [peer for peer in peers if (peer.mapping, peer.unit) == (score.mapping, score.unit)]
         if rivals:
             best = min(rivals, key=Score.typical)
-            rows.append([f"best of {len(rivals)} peers: {escape(best.model)}", *_cells(best.mse, cases, scale)])
+            rows.append([f"best of {len(rivals)} peers: {markdown_cell(best.model)}", *_cells(best.mse, cases, scale)])
     return rows_lines(rows)
 
 
@@ -130,12 +136,12 @@ def _benchmarks(findings: Sequence[Finding]) -> list[str]:
     if not kept:
         return []
     rows = [["benchmark (sources in its report)", "ours", "published", "peer"], ["---"] * 4]
-    rows += [[escape(one.what), one.ours_text, *map(_brief, (one.published, one.peer))] for one in kept.values()]
+    rows += [[markdown_cell(one.what), one.ours_text, *map(_brief, (one.published, one.peer))] for one in kept.values()]
     return rows_lines(rows)
 
 
 def _brief(text: str) -> str:
-    return escape(_SOURCE.sub("", text))
+    return markdown_cell(_SOURCE.sub("", text))
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -41,6 +41,9 @@ def run_cli(arguments: list[str]) -> int:
     """
     # Wherever it stands, as people add it to the end of the command that failed.
     debug = "--debug" in arguments
+    from sysid.workbench.runner.console import speak_plainly
+
+    speak_plainly()
     try:
         code = app([word for word in arguments if word != "--debug"], prog_name="sysid", standalone_mode=False)
         return code if isinstance(code, int) else 0
@@ -109,7 +112,9 @@ def _trace() -> None:
 
 
 def _say(text: str) -> None:
-    sys.stderr.write(text + "\n")
+    from sysid.workbench.runner.console import say
+
+    say(text)
 
 
 def _version(asked: bool) -> None:

@@ -135,11 +135,9 @@ def _start_text(start: Start) -> str | dict[str, int]:
 
 
 def _mapping(value: object) -> Mapping:
-    """A mapping from its text."""
-    if isinstance(value, Mapping):
-        return value
+    """A mapping from its text, or from its lists."""
     try:
-        return Mapping.parse(str(value))
+        return Mapping.of(value)
     except ConfigError as error:
         raise as_field_error(error) from error
 
@@ -180,8 +178,24 @@ StartField = Annotated[
         }
     ),
 ]
+_NAME = {"type": "string", "minLength": 1}
 MappingField = Annotated[
-    Mapping, PlainValidator(_mapping), PlainSerializer(str), WithJsonSchema({"type": "string", "pattern": "->"})
+    Mapping,
+    PlainValidator(_mapping),
+    PlainSerializer(str),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string", "pattern": "->"},
+                {
+                    "type": "object",
+                    "properties": {"inputs": {"anyOf": [_NAME, {"type": "array", "items": _NAME}]}, "output": _NAME},
+                    "required": ["inputs", "output"],
+                    "additionalProperties": False,
+                },
+            ]
+        }
+    ),
 ]
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from sysid.errors import TraceError
 from sysid.estimation.stability.sequences import AbstractSequences, InputSequence
 from sysid.models import AbstractModel
+from sysid.names import csv_cell
 
 SEQUENCES = 1000
 SEED = 20
@@ -107,7 +108,7 @@ class Stability:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         targets, runs = ([f"{name} {what}" for name in outputs] for what in ("target", "free run"))
-        writer.writerow(["time [s]", *inputs, *targets, *runs, "judged"])
+        writer.writerow(["time [s]", *map(csv_cell, [*inputs, *targets, *runs]), "judged"])
         values = np.hstack([self.worst.inputs, self.worst.targets, self.worst_outputs])
         for i, (row, judged) in enumerate(zip(values.tolist(), self.worst.judged.tolist(), strict=True)):
             writer.writerow([repr(round(i * self.sample_time, 9)), *(f"{value:.9g}" for value in row), int(judged)])

@@ -23,6 +23,7 @@ from sysid.ingest.readers.reader import Reader
 from sysid.ingest.readers.text_source import TextFile, ZeroBytesError, encodings, not_text
 from sysid.ingest.table import RawColumn, RawTable, recognise_time
 from sysid.ingest.words import WordCollector, states_for
+from sysid.names import from_csv_cell
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
@@ -88,7 +89,7 @@ def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
     texts: Sequence[str] = layout.names or [f"column_{index + 1}" for index in range(width)]
     if options.names is not None:
         texts = _given_names(options.names, layout, path)
-    headers = [parse_header(text) for text in texts]
+    headers = [parse_header(from_csv_cell(text)) for text in texts]
     headers = [
         Header(name=header.name, unit=split_reference(suffix)[0]) if suffix and header.unit is None else header
         for header, suffix in zip(headers, layout.suffixes, strict=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from sysid.atomic import replacing
+from sysid.names import markdown, markdown_block, markdown_cell, markdown_code
 from sysid.reporting.benchmarks.findings import (
     FINDINGS_FILE,
     Benchmark,
@@ -17,7 +18,7 @@ from sysid.reporting.benchmarks.findings import (
     write_findings,
 )
 from sysid.reporting.html import readable
-from sysid.reporting.markdown import MARK, PAGE, arrow, escape, facts_lines, machine, refuse_others, rows_lines
+from sysid.reporting.markdown import MARK, PAGE, facts_lines, machine, refuse_others, rows_lines
 
 _WORDS: Final = {True: "reached", False: "**missed**", None: ""}
 
@@ -54,10 +55,10 @@ def _lines(report: Benchmarks) -> list[str]:
     title = report.name.replace("-", " ")
     lines = [MARK, f"# {title[:1].upper()}{title[1:]}", ""]
     if report.findings:
-        lines += [f"**{verdict_on(report.findings)}**", "", *_points(report.findings)]
+        lines += [f"**{markdown(verdict_on(report.findings))}**", "", *_points(report.findings)]
     machines = [machine(benchmark.environment) for benchmark in report.benchmarks]
     rows = {key: "; ".join(dict.fromkeys(one[key] for one in machines)) for key in ("machine", "versions")}
-    lines += [*facts_lines({key: escape(text) for key, text in rows.items()})]
+    lines += [*facts_lines({key: markdown_cell(text) for key, text in rows.items()})]
     for benchmark in report.benchmarks:
         lines += ["", *_section(benchmark)]
     return lines
@@ -66,7 +67,8 @@ def _lines(report: Benchmarks) -> list[str]:
 def _points(findings: Sequence[Finding]) -> list[str]:
     """What was missed, and what is open, before anything else."""
     lines = [
-        f"- **{word}.** {arrow(finding.what)}: {finding.ours_text} against {finding.target_text}."
+        f"- **{word}.** {markdown(finding.what)}: {markdown(finding.ours_text)} against "
+        f"{markdown(finding.target_text)}."
         for word, verdict in (("Missed", False), ("Open", None))
         for finding in findings
         if finding.target is not None and finding.met is verdict
@@ -76,24 +78,22 @@ def _points(findings: Sequence[Finding]) -> list[str]:
 
 def _section(benchmark: Benchmark) -> list[str]:
     rows = {
-        "run": f"`{benchmark.command}`",
+        "run": markdown_code(benchmark.command),
         "date": readable(benchmark.created),
         "commit": machine(benchmark.environment)["commit"],
         "load": "not recorded" if benchmark.load is None else f"{benchmark.load:.1f} when it began",
-        **{f"data: {escape(name)}": f"SHA-256 {digest}" for name, digest in benchmark.data.items()},
+        **{f"data: {markdown_cell(name)}": f"SHA-256 {digest}" for name, digest in benchmark.data.items()},
     }
-    lines = [f"## {arrow(benchmark.title)}", ""]
+    lines = [f"## {markdown(benchmark.title)}", ""]
     if benchmark.findings:
         lines += [*_table(benchmark.findings), ""]
     lines += [*facts_lines(rows), ""]
-    lines += [arrow(benchmark.protocol), ""] if benchmark.protocol else []
+    lines += [markdown(benchmark.protocol), ""] if benchmark.protocol else []
     return [
         *lines,
         "<details><summary>As printed</summary>",
         "",
-        "```text",
-        benchmark.printed.rstrip("\n"),
-        "```",
+        *markdown_block(benchmark.printed),
         "",
         "</details>",
     ]
@@ -110,9 +110,10 @@ def _table(findings: Sequence[Finding]) -> list[str]:
         "peer": [finding.peer for finding in findings],
         "note": [finding.note for finding in findings],
     }
-    filled = {name: texts for name, texts in columns.items() if any(texts)}
-    rows = [list(row) for row in zip(*filled.values(), strict=True)]
-    return rows_lines([list(filled), ["---"] * len(filled), *([escape(text) for text in row] for row in rows)])
+    # The verdict is Markdown already.
+    cells = {name: [text if name == "" else markdown_cell(text) for text in texts] for name, texts in columns.items()}
+    filled = {name: texts for name, texts in cells.items() if any(texts)}
+    return rows_lines([list(filled), ["---"] * len(filled), *zip(*filled.values(), strict=True)])
 
 
 def _open(finding: Finding) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sysid.errors import ConfigError
+from sysid.names import output_side
 from sysid.reporting.assembly.results import AssemblyResults
 from sysid.reporting.judging.results import JudgementResults
 from sysid.reporting.judging.version_1 import ReadyResults
@@ -245,7 +246,7 @@ MAKERS: Final[dict[type[RunResults], Callable[[Path, Any], list[Contender]]]] = 
 
 
 def _output(mapping: str) -> str:
-    return mapping.rpartition("->")[2].strip()
+    return output_side(mapping)
 
 
 def _digest(signals: CaseSignals) -> str:

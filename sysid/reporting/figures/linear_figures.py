@@ -41,7 +41,7 @@ def bode_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, seed: 
     frequency = np.pi / model.sample_time * np.logspace(-4.0, 0.0, points)
     views = linear_views(model, uncertainty, seed)
     with styled():
-        figure = new_figure(7.6, 4.2)
+        figure = new_figure(max(7.6, 2.2 * len(views)), 4.2)
         axes = figure.subplots(2, len(views), sharex=True, squeeze=False)
         for j, view in enumerate(views):
             responses = view.responses(frequency)
@@ -81,7 +81,7 @@ def step_figure(
     system = state_space(cast("Linear", model))
     views = linear_views(model, uncertainty, seed)
     with styled():
-        figure = new_figure(7.6, 2.8)
+        figure = new_figure(max(7.6, 2.2 * len(views)), 2.8)
         axes = figure.subplots(1, len(views), squeeze=False)[0]
         for place, view in zip(axes, views, strict=True):
             n = samples or _settling(view)
@@ -118,7 +118,7 @@ def pole_zero_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, s
     """
     views = linear_views(model, uncertainty, seed)
     with styled():
-        figure = new_figure(7.6, 3.8)
+        figure = new_figure(max(7.6, 2.2 * len(views)), 3.8)
         axes = figure.subplots(1, len(views), squeeze=False)[0]
         for place, view in zip(axes, views, strict=True):
             poles, zeros = view.roots(view.F[0]), view.roots(view.B[0])

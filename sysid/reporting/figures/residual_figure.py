@@ -23,7 +23,7 @@ def residual_figure(groups: Dict[str, ResidualRecord]) -> Figure:
     """
     columns = 1 + len(next(iter(groups.values())).inputs)
     with styled():
-        figure = new_figure(7.6, 0.5 + 1.6 * len(groups))
+        figure = new_figure(max(7.6, 1.3 * columns), 0.5 + 1.6 * len(groups))
         rows = figure.subplots(len(groups), columns, squeeze=False, sharex="col")
         for axes, (name, analysis) in zip(rows, groups.items(), strict=True):
             for place, correlation in zip(axes, (analysis.whiteness, *analysis.inputs), strict=True):

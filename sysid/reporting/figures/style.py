@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import io
+import warnings
 from contextlib import AbstractContextManager
 from typing import Any, Final
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import Formatter, LogFormatter, NullFormatter, ScalarFormatter
+
+from sysid.names import visible
 
 # Okabe and Ito, Color Universal Design (2008), without the yellow, which is too faint on white. Neighbours
 # differ in lightness too, and every series has a line style and a marker of its own.
@@ -65,13 +70,44 @@ def styled() -> AbstractContextManager[None]:
 
 
 class Drawing(Figure):
-    """A figure that a notebook shows by itself: pyplot, which does that otherwise, is never imported here."""
+    """A figure that a notebook shows by itself: pyplot, which does that otherwise, is never imported here.
+
+    Its words are words: a name between dollar signs is no formula, and none turns the text around.
+    """
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
         with styled():
             self.savefig(buffer, format="png", dpi=110)
         return buffer.getvalue()
+
+    def draw(self, renderer: Any) -> None:
+        """Draw it, the labels as they are meant."""
+        numbers = set[Text]()
+        beside = self.get_size_inches()[0] / max(1, len({axes.get_position().x0 for axes in self.axes}))
+        for axes in self.axes:
+            titles = {axes.get_title(place) for place in ("left", "center", "right")} if beside < NARROW else set()
+            for text in axes.get_children():
+                if isinstance(text, Text) and text.get_text() in titles:
+                    text.set_text(_fitting(text.get_text(), round(13 * beside)))
+            legend = axes.get_legend()
+            for text in legend.get_texts() if legend is not None and beside < NARROW else ():
+                text.set_text(_fitting(text.get_text(), round(8 * beside)))
+            for axis in (axes.xaxis, axes.yaxis):
+                formatter = axis.get_major_formatter()
+                if isinstance(formatter, _NUMBERS):  # powers of ten are formulae
+                    numbers |= {label for tick in axis.get_major_ticks() for label in (tick.label1, tick.label2)}
+                elif not isinstance(formatter, _Words):
+                    axis.set_major_formatter(_Words(formatter))
+                numbers |= {label for tick in axis.get_minor_ticks() for label in (tick.label1, tick.label2)}
+        for text in self.findobj(Text):
+            if isinstance(text, Text) and text not in numbers:
+                text.set_parse_math(False)
+                text.set_text(_fitting(text.get_text(), UPRIGHT if text.get_rotation() else ACROSS))
+        with warnings.catch_warnings():
+            # A letter that our font lacks stays text in the drawing, and the reader's machine may have it.
+            warnings.filterwarnings("ignore", message="Glyph .* missing")
+            super().draw(renderer)
 
 
 def new_figure(width: float, height: float, *, fixed: bool = False) -> Figure:
@@ -88,3 +124,32 @@ def new_figure(width: float, height: float, *, fixed: bool = False) -> Figure:
     layout: Any = {"figure.constrained_layout.use": not fixed}
     with mpl.rc_context(layout):
         return Drawing(figsize=(width, height))
+
+
+ACROSS, UPRIGHT = 110, 60
+"""Letters of a line across a figure, and along its side: longer ones would leave no room for what is drawn."""
+NARROW = 3.0
+"""Inches of a panel beside others, below which its title has to be as short as it is wide."""
+
+
+def _fitting(text: str, length: int) -> str:
+    lines = visible(text, lines=True).split("\n")
+    return "\n".join(line if len(line) <= length else f"{line[: length - 1]}…" for line in lines)
+
+
+_NUMBERS: Final = (ScalarFormatter, LogFormatter, NullFormatter)
+
+
+class _Words(Formatter):
+    """Labels of ticks that are names."""
+
+    def __init__(self, names: Formatter) -> None:
+        self._names = names
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The label of a tick."""
+        return _fitting(self._names(x, pos), UPRIGHT)
+
+    def set_locs(self, locs: Any) -> None:
+        """Told where the ticks are."""
+        self._names.set_locs(locs)

@@ -9,6 +9,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
+from sysid.names import visible
 from sysid.reporting.figures.style import styled
 
 # A reader's machine need not have the font that the layout was computed with.
@@ -58,7 +59,7 @@ def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
     )
     for place, (tag, text) in enumerate((("title", title), ("desc", description))):
         words = ET.Element(tag, {"id": f"{name}-{tag}"})
-        words.text = text
+        words.text = visible(text, lines=True)
         root.insert(place, words)
     for element in root.iter():
         element.tail = "\n"

@@ -12,6 +12,7 @@ from sysid.code_digest import code_digest
 from sysid.composite.keeper import Decision, Fit, Sample, Task
 from sysid.estimation import CascadeFit, FitResult
 from sysid.models import Cascade
+from sysid.names import slug, task_slug
 from sysid.traces import TraceSet
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.exporting import export_model
@@ -21,7 +22,6 @@ from sysid.workbench.fits.estimates import network_time
 from sysid.workbench.fits.record import is_final, read_fit, write_fit
 from sysid.workbench.fits.steps import STORED_BY
 from sysid.workbench.runner import events
-from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
 from sysid.workbench.runner.store import RunFolder, digest, read_json, strict, write_json
@@ -112,7 +112,7 @@ class Context:
         return [one.value for one in done]
 
     def _kept(self, task: Task[Fit]) -> Done[Fit]:
-        key, form, name = _key(task.runs, task.terms), _FORMS[task.kind], slug(task.name)
+        key, form, name = _key(task.runs, task.terms), _FORMS[task.kind], task_slug(task.name)
         stamp, place = form.stamp.format(name=name), self.store.path / form.place.format(name=name)
         done = self.run.do(
             Step(

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name, candidate_title
+from sysid.names import slug, task_slug
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.finish import EXPORT, MEMBERS, PLACES, SCORING, STRESS, WHOLE
 from sysid.workbench.fits.data import unmade_data
-from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.run import REPORT
 from sysid.workbench.runner.steps import Estimate, Outlined
 
@@ -63,9 +63,9 @@ def _members(config: AssemblyConfig) -> Iterator[Outlined]:
         many = many or len(variants) > 1 or member.output in swept
         for index, variant in enumerate(variants):
             name, title = candidate_name(variant, index), candidate_title(variant, index)
-            yield Outlined(name=f"fit-{slug(name)}", title=title, called=name)
+            yield Outlined(name=f"fit-{task_slug(name)}", title=title, called=name)
             if plan.one_step is not None:
-                yield Outlined(name=f"fit-{slug(f'{name} one step')}", title=f"{title}, one step ahead")
+                yield Outlined(name=f"fit-{task_slug(f'{name} one step')}", title=f"{title}, one step ahead")
     if many:
         yield Outlined(name=CHOOSING, title=CHOOSING_TITLE)
     if plan.retrain is not None:
@@ -73,7 +73,7 @@ def _members(config: AssemblyConfig) -> Iterator[Outlined]:
             for output in plan.retrain.members:
                 mapping = config.composite.member(output).mapping
                 title = f"Retraining {mapping} on what the others put out, round {number + 1}"
-                yield Outlined(name=f"fit-{slug(f'{mapping} retrained {number}')}", title=title)
+                yield Outlined(name=f"fit-{task_slug(f'{mapping} retrained {number}')}", title=title)
 
 
 def _proof(config: AssemblyConfig, beside: Path) -> Iterator[Outlined]:

@@ -6,17 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from rich.markup import escape
 from rich.table import Table
 
 from sysid.errors import ConfigError
 from sysid.ingest import load_dataset, write_trace
+from sysid.names import slug
 from sysid.traces import TraceSet
 from sysid.units import Reference
 from sysid.validation.annotator import Annotator
 from sysid.workbench.annotation import annotated_set, find_annotator
 from sysid.workbench.runner.console import console
-from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.store import write_bytes
 
 
@@ -57,10 +56,10 @@ def _table(traces: TraceSet, annotator: Annotator) -> Table:
     table.add_column("case")
     table.add_column("changes", justify="right")
     for k in seen:
-        table.add_column(escape(annotator.labels[k]), justify="right")
+        table.add_column(annotator.labels[k], justify="right")
     for name, column in states.items():
         shares = [f"{100.0 * np.mean(column == k):.1f} %" for k in seen]
-        table.add_row(escape(name), str(int(np.count_nonzero(np.diff(column)))), *shares)
+        table.add_row(name, str(int(np.count_nonzero(np.diff(column)))), *shares)
     return table
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from sysid.errors import ConfigError
 from sysid.export.bundle import zip_bundle
+from sysid.names import slug
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.kinds import RunRequest, kind_of, kinds
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.dry_run import DryRun
-from sysid.workbench.runner.naming import slug
 from sysid.workbench.runner.program import look
 from sysid.workbench.runner.store import RunFolder
 

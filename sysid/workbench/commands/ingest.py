@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from sysid.errors import ConfigError
@@ -94,7 +93,7 @@ def _show_file(found: FileFinding, propose: Path | None) -> None:
             remedy="name another one; nothing was changed",
         )
     target = console()
-    told = f" ({escape(found.time_told)})" if found.time_told else ""
+    told = f" ({found.time_told})" if found.time_told else ""
     step = f"one every {found.sample_time:g} s{told}, {(found.samples - 1) * found.sample_time:g} s in all"
     if found.time.step is not None and found.time_guessed:
         step = f"no time stamps: {found.time.step:g} s between them is a guess"
@@ -109,10 +108,10 @@ def _show_file(found: FileFinding, propose: Path | None) -> None:
         remark = column.problem or column.aside or said or ("never changes" if column.constant else "")
         unit = f"{column.unit}{reference}{guess}"
         span = (f"{column.minimum:.6g}", f"{column.maximum:.6g}")
-        table.add_row(escape(column.name), escape(unit), *span, str(column.missing), escape(remark))
+        table.add_row(column.name, unit, *span, str(column.missing), remark)
     target.print(table)
     for problem in found.problems:
-        target.print(f"look at: {escape(problem)}", soft_wrap=True)
+        target.print(f"look at: {problem}", soft_wrap=True)
     if propose is not None:
         write_bytes(propose, (schema_line(propose) + proposal).encode())
     target.print(f"picture: {_picture(found)}", soft_wrap=True)
@@ -151,7 +150,7 @@ def _show_dataset(traces: TraceSet, path: Path) -> None:
     target.print(f"{traces.name}: {nearby(path)}, one sample every {traces.sample_time:g} s", soft_wrap=True)
     table = Table(header_style="bold")
     for heading in ("case", "role", "samples", "seconds", *(channel.label for channel in traces.channels)):
-        table.add_column(escape(heading), justify="left" if heading in {"case", "role"} else "right")
+        table.add_column(heading, justify="left" if heading in {"case", "role"} else "right")
     for trace in traces:
         low, high = trace.values.min(axis=0), trace.values.max(axis=0)
         spans = [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)]
@@ -159,5 +158,5 @@ def _show_dataset(traces: TraceSet, path: Path) -> None:
     target.print(table)
     for trace in traces:
         for sentence in trace.provenance:
-            target.print(f"{trace.name}: {escape(sentence)}", soft_wrap=True)
+            target.print(f"{trace.name}: {sentence}", soft_wrap=True)
     target.print(f"digest {traces.digest}")

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from rich.markup import escape
 from rich.table import Table
 
 from sysid.api.fitting import load
 from sysid.api.orders import OrderSearch, search_orders
 from sysid.errors import ConfigError
 from sysid.estimation.linear.order_search import Criterion
+from sysid.names import slug
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.numbers import number
 from sysid.validation.metrics import percent
 from sysid.workbench.runner.console import console
-from sysid.workbench.runner.naming import nearby, slug
+from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.store import write_bytes
 
 ROWS = 15
@@ -54,30 +54,28 @@ def orders_command(
     found = search_orders(traces, mapping, max_na=max_na, max_nb=max_nb, max_nk=max_nk)
     console().print(_table(found))
     for note in found.notes:
-        console().print(f"note: {escape(note)}", soft_wrap=True)
+        console().print(f"note: {note}", soft_wrap=True)
     with styled():
         drawing = svg(found.plot(), title="Orders", description=f"Loss against size, {mapping}", name="orders")
     picture = Path(f"{slug(traces.name)}.orders.svg")
     write_bytes(picture, drawing.encode())
-    console().print(f"picture: {escape(str(nearby(picture)))}", soft_wrap=True)
+    console().print(f"picture: {nearby(picture)}", soft_wrap=True)
     best = found.best()
     nb, nk = list(best.nb), list(best.nk)
-    console().print(
-        escape(f"in a pipeline: structure: {{kind: ARX, na: {best.na}, nb: {nb}, nk: {nk}}}"), soft_wrap=True
-    )
+    console().print(f"in a pipeline: structure: {{kind: ARX, na: {best.na}, nb: {nb}, nk: {nk}}}", soft_wrap=True)
 
 
 def _table(found: OrderSearch) -> Table:
     unit = found.traces[found.traces.names[0]].channel(found.mapping.output).unit
-    title = escape(f"{len(found.losses):,} structures of {found.mapping}, {found.chosen_by}")
+    title = f"{len(found.losses):,} structures of {found.mapping}, {found.chosen_by}"
     table = Table(title=title, title_justify="left")
     table.add_column("structure")
     for head in ("parameters", f"one-step mse [{unit}²]", "AICc", "BIC", "free run, fit %"):
-        table.add_column(escape(head), justify="right")
+        table.add_column(head, justify="right")
     for one in found.finalists[:ROWS]:
         aicc, bic = (found.score(one, criterion) for criterion in (Criterion.AICC, Criterion.BIC))
         table.add_row(
-            escape(one.fit.model.structure.label),
+            one.fit.model.structure.label,
             str(one.fit.model.n_parameters),
             number(one.one_step_mse),
             f"{aicc:.1f}",

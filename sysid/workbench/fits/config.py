@@ -22,6 +22,7 @@ from sysid.errors import ConfigError
 from sysid.estimation.estimators import Options, estimator_of
 from sysid.estimation.estimators import check as check_request
 from sysid.models import Start, StartKind
+from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
     STRICT,
@@ -34,7 +35,6 @@ from sysid.workbench.fields import (
     given_options,
     options_config,
 )
-from sysid.workbench.runner.naming import slug
 from sysid.workbench.stability import StabilityConfig
 from sysid.yaml_files import FieldError, check, parse_yaml, read_yaml
 

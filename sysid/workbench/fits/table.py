@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from sysid.reporting.results import FitRecord, Results
 
@@ -25,7 +25,7 @@ def table_of_fits(results: Results) -> Table:
     table.add_column("loop")
     cases = list(results.data.cases)
     for case in cases:
-        table.add_column(f"{case}\n[dim]{results.data.cases[case].role.value}[/]", justify="right")
+        table.add_column(Text.assemble(f"{case}\n", (results.data.cases[case].role.value, "dim")), justify="right")
     if results.selection:
         table.add_column("selection", justify="right")
     table.add_column("training", justify="right")
@@ -38,4 +38,4 @@ def table_of_fits(results: Results) -> Table:
 def _row(fit: FitRecord, cases: list[str], *, selection: bool) -> list[str]:
     figures = [f"{fit.cases[case].free_run.mse:.3e}" for case in cases]
     chosen = [f"{fit.selection_mse:.3e}"] if selection else []
-    return [escape(fit.name), fit.label, fit.loop.value, *figures, *chosen, f"{fit.train_time_s:.1f} s"]
+    return [fit.name, fit.label, fit.loop.value, *figures, *chosen, f"{fit.train_time_s:.1f} s"]

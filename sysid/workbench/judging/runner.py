@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.errors import ConfigError
+from sysid.names import slug
 from sysid.reporting.judging.results import FOLDER, JudgementResults, SubjectRecord, parse_judgement
 from sysid.reporting.judging.tables import judgement_headline
 from sysid.reporting.records import DataSetRecord
@@ -17,7 +18,7 @@ from sysid.workbench.judging.judge import Judge, find_judge
 from sysid.workbench.judging.sources import Found, find_model, run_folder_of
 from sysid.workbench.runner.events import JudgementReady, Warned
 from sysid.workbench.runner.kept_steps import kept_steps
-from sysid.workbench.runner.naming import nearby, slug
+from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import REPORT, Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Estimate, Outlined, Step, Work

@@ -1,11 +1,59 @@
-"""Where results are shown; apart from those who are told of a run, so that looking into a file loads no estimation."""
+"""The console on which the commands show what they found: text is text there, whatever a name holds."""
 
 from __future__ import annotations
 
-from rich.console import Console
+import codecs
+import sys
+from collections.abc import Iterable
+from typing import Any, TextIO
+
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+
+from sysid.names import visible
 
 PIPED_WIDTH = 160
 """Columns where there is no terminal to ask: enough for a table of five cases on one line."""
+
+PLAIN = {
+    **{
+        "→": "->",
+        "←": "<-",
+        "²": "^2",
+        "³": "^3",
+        "·": "*",
+        "×": "x",
+        "µ": "u",
+        "μ": "u",
+        "°": "deg",
+        "±": "+-",
+        "≤": "<=",
+    },
+    **{
+        "≥": ">=",
+        "√": "sqrt",
+        "–": "-",
+        "—": "-",
+        "…": "...",
+        "’": "'",
+        "‘": "'",
+        "“": '"',
+        "”": '"',
+        "✓": "*",
+        "é": "e",
+    },
+}
+"""What stands for a character where there is nothing but ASCII."""
+
+
+class TextConsole(Console):
+    """A console that takes every text for text: no markup unless it is asked for, no command of a terminal at all."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Segments of which no text holds a control character."""
+        for segment in super().render(renderable, options):
+            text, style, control = segment
+            yield segment if control else Segment(visible(text, lines=True), style)
 
 
 def console() -> Console:
@@ -14,5 +62,34 @@ def console() -> Console:
     Returns:
         A console on standard output.
     """
-    plain = Console(highlight=False)
-    return plain if plain.is_terminal else Console(highlight=False, width=PIPED_WIDTH)
+    fixed: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}
+    plain = TextConsole(**fixed)
+    return plain if plain.is_terminal else TextConsole(**fixed, width=PIPED_WIDTH)
+
+
+def say(text: str) -> None:
+    """Tell something on standard error.
+
+    Args:
+        text: Any text.
+    """
+    sys.stderr.write(visible(text, lines=True) + "\n")
+
+
+def speak_plainly() -> None:
+    """Write what the terminal's alphabet lacks in letters that it has: an error of encoding would end the command."""
+    codecs.register_error("sysid.plain", _plain)
+    for stream in (sys.stdout, sys.stderr):
+        _lenient(stream)
+
+
+def _lenient(stream: TextIO) -> None:
+    reconfigure = getattr(stream, "reconfigure", None)
+    if reconfigure is not None and (stream.encoding or "").lower().replace("-", "") != "utf8":
+        reconfigure(errors="sysid.plain")
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(PLAIN.get(character, "?") for character in error.object[error.start : error.end]), error.end

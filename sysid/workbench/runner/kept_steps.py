@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
-from sysid.workbench.runner.naming import slug
+from sysid.names import slug
 from sysid.workbench.runner.steps import Step, Work
 from sysid.workbench.runner.store import RunFolder, digest, read_json, strict, write_json
 

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
+from sysid.names import visible
 from sysid.workbench.runner.events import Event, RunStarted, StepDone, StepProgress, StepStarted, Warned
 
 if TYPE_CHECKING:
@@ -39,15 +40,17 @@ class Screen:
                 self._start(event.step)
             case StepProgress() if self._progress is not None and self._task is not None:
                 share = None if event.fraction is None else 100.0 * event.fraction
-                self._progress.update(self._task, completed=share, detail=escape(event.detail))
+                self._progress.update(self._task, completed=share, detail=visible(event.detail))
                 if share is not None:
                     self._progress.update(self._task, total=100.0)
             case StepDone():
                 self.close()
-                mark = "[dim]stored[/]" if event.stored else "[green]done  [/]"
-                self._console.print(f"{mark}  {escape(event.step)}[dim]  {escape(event.detail)}[/]", soft_wrap=True)
+                mark = ("stored", "dim") if event.stored else ("done  ", "green")
+                told = Text.assemble(mark, f"  {visible(event.step)}", (f"  {visible(event.detail)}", "dim"))
+                self._console.print(told, soft_wrap=True)
             case Warned():
-                self._console.print(f"[yellow]warning[/] {escape(event.text)}", soft_wrap=True)
+                told = Text.assemble(("warning", "yellow"), f" {visible(event.text, lines=True)}")
+                self._console.print(told, soft_wrap=True)
             case _:
                 pass
 
@@ -63,16 +66,16 @@ class Screen:
             return
         self._progress = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=24),
             TimeElapsedColumn(),
-            TextColumn("[dim]left"),
+            TextColumn("left", style="dim"),
             TimeRemainingColumn(),
-            TextColumn("[dim]{task.fields[detail]}"),
+            TextColumn("{task.fields[detail]}", style="dim", markup=False),
             console=self._console,
             transient=True,
         )
-        self._task = self._progress.add_task(escape(step), total=None, detail="")
+        self._task = self._progress.add_task(visible(step), total=None, detail="")
         self._progress.start()
 
 
@@ -114,7 +117,7 @@ class LogFile:
     def _write(self, text: str) -> None:
         if self._path is not None:
             with self._path.open("a", encoding="utf-8") as log:
-                log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')}  {text}\n")
+                log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')}  {visible(text)}\n")
 
 
 def _standing(event: StepProgress, elapsed_s: float) -> str:
@@ -163,5 +166,5 @@ def table_of_steps(planned: Sequence[PlannedStep]) -> Table:
     table.add_column("how that is known")
     for one in planned:
         seconds = "-" if one.stored else "?" if one.seconds is None else duration(one.seconds)
-        table.add_row(escape(one.step), seconds, escape(one.basis))
+        table.add_row(one.step, seconds, one.basis)
     return table

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from rich.markup import escape
 from rich.table import Table
 
 from sysid.reporting.sweep.record import SweepRecord, Trial
@@ -22,9 +21,9 @@ def table_of_trials(record: SweepRecord) -> Table:
     """
     table = Table(title=f"Best of {len(record.trials)} trials", title_justify="left", header_style="bold")
     for name in ("trial", "structure", "parameters", record.words(record.choose_by), record.words("run_time")):
-        table.add_column(escape(name), justify="left" if name == "structure" else "right")
+        table.add_column(name, justify="left" if name == "structure" else "right")
     ranked: list[Trial] = sorted(record.tried_in_full, key=record.choice)
     for trial in ranked[:SHOWN]:
-        cells = [str(trial.number), escape(trial.label), str(trial.parameters)]
+        cells = [str(trial.number), trial.label, str(trial.parameters)]
         table.add_row(*cells, f"{record.choice(trial):.4g}", f"{record.figure(trial, 'run_time'):.4g}")
     return table

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.names import distinct, markdown_code, markdown_inline, shortened, tracking_key, tracking_text, visible
 from sysid.traces import Role
 from sysid.validation.metrics import MERITS, mean_fit
 from sysid.workbench.runner.events import DataLoaded, FitReady, RunStarted
@@ -48,7 +48,8 @@ def run_name(ready: FitReady) -> str:
         For example ``BP+AR -> BC · NARX 4/4/20 · closed``.
     """
     model = ready.fit.model
-    return f"{model.mapping} · {model.structure.label} · {ready.fit.loop.value}"
+    mapping = shortened(visible(model.mapping), 180)
+    return f"{mapping} · {model.structure.label} · {ready.fit.loop.value}"
 
 
 def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
@@ -62,7 +63,7 @@ def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
     Returns:
         Texts by name.
     """
-    return {
+    found = {
         "pipeline": run.pipeline,
         "pipeline_run": run.run_id,
         "fit": ready.config.name,
@@ -74,6 +75,7 @@ def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
         "output_unit": ready.fit.model.output_unit,
         "folder": str(ready.folder),
     } | ({"initial_fit": ready.config.initial} if ready.config.initial else {})
+    return {name: tracking_text(value) for name, value in found.items()}
 
 
 def description(ready: FitReady, run: RunStarted, links: Mapping[str, str]) -> str:
@@ -88,10 +90,11 @@ def description(ready: FitReady, run: RunStarted, links: Mapping[str, str]) -> s
         Markdown.
     """
     # MLflow shows the first few lines and hides the rest behind a click: what leads elsewhere stands first.
-    leads = [f"[{words}]({address})" for words, address in links.items()]
-    lines = [" · ".join([f"**{ready.config.name}** of the pipeline `{run.pipeline}`", *leads]), ""]
-    lines += [ready.fit.status.value, "", *(f"* {note}" for note in ready.fit.notes)]
-    return "\n".join([*lines, "", f"Made by `{run.command}`."])
+    leads = [f"[{markdown_inline(words)}]({address})" for words, address in links.items()]
+    name, pipeline = markdown_inline(ready.config.name.strip()), markdown_code(run.pipeline)
+    lines = [" · ".join([f"**{name}** of the pipeline {pipeline}", *leads]), ""]
+    lines += [ready.fit.status.value, "", *(f"* {markdown_inline(note)}" for note in ready.fit.notes)]
+    return "\n".join([*lines, "", f"Made by {markdown_code(run.command)}."])
 
 
 def parameters(ready: FitReady) -> dict[str, str]:
@@ -108,7 +111,7 @@ def parameters(ready: FitReady) -> dict[str, str]:
     training = ready.config.training_options(ready.pipeline.seed)
     if training is not None:
         chosen |= {f"training.{name}": getattr(value, "value", value) for name, value in vars(training).items()}
-    return {name: str(value) for name, value in chosen.items()}
+    return {name: tracking_text(value) for name, value in chosen.items()}
 
 
 def metrics(ready: FitReady) -> dict[str, float]:
@@ -138,8 +141,9 @@ def metrics(ready: FitReady) -> dict[str, float]:
         found["effective_parameters"] = fit.evidence.total_effective_parameters
     if fit.stability is not None:
         found["unstable_sequences"] = fit.stability["unbounded"] + fit.stability["unsettled"]
+    keys = distinct(cases, tracking_key)
     for name, case in cases.items():
-        case_name = key(name)
+        case_name = keys[name]
         found[f"free_run_mse/{case_name}"] = case.free_run.mse
         found[f"one_step_mse/{case_name}"] = case.one_step.mse
         found |= {f"{one.key}/{case_name}": getattr(case.free_run, one.key) for one in MERITS[1:]}
@@ -168,8 +172,9 @@ def pictures(ready: FitReady) -> Iterator[tuple[str, NDArray[np.uint8]]]:
     Yields:
         Key and picture, shape ``(height, width, 3)``.
     """
+    keys = distinct(ready.evaluation.cases, tracking_key)
     for name, case in ready.evaluation.cases.items():
-        yield f"target and output/{key(name)}", _picture(ready, case)
+        yield f"target and output/{keys[name]}", _picture(ready, case)
 
 
 def _picture(ready: FitReady, case: CaseResult) -> NDArray[np.uint8]:
@@ -203,15 +208,3 @@ def batches(values: Sequence[Any]) -> Iterator[Sequence[Any]]:
     """
     for first in range(0, len(values), MAX_METRICS):
         yield values[first : first + MAX_METRICS]
-
-
-def key(name: str) -> str:
-    """A name with every character that a tracking store refuses as an underscore.
-
-    Args:
-        name: For example ``"VAL 1 (µ = 0.3)"``.
-
-    Returns:
-        For example ``"VAL 1 __ _ 0.3_"``.
-    """
-    return re.sub(r"[^A-Za-z0-9_. -]", "_", name)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from sysid.names import slug, tracking_key
 from sysid.workbench.runner.events import JudgementReady
-from sysid.workbench.runner.naming import slug
-from sysid.workbench.tracking.fit_values import batches, key
+from sysid.workbench.tracking.fit_values import batches
 
 
 def log_judgement(client: Any, ready: JudgementReady, *, key_tag: str, experiment: str, metric: Any) -> None:
@@ -58,7 +58,7 @@ def _runs_of(client: Any, ready: JudgementReady, key_tag: str) -> list[str]:
 def _log(client: Any, run_id: str, ready: JudgementReady, metric: Any) -> None:
     now = int(time.time() * 1000)
     values = [
-        metric(f"{slug(ready.pipeline)}/{'/'.join(key(part) for part in name.split('/'))}", value, now, 0)
+        metric(f"{slug(ready.pipeline)}/{'/'.join(tracking_key(part) for part in name.split('/'))}", value, now, 0)
         for name, value in ready.metrics.items()
     ]
     for batch in batches(values):

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from sysid.export import zip_bundle
+from sysid.names import distinct, slug, tracking_key
 from sysid.workbench.runner.events import (
     BundleReady,
     DataLoaded,
@@ -27,7 +28,6 @@ from sysid.workbench.runner.events import (
     RunStarted,
     SweepReady,
 )
-from sysid.workbench.runner.naming import slug
 from sysid.workbench.tracking import fit_run as tracked_fit
 from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_store as tracking
@@ -131,7 +131,7 @@ class Tracker:
             tracked_fit.log_values(self.client, run_id, ready, tracking.entities())
             tracking.log_data(self.client, run_id, self.data.traces)
             tracked_fit.log_pictures(self.client, run_id, ready)
-            views.show(self.client, experiment, [tracked.key(name) for name in ready.evaluation.cases])
+            views.show(self.client, experiment, list(distinct(ready.evaluation.cases, tracking_key).values()))
             status = "FINISHED"
         finally:
             self.client.set_terminated(run_id, status=status)

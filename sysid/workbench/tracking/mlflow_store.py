@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.names import read_sides, slug, told_apart, tracking_text
 from sysid.traces import TraceSet
 from sysid.workbench.runner.events import FitReady
-from sysid.workbench.runner.naming import slug
 from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_views as views
 from sysid.workbench.tracking.fit_run import Entities
@@ -35,6 +35,8 @@ QUIET = {
 """Settings that MLflow reads when it is imported; what the user has set stays."""
 
 
+LONGEST_NAME = 250
+"""Letters of an experiment's name: MLflow takes 500 bytes."""
 TRACKING_VARIABLE = "MLFLOW_TRACKING_URI"
 """MLflow's own environment variable for the store."""
 
@@ -116,11 +118,13 @@ def experiment_of(client: Any, name: str, artifacts: Path | None) -> str:
     """
     from mlflow.exceptions import MlflowException
 
+    names = [one for side in read_sides(name) for one in side]
+    name = tracking_text(name, LONGEST_NAME)
     found = client.get_experiment_by_name(name)
     if found is None:
         location = None
         if artifacts is not None:
-            location = (artifacts / slug(name)).resolve().as_uri()
+            location = (artifacts / told_apart(slug(name), names)).resolve().as_uri()
         try:
             # Otherwise MLflow asks every visitor what kind of experiment it is.
             tags = {"mlflow.experimentKind": "custom_model_development"}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.workbench.runner.naming import slug
+from sysid.names import read_sides, slug, told_apart
 
 CANDIDATE = "candidate"
 CHAMPION = "champion"
@@ -54,7 +54,9 @@ def registered_name(mapping: str) -> str:
         >>> registered_name("BP+AR -> BC")
         'bp-ar-to-bc'
     """
-    return "-to-".join(slug(side) for side in mapping.split("->"))
+    sides = read_sides(mapping)
+    fitted = "-to-".join(slug("+".join(side)) for side in sides)
+    return told_apart(fitted, [name for side in sides for name in side])
 
 
 def parsed(address: str) -> tuple[str, str | None, str | None]:

@@ -6,6 +6,8 @@ No tracking tool is imported here: its client and its entities come from :mod:`s
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import tempfile
 import time
@@ -15,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.names import csv_cell, distinct, shortened, tracking_key, tracking_text
 from sysid.reporting.sweep.record import SWEEP_FILE, SweepRecord, Trial
 from sysid.workbench.runner.events import SweepReady
 from sysid.workbench.runner.store import digest
 from sysid.workbench.tracking.fit_run import Entities
-from sysid.workbench.tracking.fit_values import key
 
 SUMMARY = "summary"
 """Value of the tag ``kind`` of the run that has the figures."""
@@ -37,7 +39,7 @@ def experiment_name(record: SweepRecord) -> str:
     Returns:
         For example ``BP+AR -> BC · sweep closed-loop-sweep``.
     """
-    return f"{record.mapping} · sweep {record.name}"
+    return f"{shortened(record.mapping, 180)} · sweep {record.name}"
 
 
 def log_sweep(client: Any, ready: SweepReady, *, key_tag: str, experiment: str, entities: Entities) -> int:
@@ -97,11 +99,11 @@ def _log_trial(
         "dropped": "no" if trial.dropped_at is None else f"after look {trial.dropped_at}",
     }
     run = client.create_run(experiment, run_name=f"{trial.number} · {trial.label}", tags=tags)
-    now = int(time.time() * 1000)
+    now, keys = int(time.time() * 1000), distinct(trial.values, tracking_key)
     client.log_batch(
         run.info.run_id,
         metrics=[entities.metric(name, value, now, 0) for name, value in metrics(trial).items()],
-        params=[entities.param(name, str(value)) for name, value in trial.values.items()],
+        params=[entities.param(keys[name], tracking_text(value)) for name, value in trial.values.items()],
     )
     # Whole, however the fit ended: that is what its tag says.
     client.set_terminated(run.info.run_id, status="FINISHED")
@@ -130,7 +132,8 @@ def metrics(trial: Trial) -> dict[str, float]:
         "cpu_s": trial.cpu_s,
         "trial": trial.number,
     }
-    found |= {f"free_run_mse/{key(name)}": case.free_run_mse for name, case in trial.cases.items()}
+    keys = distinct(trial.cases, tracking_key)
+    found |= {f"free_run_mse/{keys[name]}": case.free_run_mse for name, case in trial.cases.items()}
     return {name: float(value) for name, value in found.items() if math.isfinite(value)}
 
 
@@ -191,10 +194,12 @@ def _csv(record: SweepRecord) -> str:
     """All trials, one a line."""
     names = list(dict.fromkeys(name for trial in record.trials for name in trial.values))
     columns = sorted({name for trial in record.trials for name in metrics(trial)})
-    lines = [",".join(["label", "status", "dropped_at", *names, *columns])]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(map(csv_cell, ["label", "status", "dropped_at", *names, *columns]))
     for trial in record.trials:
         values = metrics(trial)
         cells = [trial.label, trial.status, trial.dropped_at or "", *(trial.values.get(name, "") for name in names)]
-        cells += [repr(values[name]) if name in values else "" for name in columns]
-        lines.append(",".join(f'"{cell}"' if "," in str(cell) else str(cell) for cell in cells))
-    return "\n".join(lines) + "\n"
+        cells += [values.get(name, "") for name in columns]
+        writer.writerow(csv_cell(cell) if isinstance(cell, str) else cell for cell in cells)
+    return text.getvalue()
