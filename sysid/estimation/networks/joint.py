@@ -50,8 +50,6 @@ class JointTraining:
         soft_margin: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
             its logarithm, so that a few traces on which the free run is lost do not rule the loss (``soft_margin.py``).
         workers: Records that are worked on at the same time.
-        basis: ``levels and rates`` or ``plain``, as for a network alone.
-        evidence_after: Iterations before the evidence first moves the precisions of the priors.
     """
 
     max_iterations: int = 100
@@ -66,8 +64,6 @@ class JointTraining:
     leverage: float = float("inf")
     soft_margin: float = float("inf")
     workers: int = 2
-    basis: str = "levels and rates"
-    evidence_after: int = 20
 
     def __post_init__(self) -> None:
         for name in ("max_iterations", "patience", "looks", "starts", "stride", "workers"):
@@ -76,14 +72,6 @@ class JointTraining:
         for name in ("moves", "leverage", "soft_margin"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
-        if self.basis not in {"levels and rates", "plain"}:
-            raise ConfigError(
-                "unknown value of basis",
-                where="basis",
-                expected="levels and rates or plain",
-                got=repr(self.basis),
-                remedy="write for example basis: levels and rates",
-            )
 
     def provider(
         self,
@@ -319,7 +307,7 @@ class Joint:
             tolerance=training.tolerance,
             patience=training.patience,
         )
-        return LevenbergMarquardt(termination=limits, evidence_after=training.evidence_after, on_iteration=report)
+        return LevenbergMarquardt(termination=limits, on_iteration=report)
 
     def _candidate(
         self, start: tuple[int, int | None], theta: NDArray[np.float64], solution: Solution | None

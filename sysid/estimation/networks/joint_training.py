@@ -54,7 +54,7 @@ def fit_cascade(
     training = training or JointTraining()
     provider = training.provider(cascade, traces, unit_errors(cascade, traces, targets), trained)
     records = [_channels(cascade, trace) for trace in traces]
-    layout = JointLayout.of(provider.members, records, plain=training.basis == "plain")
+    layout = JointLayout.of(provider.members, records)
     joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)
     return joint.fit([(None, layout.in_basis(provider.theta))])
 

@@ -196,15 +196,12 @@ class JointLayout:
     to_plain: sparse.csr_array
 
     @classmethod
-    def of(
-        cls, models: Sequence[Member], records: Sequence[dict[str, NDArray[np.float64]]], *, plain: bool
-    ) -> JointLayout:
+    def of(cls, models: Sequence[Member], records: Sequence[dict[str, NDArray[np.float64]]]) -> JointLayout:
         """The layout of some members.
 
         Args:
             models: The members that are trained, in the order of the parameters.
             records: What their bases are scaled to; see :func:`basis_of`.
-            plain: Train on the lagged samples as they are.
 
         Returns:
             The layout.
@@ -214,7 +211,7 @@ class JointLayout:
             part = Part.of(model)
             if part is not None:
                 layout = MemberLayout.of(model, part)
-                basis = RegressorBasis.identity(layout.lags) if plain else basis_of(model, layout, records)
+                basis = basis_of(model, layout, records)
                 layouts.append(layout)
                 blocks.append(layout.to_plain(basis))
         return cls(members=tuple(layouts), to_plain=sparse.csr_array(sparse.block_diag(blocks)))

@@ -62,7 +62,7 @@ def fit_vector_narx(
     }
     provider = training.provider(cascade, traces, errors)
     records = [{name: trace[name] for name in (*mapping.inputs, *mapping.outputs)} for trace in traces]
-    layout = JointLayout.of(provider.members, records, plain=training.basis == "plain")
+    layout = JointLayout.of(provider.members, records)
     starts: list[tuple[int | None, NDArray[np.float64]]] = []
     if initial is not None:
         starts.append((None, layout.in_basis(provider.theta)))
