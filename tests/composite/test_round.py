@@ -92,9 +92,10 @@ def test_its_error_is_that_by_which_it_chooses_among_its_states() -> None:
     fit = ready.put(ready.fit())
     start, end = ready.error(ready.whole), ready.error(fit.model)
     assert end < start
-    chosen, others = fit.notes
-    assert chosen.endswith(f"on the selection traces {end:.4g}.")
-    assert f" {start:.4g} (0)" in others
+    (chosen,) = [one for one in fit.attempts if one.chosen]
+    given = fit.attempts[0]
+    assert chosen.selection_mse == pytest.approx(end)
+    assert (given.iterations, given.status, given.selection_mse) == (0, "", pytest.approx(start))
 
 
 def test_a_target_that_is_met_exactly_does_not_outweigh_the_others() -> None:
@@ -109,7 +110,7 @@ def test_a_target_that_is_met_exactly_does_not_outweigh_the_others() -> None:
     )
     start = ready.error(ready.whole)
     assert start == pytest.approx(np.sqrt(1e-6 * np.mean((own["BC"] - exact["BC"]) ** 2) / 2.0**2))
-    assert any(f"{start:.4g}" in said for said in ready.fit().notes)
+    assert start == pytest.approx(ready.fit().attempts[0].selection_mse)
 
 
 def test_members_that_are_named_are_the_ones_trained(monkeypatch: pytest.MonkeyPatch) -> None:

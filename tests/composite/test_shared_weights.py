@@ -116,9 +116,9 @@ def test_after_the_round_every_place_has_the_same_new_weights():
         assert fit.model.member(f"{name}9").mapping == before.member(f"{name}9").mapping
     for name in ("BP", "BP9"):
         assert_array_equal(fit.model.member(name).theta, before.member(name).theta)
-    chosen, others = fit.notes
-    assert chosen.endswith(f"on the selection traces {ready.error(fit.model):.4g}.")
-    assert f" {ready.error(before):.4g} (0)" in others
+    (chosen,) = [one for one in fit.attempts if one.chosen]
+    assert chosen.selection_mse == pytest.approx(ready.error(fit.model))
+    assert fit.attempts[0].selection_mse == pytest.approx(ready.error(before))
 
 
 def test_what_a_member_has_come_to_read_it_reads_at_its_own_place():

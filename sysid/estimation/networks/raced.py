@@ -103,6 +103,7 @@ def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[A
             chosen=candidate is choice.chosen,
             members=tuple(number + 1 for number in candidate.members),
             without=candidate.without,
+            status=candidate.solution.status.name,
         )
         for candidate, stable in zip(candidates, choice.stable, strict=True)
     ]

@@ -62,6 +62,8 @@ def test_the_fit_survives_storing(fit):
     unseen = measured(seed=3)
     assert_array_equal(again.model.simulate_trace(unseen).values, fit.model.simulate_trace(unseen).values)
     assert (again.status, again.errors, again.notes) == (fit.status, fit.errors, fit.notes)
+    assert repr(again.attempts) == repr(fit.attempts), "every start at every look"
+    assert sum(one.chosen for one in fit.attempts) == 1
 
 
 def test_the_downstream_target_alone_moves_upstream_members():
@@ -94,7 +96,7 @@ def test_what_is_exactly_right_does_not_outweigh_the_rest():
     fit = fit_cascade(
         TRUTH, [measured()], targets=errors, training=replace(TRAINING, max_iterations=1), selection=[measured(seed=2)]
     )
-    assert "on the selection traces 1e-06" in fit.notes[0]
+    assert [one.selection_mse for one in fit.attempts if one.chosen] == [pytest.approx(1e-6)]
 
 
 def test_a_fit_is_the_same_every_time():
