@@ -180,3 +180,14 @@ def test_a_missing_description_says_how_to_get_one(tmp_path: Path) -> None:
 def test_bytes_that_are_not_text_are_refused(write: Write) -> None:
     with pytest.raises(ConfigError, match=r"(?s)cannot be read.*UTF-8"):
         read_description(write("dataset.yaml", b"\xff\xfe\x00name"))
+
+
+def test_the_page_about_files_shows_descriptions_that_are_valid(tmp_path: Path) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "reading-files.md").read_text(encoding="utf-8")
+    shown = [
+        block for block in re.findall(r"^```yaml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL) if "cases:" in block
+    ]
+    assert shown
+    for block in shown:
+        (tmp_path / "dataset.yaml").write_text(block)
+        assert read_description(tmp_path / "dataset.yaml").cases
