@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import math
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
@@ -33,7 +34,7 @@ from sysid.estimation.stability.check import (
     PoleCheck,
     StabilityOptions,
 )
-from sysid.models import ARX, NARX, AbstractStructure, Mapping, NeuralStateSpace, Start, TransferFunction
+from sysid.models import ARX, NARX, AbstractModel, AbstractStructure, Mapping, NeuralStateSpace, Start, TransferFunction
 from sysid.traces import Trace
 
 Options = Training | TransferFunctionTraining
@@ -325,14 +326,8 @@ def fit(
     """
     row = estimator_of(structure)
     row.check(training, None if initial is None else initial.model.structure, structure, len(mapping.inputs))
-    if initial is not None and initial.model.mapping != mapping:
-        raise ConfigError(
-            "the initial fit is of another mapping",
-            where="initial",
-            expected=str(mapping),
-            got=str(initial.model.mapping),
-            remedy="start from a fit of this mapping, its inputs in this order, or leave initial out",
-        )
+    if initial is not None:
+        _check_terms(initial.model, mapping, traces[0].sample_time)
     return row.run(
         traces,
         mapping,
@@ -347,6 +342,20 @@ def fit(
         on_checkpoint=on_checkpoint,
         on_progress=on_progress,
     )
+
+
+def _check_terms(model: AbstractModel, mapping: Mapping, sample_time: float) -> None:
+    """Refuse an initial fit whose lags are others' samples."""
+    other = model.mapping != mapping
+    if other or not math.isclose(model.sample_time, sample_time, rel_tol=1e-9):
+        raise ConfigError(
+            f"the initial fit {'is of another mapping' if other else 'has another sample time'}",
+            where="initial",
+            expected=f"{mapping}, every {sample_time:g} s",
+            got=f"{model.mapping}, every {model.sample_time:g} s",
+            remedy="start from a fit of this mapping, its inputs in this order and its samples as far apart, or leave "
+            "initial out",
+        )
 
 
 def with_stability(fitted: FitResult, traces: Sequence[Trace], stability: StabilityOptions | None) -> FitResult:

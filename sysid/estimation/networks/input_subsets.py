@@ -2,7 +2,7 @@ r"""Some starts of a race see only some of the inputs: what an input misleads to
 
 An input may explain the estimation record for a reason that holds there alone. The record does not tell which inputs
 these are, and the evidence prunes only what explains nothing. Starts that differ in what they see differ where it
-matters, in what they make of inputs that they have not met before: a committee of them (``committee.py``) is right more
+matters, in what they make of inputs that they have not met before: a committee of them (``ensemble.py``) is right more
 often than one of starts that differ in their random weights alone (Ho 1998, "The random subspace method for
 constructing decision forests", there for trees).
 

@@ -39,16 +39,16 @@ class Training:
             copies that differ in level alone tell the network which to follow, and how far a sensor may be off.
         regularisation: ``None`` lets the evidence weigh the weights' sizes against the residuals, group by group. A
             number is that weight, the same for all and never changed: 0 is plain Levenberg-Marquardt (``trainlm``).
-        prelude: Samples on which a random start is trained one step ahead before the free run (``prelude.py``): cheap
-            iterations that find what switches where. 0 for none.
+        prelude: Samples on which a random start is trained one step ahead before the free run (``pretraining.py``):
+            cheap iterations that find what switches where. 0 for none.
         prelude_iterations: Iterations of the prelude.
         stride: Every so-manieth sample counts in the loss. Residuals of a free run are correlated over tens of samples:
             a few of them say nearly as much as all, and the price of the normal equations falls with them.
         committee: Votes that unite the candidates of the race into one network whose one-step map is the mean of theirs
-            (``committee.py``), elected on the selection traces; 1 for none. Each member adds its neurons.
+            (``ensemble.py``), elected on the selection traces; 1 for none. Each member adds its neurons.
         leave_out: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs and
-            networks that do without each of the sets (``views.py``), for a committee whose members differ in what they
-            rely on. All see everything by default.
+            networks that do without each of the sets (``input_subsets.py``), for a committee whose members differ in
+            what they rely on. All see everything by default.
     """
 
     loop: Loop = Loop.CLOSED

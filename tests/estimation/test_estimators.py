@@ -1,0 +1,52 @@
+"""The table of estimators by itself; what its doors have in common is in ``tests/workbench/test_doors.py``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.estimation import StabilityOptions, Status, Training, fit_arx
+from sysid.estimation.estimators import ESTIMATORS, JOINING, estimator_of, fit, with_stability
+from sysid.models import ARX, NARX, Mapping, VectorNARX
+from sysid.traces import Channel, Trace
+
+MAPPING = Mapping.parse("u -> y")
+ORDERS = ARX(na=1, nb=(1,), nk=(1,))
+NETWORK = NARX(input_delays=1, output_delays=1, neurons=1)
+
+
+def trace(pole: float = 0.9) -> Trace:
+    u, y = np.random.default_rng(0).normal(size=120), np.zeros(120)
+    for t in range(119):
+        y[t + 1] = pole * y[t] + 0.1 * u[t]
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+    return Trace(name="record", sample_time=0.5, channels=channels, values=np.column_stack([u, y]))
+
+
+def test_a_structure_without_a_row_is_refused() -> None:
+    with pytest.raises(ConfigError, match="no estimator belongs to the structure") as caught:
+        estimator_of(VectorNARX(input_delays=1, output_delays=1, neurons=1))  # type: ignore[arg-type]
+    assert "fit_vector_narx" in str(caught.value.remedy)
+
+
+def test_a_row_says_what_its_function_knows() -> None:
+    assert {kind for kind, row in ESTIMATORS.items() if row.selects} == {"NARX", "NSS", "TransferFunction"}
+    assert {kind for kind, row in ESTIMATORS.items() if row.resumes} == {"NARX"} == set(JOINING)
+    assert {kind for kind, row in ESTIMATORS.items() if row.linear} == {"ARX", "TransferFunction"}
+
+
+@pytest.mark.parametrize(("pole", "status"), [(0.9, Status.EXACT), (1.05, Status.UNSTABLE)])
+def test_a_linear_fit_with_a_pole_outside_the_unit_circle_is_unstable(pole: float, status: Status) -> None:
+    assert fit([trace(pole)], MAPPING, ORDERS).status is status
+    alone = fit_arx([trace(pole)], MAPPING, ORDERS)
+    assert with_stability(alone, [trace(pole)], StabilityOptions()).status is status
+    assert with_stability(alone, [trace(pole)], None) is alone
+
+
+def test_an_initial_fit_at_another_sample_time_is_refused() -> None:
+    first = fit([replace(trace(), sample_time=1.0)], MAPPING, ORDERS)
+    with pytest.raises(ConfigError, match="the initial fit has another sample time"):
+        fit([trace()], MAPPING, NETWORK, Training(max_iterations=1), initial=first)
