@@ -45,7 +45,7 @@ def _other_case(folder: Path) -> None:
 
 
 def _missing_part(folder: Path) -> None:
-    _write(folder, **{"A/predicted": None})
+    _write(folder, **{"A/simulated": None})
 
 
 def _unequal(folder: Path) -> None:
@@ -67,7 +67,7 @@ def _pickled(folder: Path) -> None:
         pytest.param(_no_archive, "npz archive", id="no-archive"),
         pytest.param(_cut_off, "npz archive", id="cut-off"),
         pytest.param(_other_case, "arrays of B", id="case-not-stored"),
-        pytest.param(_missing_part, "A/predicted", id="part-not-stored"),
+        pytest.param(_missing_part, "A/simulated", id="part-not-stored"),
         pytest.param(_unequal, "one and the same length", id="unequal-lengths"),
         pytest.param(_empty, "one and the same length", id="no-samples"),
         pytest.param(_pickled, "npz archive", id="pickled-objects"),
@@ -77,3 +77,11 @@ def test_damaged_signals_are_refused(tmp_path: Path, damage: Callable[[Path], No
     damage(tmp_path)
     with pytest.raises(ConfigError, match=words):
         read_signals(tmp_path, ["A"])
+
+
+def test_an_assembly_has_no_run_one_step_ahead_and_its_outputs_stand_apart(tmp_path: Path) -> None:
+    arrays = {f"{output}/A/{part}": np.arange(3.0) + k for k, output in enumerate("yz") for part in PARTS[:3]}
+    np.savez(tmp_path / "signals.npz", **arrays)  # type: ignore[arg-type]  # names are free
+    found = read_signals(tmp_path, ["A"], of="z")["A"]
+    assert found.predicted is None
+    assert found.target.tolist() == [1.0, 2.0, 3.0]
