@@ -15,7 +15,7 @@ from sysid.composite.keeper import Keeper, MakeAll, Task
 from sysid.composite.limit_check import LimitCheck, check_limits
 from sysid.composite.limits_held import Holding, holding
 from sysid.composite.members import assembled, dealt, own_traces, simulated_inputs, whole_score
-from sysid.composite.monte_carlo import Stress, stress
+from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
 from sysid.composite.plan import ActiveLearning, OneStep, Retraining, RoundPlan, TrainingPlan
 from sysid.composite.rehearsal import rehearse
 from sysid.composite.round import JointRound, TrainedRound, train_round
@@ -38,12 +38,12 @@ __all__ = [
     "Look",
     "MakeAll",
     "Member",
+    "MonteCarlo",
     "OneStep",
     "Retrained",
     "Retraining",
     "RoundPlan",
     "Standing",
-    "Stress",
     "Task",
     "TrainedComposite",
     "TrainedRound",
@@ -64,10 +64,10 @@ __all__ = [
     "reading_more",
     "rehearse",
     "retrain",
+    "run_monte_carlo",
     "sequence_errors",
     "simulated_inputs",
     "started_from",
-    "stress",
     "train",
     "train_round",
     "whole_score",

@@ -18,7 +18,7 @@ WORST = 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stress:
+class MonteCarlo:
     """What came of it.
 
     Args:
@@ -45,7 +45,7 @@ class Stress:
     by_state: dict[str, dict[float, float]] = field(default_factory=dict)
 
 
-def stress(
+def run_monte_carlo(
     cascade: Cascade,
     traces: Sequence[Trace],
     output: str,
@@ -53,7 +53,7 @@ def stress(
     report: Callable[[int], None] = lambda _: None,
     *,
     annotator: Annotator | None = None,
-) -> Stress:
+) -> MonteCarlo:
     """Run a cascade over sequences of the reference.
 
     Args:
@@ -79,7 +79,7 @@ def stress(
         lost += any(one.lost > 0 for one in run.activity.values()) or not np.isfinite(errors[i])
         report(i + 1)
     order = np.argsort(-np.nan_to_num(errors, nan=np.inf))
-    return Stress(
+    return MonteCarlo(
         output=output,
         unit=traces[0].channel(output).unit,
         sequences=len(traces),

@@ -182,7 +182,7 @@ def retrain(
         train_time_s=0.0, seed=0,
     )  # fmt: skip
     return fit_member(
-        replace(member.trained(max_iterations=max_iterations, starts=1, prelude=0), stability=None),
+        replace(member.trained(max_iterations=max_iterations, starts=1, pretraining=0), stability=None),
         simulated_inputs(others, estimation[: member.traces]),
         simulated_inputs(others, selection),
         report,

@@ -13,7 +13,7 @@ class Attempt:
 
     Args:
         start: Which start, from 1 on.
-        seed: Its seed; ``None`` for an initial fit, and for a committee.
+        seed: Its seed; ``None`` for an initial fit, and for an ensemble.
         iterations: Done by then.
         elapsed_s: Seconds that it had taken.
         estimation_mse: On the estimation records, in the output's unit squared.
@@ -22,7 +22,7 @@ class Attempt:
         effective_parameters: Parameters that the data determine; NaN where the evidence was not computed.
         stable: Whether its free run passed the check over random sequences; ``None`` where nobody asked.
         chosen: Whether it is the result.
-        members: Of a committee, the starts that it unites, once for each vote.
+        members: Of an ensemble, the starts that it unites, once for each pick.
         without: Inputs that it does without.
         status: Name of the status that it had then; empty where it was not recorded.
     """

@@ -14,7 +14,6 @@ from sysid.reporting.comparing.published import PublishedTable
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.judging.document import judgement_sections
-from sysid.reporting.moments import Moment, worst_moments
 from sysid.reporting.numbers import number
 from sysid.reporting.overview import overview_section
 from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
@@ -39,6 +38,7 @@ from sysid.reporting.tables import (
 )
 from sysid.reporting.training_view import training_parts, trust_sections
 from sysid.reporting.verdict import verdict
+from sysid.reporting.worst_instants import Instant, worst_instants
 
 
 def build_document(folder: Path, results: Results, published: PublishedTable | None) -> Document:
@@ -57,14 +57,14 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     """
     signals = {fit.slug: read_signals(folder / "fits" / fit.slug, list(fit.cases)) for fit in results.fits}
     best = results.best_fit
-    moments: list[Moment] = []
+    instants: list[Instant] = []
     if best is not None:
         judged = scored_cases(best) or best.cases
-        moments = worst_moments({name: signals[best.slug][name] for name in judged}, 5)
+        instants = worst_instants({name: signals[best.slug][name] for name in judged}, 5)
     sections = [overview_section(results, signals), _accuracy(results, published), *sweep_sections(folder, published)]
     columns = _columns(results)
     if best is not None:
-        sections.append(_best(best, signals[best.slug], moments, columns))
+        sections.append(_best(best, signals[best.slug], instants, columns))
         by_level = amplitude_section(
             best, {name: signals[best.slug][name] for name in scored_cases(best) or best.cases}
         )
@@ -83,7 +83,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         sections.append(Section(anchor="exports", title="Exported files", parts=parts))
     sections += [_data(results), *_others(results, signals, columns)]
     comparability = "" if published is None else published.comparability
-    found = verdict(results, moments, comparability)
+    found = verdict(results, instants, comparability)
     found = replace(found, points=(*sweep_points(folder, published), *found.points))
     return Document(results=results, verdict=found, sections=tuple(sections))
 
@@ -119,15 +119,15 @@ def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
     return picture(figure, f"Free-run mse by case, {mapping}", caption, name)
 
 
-def _best(fit: FitRecord, signals: Dict[str, CaseSignals], moments: list[Moment], columns: int) -> Section:
+def _best(fit: FitRecord, signals: Dict[str, CaseSignals], instants: list[Instant], columns: int) -> Section:
     parts: list[Part] = [*_quality(fit)]
     parts += _case_pictures(fit, signals, columns)
     output = output_side(fit.mapping)
-    if moments:
-        title = f"{fit.name}: the {len(moments)} worst moments"
-        drawing = figures.moments_figure(moments, signals, title=title, label=output, unit=fit.unit)
-        parts.append(picture(drawing, title, "Zooms at the largest errors of the free run, worst first.", "moments"))
-        parts.append(_moments_table(fit, moments))
+    if instants:
+        title = f"{fit.name}: the {len(instants)} worst instants"
+        drawing = figures.instants_figure(instants, signals, title=title, label=output, unit=fit.unit)
+        parts.append(picture(drawing, title, "Zooms at the largest errors of the free run, worst first.", "instants"))
+        parts.append(_instants_table(fit, instants))
     r = {case: record.free_run.r for case, record in fit.cases.items()}
     drawing = figures.regression_figure(signals, r, label=output, unit=fit.unit)
     caption = "Free run against target: a perfect model lies on the line."
@@ -172,20 +172,20 @@ def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int
     return parts
 
 
-def _moments_table(fit: FitRecord, moments: list[Moment]) -> Table:
+def _instants_table(fit: FitRecord, instants: list[Instant]) -> Table:
     return Table(
-        caption="The worst moments of the free run, on the cases that the verdict rests on.",
+        caption="The worst instants of the free run, on the cases that the verdict rests on.",
         head=(("", ""), ("case", ""), ("time", "s"), ("target", fit.unit), ("free run", fit.unit), ("error", fit.unit)),
         rows=tuple(
             (
                 Cell(text=str(place), header=True),
-                Cell(text=moment.case),
-                Cell(text=f"{moment.time:g}", value=moment.time, mark="number"),
-                figure_cell(moment.target, digits=5),
-                figure_cell(moment.simulated, digits=5, missing=DIVERGED),
-                figure_cell(moment.error, missing=DIVERGED),
+                Cell(text=instant.case),
+                Cell(text=f"{instant.time:g}", value=instant.time, mark="number"),
+                figure_cell(instant.target, digits=5),
+                figure_cell(instant.simulated, digits=5, missing=DIVERGED),
+                figure_cell(instant.error, missing=DIVERGED),
             )
-            for place, moment in enumerate(moments, start=1)
+            for place, instant in enumerate(instants, start=1)
         ),
     )
 

@@ -80,7 +80,7 @@ def readable(created: str) -> str:
         '21 November 2026, 02:59 UTC'
     """
     try:
-        moment = datetime.fromisoformat(created)
+        instant = datetime.fromisoformat(created)
     except ValueError:
         return created
-    return f"{moment.day} {moment:%B %Y, %H:%M} {moment.tzname() or ''}".rstrip()
+    return f"{instant.day} {instant:%B %Y, %H:%M} {instant.tzname() or ''}".rstrip()

@@ -135,7 +135,7 @@ class AttemptRecord(Record):
     effective_parameters: Number = Field(description="Parameters that the data determine.")
     stable: bool | None = Field(default=None, description="What the check of its free run said, where it was asked.")
     chosen: bool = Field(default=False, description="Whether it is the result.")
-    members: list[int] = Field(default=[], description="Of a committee, the starts that it unites, once for each vote.")
+    members: list[int] = Field(default=[], description="Of an ensemble, the starts that it unites, once for each pick.")
     without: list[str] = Field(default=[], description="Inputs that it does without.")
     status: str = Field(default="", description="Name of the status that it had then; empty where not recorded.")
 

@@ -166,7 +166,7 @@ def _attempt_row(attempt: AttemptRecord) -> tuple[Cell, ...]:
     if attempt.without:
         origin += f", without {' and '.join(attempt.without)}"
     if attempt.members:
-        name, origin = "committee", f"of starts {', '.join(map(str, attempt.members))}"
+        name, origin = "ensemble", f"of starts {', '.join(map(str, attempt.members))}"
     words = {None: "not checked", True: "stable", False: "not stable"}[attempt.stable]
     return (
         Cell(text=name, header=True, below=f"{origin}, chosen" if attempt.chosen else origin, mark=_mark(attempt)),

@@ -7,19 +7,19 @@ from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 
 from sysid.estimation import Status
-from sysid.reporting.moments import Moment
 from sysid.reporting.numbers import number, quantity, seconds, times
 from sysid.reporting.parts import Tile, Verdict
 from sysid.reporting.results import CaseRecord, FitRecord, Results
 from sysid.reporting.tables import mean_mse, real_time_factor, scored_cases
+from sysid.reporting.worst_instants import Instant
 
 
-def verdict(results: Results, moments: Sequence[Moment], comparability: str) -> Verdict:
+def verdict(results: Results, instants: Sequence[Instant], comparability: str) -> Verdict:
     """Say which model was chosen and what it is worth.
 
     Args:
         results: The results, with published figures where there are some.
-        moments: The worst moments of the chosen fit, worst first.
+        instants: The worst instants of the chosen fit, worst first.
         comparability: What a comparison with the published figures can and cannot say.
 
     Returns:
@@ -37,7 +37,7 @@ def verdict(results: Results, moments: Sequence[Moment], comparability: str) -> 
     points = [("Accuracy", _accuracy(best, cases, cases_chose=results.best.cases_chose))]
     published = _published(cases, comparability)
     points += [("Published", published)] if published else []
-    points += [("Speed", _speed(cases, results)), ("Weakness", _weakness(best, cases, moments))]
+    points += [("Speed", _speed(cases, results)), ("Weakness", _weakness(best, cases, instants))]
     points += [("Choice", results.best.chosen_by), ("Export", _export(best))]
     count = "" if best.n_parameters is None else f", {best.n_parameters} parameters"
     return Verdict(
@@ -117,18 +117,18 @@ def _speed(cases: Dict[str, CaseRecord], results: Results) -> str:
     )
 
 
-def _weakness(fit: FitRecord, cases: Dict[str, CaseRecord], moments: Sequence[Moment]) -> str:
+def _weakness(fit: FitRecord, cases: Dict[str, CaseRecord], instants: Sequence[Instant]) -> str:
     diverging = [name for name, case in cases.items() if not math.isfinite(case.free_run.mse)]
     if diverging:
         return f"The free run diverges on {', '.join(diverging)}: do not use this model there."
     worst = max(cases, key=lambda name: cases[name].free_run.mse)
     text = f"Weakest on {worst} (mse {quantity(cases[worst].free_run.mse, fit.unit + '²')})."
-    if moments:
-        moment = moments[0]
+    if instants:
+        instant = instants[0]
         text += (
-            f" The largest error, {quantity(moment.error, fit.unit)}, occurs in {moment.case} at "
-            f"{moment.time:g}\u00a0s, where the target is {quantity(moment.target, fit.unit, digits=5)} and "
-            f"the free run {quantity(moment.simulated, fit.unit, digits=5)}."
+            f" The largest error, {quantity(instant.error, fit.unit)}, occurs in {instant.case} at "
+            f"{instant.time:g}\u00a0s, where the target is {quantity(instant.target, fit.unit, digits=5)} and "
+            f"the free run {quantity(instant.simulated, fit.unit, digits=5)}."
         )
     return text
 

@@ -17,7 +17,7 @@ from sysid.traces import Trace, TraceSet
 from sysid.validation import CaseResult, Evaluation
 from sysid.validation.annotator import Annotator
 from sysid.validation.metrics import figures
-from sysid.workbench.fields import STRICT
+from sysid.workbench.old_words import STRICT
 from sysid.workbench.plugins import find_plugin
 
 GROUP = "sysid.annotators"

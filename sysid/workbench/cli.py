@@ -7,6 +7,7 @@ complete but could not be tracked), 130 stopped by the user.
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -44,6 +45,17 @@ def run_cli(arguments: list[str]) -> int:
     from sysid.workbench.runner.console import speak_plainly
 
     speak_plainly()
+    with warnings.catch_warnings():
+        warnings.showwarning = _note
+        return _run(arguments, debug=debug)
+
+
+def _note(message: Warning | str, *_: Any, **__: Any) -> None:
+    """A warning as a person reads it: what is warned of, without the line of ours that found it."""
+    _say(f"note: {message}")
+
+
+def _run(arguments: list[str], *, debug: bool) -> int:
     try:
         code = app([word for word in arguments if word != "--debug"], prog_name="sysid", standalone_mode=False)
         return code if isinstance(code, int) else 0

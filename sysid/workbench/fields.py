@@ -9,7 +9,7 @@ import typing
 from collections.abc import Mapping as Dict
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, create_model
+from pydantic import BaseModel, Field, PlainSerializer, PlainValidator, WithJsonSchema, create_model
 
 from sysid.errors import ConfigError
 from sysid.estimation import JointTraining, Training, TransferFunctionTraining
@@ -17,10 +17,8 @@ from sysid.estimation.estimators import ESTIMATORS, Estimator, estimator_of
 from sysid.export.exporters import EXPORTERS
 from sysid.models import AbstractStructure, Mapping, Start, StartKind, structure_from_dict
 from sysid.models.lags import LagSpec, parse_lags
+from sysid.workbench.old_words import JOINT_TRAINING, STRICT, TRAINING, Words, with_new_words
 from sysid.yaml_files import FieldError
-
-STRICT = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
-"""A field that is not known is an error; nothing changes once it is read."""
 
 STRUCTURES: dict[str, type[AbstractStructure]] = {kind: row.structure for kind, row in ESTIMATORS.items()}
 """Structures that a pipeline can fit; their fields are those of the classes."""
@@ -239,12 +237,19 @@ if TYPE_CHECKING:
         """Options of a cascade's training, field by field those of :class:`sysid.estimation.JointTraining`."""
 
 else:
+
+    class _TrainingWords(Words):
+        OLD = TRAINING
+
+    class _JointWords(Words):
+        OLD = JOINT_TRAINING
+
     # The fields are read off the dataclass: an option added to the training appears in the YAML by itself.
-    TrainingConfig = create_model("TrainingConfig", __config__=STRICT, **_fields_of(Training))
+    TrainingConfig = create_model("TrainingConfig", __base__=_TrainingWords, **_fields_of(Training))
     TransferFunctionConfig = create_model(
         "TransferFunctionConfig", __config__=STRICT, **_fields_of(TransferFunctionTraining)
     )
-    JointConfig = create_model("JointConfig", __config__=STRICT, **_fields_of(JointTraining))
+    JointConfig = create_model("JointConfig", __base__=_JointWords, **_fields_of(JointTraining))
 
 OptionsConfig = TrainingConfig | TransferFunctionConfig
 """Options that some structure takes, as the YAML has them."""
@@ -280,7 +285,8 @@ def options_config(structure: AbstractStructure, value: object) -> Any:
     if row.training is None:
         raise as_field_error(row.takes_none(value))
     config = options_of(row)
-    for name in value:
+    named: Dict[str, Any] = with_new_words(value, getattr(config, "OLD", {}))
+    for name in named:
         if name not in config.model_fields:
             near = difflib.get_close_matches(str(name), config.model_fields, n=1)
             raise FieldError(
@@ -289,7 +295,7 @@ def options_config(structure: AbstractStructure, value: object) -> Any:
                 got=str(name),
                 remedy=f"did you mean {near[0]}?" if near else f"remove it: {row.name} has no such option",
             )
-    checked = config.model_validate(value)
+    checked = config.model_validate(named)
     try:
         row.options(given_options(checked), seed=0)
     except ConfigError as error:

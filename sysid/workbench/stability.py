@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 
 from sysid.estimation.stability import StabilityOptions
 from sysid.traces import Trace
-from sysid.workbench.fields import STRICT
+from sysid.workbench.old_words import STRICT
 
 _DEFAULT = StabilityOptions()
 

@@ -10,8 +10,8 @@ import numpy as np
 from sysid.airbrake.command import Command
 from sysid.export import read_bundle
 from sysid.models import NARX, Cascade, Limit, Mapping, NARXModel, Scaling, parameter_count
-from sysid.workbench.assembly.begun import read_whole
 from sysid.workbench.assembly.runner import read_assembly
+from sysid.workbench.assembly.warm_start import read_whole
 from tests.benchmarks._findings import read
 
 ROWS = [[0, 90], [100, 84], [300, 90], [500, 70], [800, 90], [1100, 64.2], [1300, 90], [1700, 0], [1800, 90]]

@@ -39,7 +39,7 @@ def networks(estimation: Trace) -> list[AbstractModel]:
     ((entry, network),) = ((fit, fit.structure) for fit in config.fits if isinstance(fit.structure, NARX))
 
     def one(seed: int) -> tuple[float, AbstractModel]:
-        training = replace(entry.training_options(seed), starts=1, committee=1)
+        training = replace(entry.training_options(seed), starts=1, ensemble=1)
         model = fit_narx([estimation], config.mapping, network, training, rest_output=config.rest_output).model
         return mse(model.simulate(estimation.columns(config.mapping.inputs)), estimation["BP"]), model
 

@@ -59,7 +59,7 @@ def trace(n: int = 120, seed: int = 0) -> Trace:
     )
 
 
-SHORT = Training(prelude=400, prelude_iterations=30, max_iterations=10, workers=1, seed=3)
+SHORT = Training(pretraining=400, pretraining_iterations=30, max_iterations=10, workers=1, seed=3)
 
 
 def tanks(**changes) -> Composite:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.composite.members import assembled
-from sysid.composite.monte_carlo import stress
+from sysid.composite.monte_carlo import run_monte_carlo
 from sysid.traces import Channel, Trace
 from tests.composite.composites import models, pipe, trace
 
@@ -16,7 +16,7 @@ from tests.composite.composites import models, pipe, trace
 def test_it_counts_what_is_lost_and_names_the_worst():
     whole = assembled(pipe(), models())
     sequences = [trace(seed=s) for s in range(12)]
-    found = stress(whole, sequences, "AR", limit=1e6)
+    found = run_monte_carlo(whole, sequences, "AR", limit=1e6)
     errors = [np.sqrt(np.mean((whole.simulate_trace(t)["AR"] - t["AR"]) ** 2)) for t in sequences]
     assert found.sequences == 12
     assert found.within == 1.0
@@ -39,7 +39,7 @@ class Halves:
 def test_it_says_what_the_errors_of_each_state_are():
     whole = assembled(pipe(), models())
     sequences = [trace(seed=s) for s in range(5)]
-    found = stress(whole, sequences, "AR", 1.0, annotator=Halves())
+    found = run_monte_carlo(whole, sequences, "AR", 1.0, annotator=Halves())
     halves = [((whole.simulate_trace(t)["AR"] - t["AR"]) ** 2).reshape(2, -1).mean(axis=1) ** 0.5 for t in sequences]
     for label, errors in zip(("early", "late"), np.transpose(halves), strict=True):
         assert found.by_state[label][0.5] == pytest.approx(np.median(errors))

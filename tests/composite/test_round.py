@@ -39,7 +39,7 @@ def trained(monkeypatch: pytest.MonkeyPatch, **asked) -> tuple[Cascade, Cascade,
         return fit_cascade(cascade, *args, **kwargs)
 
     monkeypatch.setattr(joint_round, "fit_cascade", fit)
-    plan = RoundPlan(training=JointTraining(max_iterations=2, looks=1, workers=1), **asked)
+    plan = RoundPlan(training=JointTraining(max_iterations=2, checkpoints=1, workers=1), **asked)
     found = train_round(CHAIN, plan, service(), estimation=[record()], selection=[])
     ((part, names),) = given
     return found.model, part, names
@@ -81,7 +81,7 @@ def test_what_it_depends_on_is_the_same_in_whichever_order_the_whole_has_its_mem
 
 
 def test_its_error_is_that_by_which_it_chooses_among_its_states() -> None:
-    training = JointTraining(max_iterations=2, looks=1)
+    training = JointTraining(max_iterations=2, checkpoints=1)
     ready = JointRound.of(
         CHAIN,
         RoundPlan(targets={"AR": 0.5, "BC": 2.0}, measured=("BP",), training=training),

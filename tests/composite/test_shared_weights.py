@@ -26,7 +26,7 @@ ROUND = RoundPlan(
     members=("AR", "BC"),
     share_weights=True,
     targets={"AR": 1.0, "BC": 1.0},
-    training=JointTraining(max_iterations=2, looks=1, workers=1),
+    training=JointTraining(max_iterations=2, checkpoints=1, workers=1),
 )
 BOTH = ("", "9")
 LINE = Composite(

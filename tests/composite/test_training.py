@@ -25,7 +25,7 @@ from sysid.estimation import CascadeFit, FitResult, JointTraining
 from sysid.models import NARX
 from tests.composite.composites import fixed, member, tank_trace, tanks
 
-QUICK = JointTraining(max_iterations=3, stride=2, looks=2, workers=1)
+QUICK = JointTraining(max_iterations=3, stride=2, checkpoints=2, workers=1)
 ROUND = RoundPlan(targets={"upper": 0.1, "lower": 0.1}, training=QUICK)
 PLAN = TrainingPlan(
     outputs=("upper", "lower"),

@@ -69,10 +69,10 @@ def test_the_last_look_at_each_start_is_listed_best_first(results):
     assert table.rows[3][3].text == "none"
 
 
-def test_a_committee_is_listed_with_the_starts_that_it_unites(results):
+def test_a_ensemble_is_listed_with_the_starts_that_it_unites(results):
     united = results.fits[2].attempts[0].model_copy(update={"start": 5, "seed": None, "members": [3, 1, 3]})
     fit = results.fits[2].model_copy(update={"attempts": [*results.fits[2].attempts, united]})
-    (row,) = (row for row in attempts_table(fit).rows if row[0].text == "committee")
+    (row,) = (row for row in attempts_table(fit).rows if row[0].text == "ensemble")
     assert row[0].below == "of starts 3, 1, 3"
 
 

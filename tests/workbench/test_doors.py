@@ -51,7 +51,7 @@ FITS = [
     pytest.param(NARX, {"seed": 7, "loop": "open", "max_iterations": 8}, EVERYWHERE, id="NARX one step ahead"),
     pytest.param(NARX, {"seed": 7, "max_iterations": 30, "starts": 3}, EVERYWHERE, id="NARX of several starts"),
     pytest.param(
-        NARX | {"gated": True}, {"seed": 7, "max_iterations": 12, "prelude": 300, "starts": 4, "committee": 2},
+        NARX | {"gated": True}, {"seed": 7, "max_iterations": 12, "pretraining": 300, "starts": 4, "ensemble": 2},
         EVERYWHERE, id="NARX gated, an ensemble",
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
@@ -174,7 +174,12 @@ def test_a_sweep_begins_a_network_at_the_next_smaller_one_as_python_does(place: 
 
 WRONG = {
     "a training for an ARX model": (ARX, {"starts": 5}, "an ARX model takes no training", EVERYWHERE),
-    "lagged options for hidden states": (NSS, {"prelude": 100}, "state space is not trained with prelude", EVERYWHERE),
+    "lagged options for hidden states": (
+        NSS,
+        {"pretraining": 100},
+        "state space is not trained with pretraining",
+        EVERYWHERE,
+    ),
     "an open loop of hidden states": (NSS, {"loop": "open"}, "a neural state space has no open loop", EVERYWHERE),
     "an unknown choice": (NARX, {"choose_by": "dice"}, "unknown value of choose_by", EVERYWHERE),
     "no iterations": (NARX, {"max_iterations": 0}, "max_iterations is too small", EVERYWHERE),

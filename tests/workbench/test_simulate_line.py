@@ -14,7 +14,7 @@ from sysid.errors import ConfigError
 from sysid.ingest import read_trace
 from sysid.traces import Channel
 from sysid.units import Reference
-from sysid.workbench.assembly.line import StoredLine
+from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.assembly.runner import read_line
 from sysid.workbench.cli import app
 from sysid.workbench.commands.simulate_line import parse_places, simulate_line_command
@@ -30,7 +30,7 @@ def run_folder(tmp_path: Path) -> Path:
     """What a finished run leaves, and a command beside it."""
     folder = tmp_path / "runs" / "train"
     folder.mkdir(parents=True)
-    stored = StoredLine(line=line(), inputs=(HANDLE,), outputs=(CYLINDER,))
+    stored = StoredInterpolation(line=line(), inputs=(HANDLE,), outputs=(CYLINDER,))
     (folder / "line.json").write_text(json.dumps(stored.to_dict()), encoding="utf-8")
     command = {"command": ROWS, "time_unit": "ds", "unit": "psi"}
     (tmp_path / "command.json").write_text(json.dumps(command), encoding="utf-8")

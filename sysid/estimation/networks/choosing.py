@@ -1,4 +1,4 @@
-"""The choice between the candidates of a race: by selection traces or evidence, and only what is stable."""
+"""The choice between the candidates of a multistart: by selection traces or evidence, and only what is stable."""
 
 from __future__ import annotations
 

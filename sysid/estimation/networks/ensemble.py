@@ -5,8 +5,8 @@ record did not show them what to do. The mean of their one-step maps
 
 .. math:: \bar f(x) = \sum_m \tfrac{n_m}{n} f_m(x), \qquad n = \sum_m n_m,
 
-with :math:`n_m` votes of member :math:`m`, is itself a network: the members' neurons side by side, readouts and gates
-multiplied by their share of the votes, constants and linear parts averaged. In free run, with the members' errors one
+with :math:`n_m` picks of member :math:`m`, is itself a network: the members' neurons side by side, readouts and gates
+multiplied by their share of the picks, constants and linear parts averaged. In free run, with the members' errors one
 step ahead :math:`\delta_m(x)` and the sensitivity :math:`a = \partial f / \partial y` that they nearly share,
 
 .. math:: e(t) = a\,e(t-1) + \sum_m \tfrac{n_m}{n}\,\delta_m(x_t) :
@@ -16,10 +16,10 @@ members (Perrone and Cooper 1993, "When networks disagree", for networks without
 is exported, checked and timed like any other.
 
 Who sits in it is found by forward selection with replacement (Caruana et al. 2004, "Ensemble selection from libraries
-of models", section 2.1) from the best candidates of the race: the vote that lowers the error of the united free run on
+of models", section 2.1) from the best candidates of the multistart: the pick that lowers the error of the united run on
 the selection traces most is cast next, until none lowers it by :data:`WORTH`. A network that sticks or runs away on
 some inputs takes the mean with it, though: the united network has to pass the check of its free run, where there is
-one, and where it does not, votes are cast once more and it has to after every vote.
+one, and where it does not, picks are cast once more and it has to after every pick.
 
 Limits: the price of a free run grows with the members; all must agree on what a regressor means, so that hidden states,
 which have no common coordinates, cannot be united; the selection traces choose more often than between single starts,
@@ -53,50 +53,50 @@ ELIGIBLE = 40
 """Candidates that may be voted for, best on the selection traces first."""
 
 WORTH = 0.01
-"""Least share by which a vote has to lower the error: neurons that bring less are not worth their run time."""
+"""Least share by which a pick has to lower the error: neurons that bring less are not worth their run time."""
 
 EVIDENCE_ROUNDS = 5
 """Steps of the evidence's fixed-point iteration at the united parameters, which do not move meanwhile."""
 
 
 def check(training: Training, selection: Sequence[Trace]) -> None:
-    """Refuse a committee that nobody could elect.
+    """Refuse an ensemble that nothing could choose.
 
     Args:
         training: How to train.
         selection: Traces that choose.
 
     Raises:
-        ConfigError: If a committee is asked for and no traces choose.
+        ConfigError: If an ensemble is asked for and no traces choose.
     """
-    if training.committee > 1 and (training.choose_by != "selection" or not selection):
+    if training.ensemble > 1 and (training.choose_by != "selection" or not selection):
         raise ConfigError(
-            "nobody can elect a committee",
-            where="committee",
+            "nothing can choose the members of an ensemble",
+            where="ensemble",
             expected="selection traces, and choose_by: selection",
             got=f"{len(selection)} selection traces, choose_by: {training.choose_by}",
-            remedy="give traces that train nothing, or leave committee out",
+            remedy="give traces that train nothing, or leave ensemble out",
         )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Committee:
-    """Who was elected.
+class Ensemble:
+    """Who was selected.
 
     Args:
-        votes: For each member its place among the candidates and its votes, in the order of their first vote.
+        picks: For each member its place among the candidates and its picks, in the order of their first pick.
         model: The united network.
         score: Its error on the selection traces.
     """
 
-    votes: dict[int, int]
+    picks: dict[int, int]
     model: NARXModel
     score: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
-    """What is minimised, for the network that the committee makes.
+    """What is minimised, for the network that the ensemble makes.
 
     Args:
         provider: Residuals in the basis of training.
@@ -109,37 +109,37 @@ class Task:
     to_plain: NDArray[np.float64]
 
 
-def elected(
-    race: starts.Race,
+def selected(
+    multistart: starts.Multistart,
     candidates: Sequence[starts.Candidate],
     vet: Callable[[starts.Network], bool] | None = None,
-) -> tuple[Committee, list[starts.Candidate]] | None:
-    """The committee of the candidates of a race.
+) -> tuple[Ensemble, list[starts.Candidate]] | None:
+    """The ensemble of the candidates of a multistart.
 
     Args:
-        race: The race; its training says how many votes there are.
+        multistart: The race; its training says how many picks there are.
         candidates: Every start at every look.
-        vet: Whether a model's free run is stable; a committee must be.
+        vet: Whether a model's free run is stable; an ensemble must be.
 
     Returns:
-        The committee and those whom its votes count; ``None`` where no second vote helps.
+        The ensemble and those whom its picks count; ``None`` where no second pick helps.
     """
     usable = [c for c in candidates if c.solution.status.usable and isinstance(c.model, NARXModel)]
     models = [c.model for c in usable if isinstance(c.model, NARXModel)]
     if not usable:
         return None
-    training = race.training
-    scale = race.template.scaling.output_scale**2
+    training = multistart.training
+    scale = multistart.template.scaling.output_scale**2
 
-    def report(vote: int) -> None:
-        race.on_progress(
+    def report(pick: int) -> None:
+        multistart.on_progress(
             FitProgress(
-                stage=f"vote {vote} of {training.committee}",
+                stage=f"pick {pick} of {training.ensemble}",
                 start=training.starts,
                 starts=training.starts,
                 iteration=training.max_iterations,
                 max_iterations=training.max_iterations,
-                mse=2.0 * min(c.loss for c in usable) / race.provider.n_samples * scale,
+                mse=2.0 * min(c.loss for c in usable) / multistart.provider.n_samples * scale,
                 elapsed_s=0.0,
                 fraction=1.0,
             )
@@ -148,28 +148,28 @@ def elected(
     found = elect(
         models,
         [c.score for c in usable],
-        lambda model: starts.score(race, model),
-        votes=training.committee,
+        lambda model: starts.score(multistart, model),
+        picks=training.ensemble,
         origins=[c.number for c in usable],
         accept=vet or (lambda _: True),
         workers=training.workers,
-        on_vote=report,
+        on_pick=report,
     )
-    return (found, usable) if found and sum(found.votes.values()) > 1 else None
+    return (found, usable) if found and sum(found.picks.values()) > 1 else None
 
 
-def seated(
-    race: starts.Race, committee: Committee, members: Sequence[starts.Candidate], task: Task
+def as_candidate(
+    multistart: starts.Multistart, ensemble: Ensemble, members: Sequence[starts.Candidate], task: Task
 ) -> starts.Candidate:
-    """The committee as one more candidate of its race.
+    """The ensemble as one more candidate of its multistart.
 
     Its learning curve is that of its first member, with the united network as the last point; precisions and evidence
     are those at the united parameters, where no step is taken.
 
     Args:
-        race: The race.
-        committee: Whom the votes elected.
-        members: The candidates that the votes count.
+        multistart: The multistart.
+        ensemble: Whom the picks selected.
+        members: The candidates that the picks count.
         task: What is minimised, for the united network.
 
     Returns:
@@ -177,14 +177,14 @@ def seated(
     """
     theta, centre = (
         np.asarray(np.linalg.solve(task.to_plain, plain), dtype=np.float64)
-        for plain in (committee.model.theta, task.layout.centre())
+        for plain in (ensemble.model.theta, task.layout.centre())
     )
-    prior, evidence = starts.first_prior(race.training, task.layout, task.provider, theta, centre), None
+    prior, evidence = starts.first_prior(multistart.training, task.layout, task.provider, theta, centre), None
     with threadpool_limits(1, "blas"):
         at = task.provider.linearise(theta)
-        for _ in range(EVIDENCE_ROUNDS if race.training.regularisation is None else 0):
+        for _ in range(EVIDENCE_ROUNDS if multistart.training.regularisation is None else 0):
             prior, evidence = update(prior, theta, at, task.provider.n_samples)
-    lead = members[next(iter(committee.votes))].solution
+    lead = members[next(iter(ensemble.picks))].solution
     last = lead.curve[-1]
     entry = Iteration(
         iteration=last.iteration,
@@ -195,12 +195,12 @@ def seated(
     )
     state = replace(lead.state, theta=theta, at=at, prior=prior, evidence=evidence, curve=(*lead.curve, entry))
     return starts.Candidate(
-        number=race.training.starts,
+        number=multistart.training.starts,
         seed=None,
         solution=Solution(state=state, status=lead.status),
-        model=committee.model,
-        score=committee.score,
-        members=tuple(members[i].number for i, votes in committee.votes.items() for _ in range(votes)),
+        model=ensemble.model,
+        score=ensemble.score,
+        members=tuple(members[i].number for i, picks in ensemble.picks.items() for _ in range(picks)),
     )
 
 
@@ -209,40 +209,40 @@ def elect(
     scores: Sequence[float],
     score: Callable[[NARXModel], float],
     *,
-    votes: int,
+    picks: int,
     origins: Sequence[int] | None = None,
     accept: Callable[[NARXModel], bool] = lambda _: True,
     workers: int = 1,
-    on_vote: Callable[[int], None] = lambda _: None,
-) -> Committee | None:
-    """Cast the votes one after the other, each for the member that helps most.
+    on_pick: Callable[[int], None] = lambda _: None,
+) -> Ensemble | None:
+    """Make the picks one after the other, each for the member that helps most.
 
-    A check of a free run costs as much as a vote. The one that matters is that of the network that comes out: votes are
+    A check of a free run costs as much as a pick. The one that matters is that of the network that comes out: picks are
     first cast unchecked, and only where that network fails they are cast once more, with a check after every one.
 
     Args:
         models: The candidates, all of one structure and scaling.
         scores: Error of each on the selection traces; one that is not finite is not eligible.
         score: The error of a model on them.
-        votes: At most so many.
+        picks: At most so many.
         origins: The start that each candidate comes from; by default each is its own.
-        accept: Whether a united network may stand; where votes are cast once more, whoever would make it one that may
+        accept: Whether a united network may stand; where picks are cast once more, whoever would make it one that may
             not is passed over from then on, and with him all that come from the same start.
         workers: Models that are run at the same time.
-        on_vote: Called with the number of each vote that is about to be cast.
+        on_pick: Called with the number of each pick that is about to be cast.
 
     Returns:
-        The committee, of one member where no second vote helps; ``None`` where not even one may stand.
+        The ensemble, of one member where no second pick helps; ``None`` where not even one may stand.
     """
     ballot = partial(
         _cast,
         models,
         scores,
         score,
-        votes=votes,
+        picks=picks,
         origins=origins or range(len(models)),
         workers=workers,
-        on_vote=on_vote,
+        on_pick=on_pick,
     )
     unchecked = ballot(accept=lambda _: True)
     return unchecked if unchecked is None or accept(unchecked.model) else ballot(accept=accept)
@@ -253,32 +253,32 @@ def _cast(
     scores: Sequence[float],
     score: Callable[[NARXModel], float],
     *,
-    votes: int,
+    picks: int,
     origins: Sequence[int],
     accept: Callable[[NARXModel], bool],
     workers: int,
-    on_vote: Callable[[int], None],
-) -> Committee | None:
-    """The votes cast, each checked; see :func:`elect`."""
+    on_pick: Callable[[int], None],
+) -> Ensemble | None:
+    """The picks made, each checked; see :func:`elect`."""
     order = sorted((i for i, value in enumerate(scores) if np.isfinite(value)), key=lambda i: scores[i])
-    eligible, found, committee = order[:ELIGIBLE], dict(enumerate(scores)), None
+    eligible, found, ensemble = order[:ELIGIBLE], dict(enumerate(scores)), None
     with ThreadPoolExecutor(workers) as pool:
-        for vote in range(1, votes + 1):
-            on_vote(vote)
-            elected = Counter(committee.votes) if committee else Counter[int]()
-            networks = {i: _of(models, elected + Counter([i])) for i in eligible}
-            if committee:
+        for pick in range(1, picks + 1):
+            on_pick(pick)
+            selected = Counter(ensemble.picks) if ensemble else Counter[int]()
+            networks = {i: _of(models, selected + Counter([i])) for i in eligible}
+            if ensemble:
                 found = dict(zip(eligible, pool.map(score, networks.values()), strict=True))
-            bar = (1.0 - WORTH) * committee.score if committee else np.inf
+            bar = (1.0 - WORTH) * ensemble.score if ensemble else np.inf
             better = sorted((i for i in eligible if found[i] < bar), key=found.__getitem__)
             cast, barred = _first_accepted(better, origins, networks, accept)
             if cast is None:
                 break
             # the very network that was accepted: a check that knows it need not run again
-            tally = dict(elected + Counter([cast]))
-            committee = Committee(votes=tally, model=networks[cast], score=found[cast])
+            tally = dict(selected + Counter([cast]))
+            ensemble = Ensemble(picks=tally, model=networks[cast], score=found[cast])
             eligible = [i for i in eligible if origins[i] not in barred]
-    return committee
+    return ensemble
 
 
 def _first_accepted(
@@ -298,16 +298,16 @@ def _first_accepted(
     return None, barred
 
 
-def _of(models: Sequence[NARXModel], votes: Counter[int]) -> NARXModel:
-    return united([models[i] for i in votes], list(votes.values()))
+def _of(models: Sequence[NARXModel], picks: Counter[int]) -> NARXModel:
+    return united([models[i] for i in picks], list(picks.values()))
 
 
-def united(members: Sequence[NARXModel], votes: Sequence[int]) -> NARXModel:
+def united(members: Sequence[NARXModel], picks: Sequence[int]) -> NARXModel:
     """The network whose one-step map is the mean of the members'.
 
     Args:
         members: Of one structure, mapping and scaling.
-        votes: Of each.
+        picks: Of each.
 
     Returns:
         The network, with the neurons of all; a single member comes back as it is.
@@ -317,7 +317,7 @@ def united(members: Sequence[NARXModel], votes: Sequence[int]) -> NARXModel:
         return first
     layout = Layout.of(first.network, len(first.mapping.inputs))
     hidden = layout.neurons * layout.lags.n_regressors
-    shares = np.array(votes) / sum(votes)
+    shares = np.array(picks) / sum(picks)
     thetas = [member.theta for member in members]
     parts = [theta[:hidden] for theta in thetas]
     parts += [theta[hidden : layout.hidden.stop] for theta in thetas]

@@ -2,7 +2,7 @@ r"""Some starts of a race see only some of the inputs: what an input misleads to
 
 An input may explain the estimation record for a reason that holds there alone. The record does not tell which inputs
 these are, and the evidence prunes only what explains nothing. Starts that differ in what they see differ where it
-matters, in what they make of inputs that they have not met before: a committee of them (``ensemble.py``) is right more
+matters, in what they make of inputs that they have not met before: an ensemble of them (``ensemble.py``) is right more
 often than one of starts that differ in their random weights alone (Ho 1998, "The random subspace method for
 constructing decision forests", there for trees).
 
@@ -77,19 +77,19 @@ def views(training: Training, mapping: Mapping) -> list[View]:
         ConfigError: If a view would have no input left, or no start.
 
     Example:
-        >>> training = Training(starts=5, leave_out=[["u"]])
+        >>> training = Training(starts=5, input_subsets=[["u"]])
         >>> [(view.without, view.first, view.training.starts) for view in views(training, Mapping.parse("u+w -> y"))]
         [((), 0, 3), (('u',), 3, 2)]
     """
-    sets = ((), *training.leave_out)
+    sets = ((), *training.input_subsets)
     for without in sets:
         strangers = sorted(set(without) - set(mapping.inputs))
         if strangers:
-            raise ChannelError(strangers, mapping.inputs, where="leave_out")
+            raise ChannelError(strangers, mapping.inputs, where="input_subsets")
         if without and set(without) == set(mapping.inputs):
             raise ConfigError(
                 "nothing is left to see",
-                where="leave_out",
+                where="input_subsets",
                 expected=f"some of {', '.join(mapping.inputs)}, not all of them",
                 got=", ".join(without),
                 remedy="keep at least one input",
@@ -99,7 +99,7 @@ def views(training: Training, mapping: Mapping) -> list[View]:
     for number, without in enumerate(sets):
         starts = share + (number < more)
         seconds = training.max_time_s * starts / training.starts
-        own = replace(training, starts=starts, seed=training.seed + first, max_time_s=seconds, leave_out=())
+        own = replace(training, starts=starts, seed=training.seed + first, max_time_s=seconds, input_subsets=())
         found.append(View(without=without, first=first, training=own, starts=training.starts))
         first += starts
     return found

@@ -39,7 +39,7 @@ class JointTraining:
         max_time_s: Wall time of the whole fit in seconds. A fit that it ends cannot be repeated exactly.
         tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
         patience: Iterations over which improvement is judged.
-        looks: How often the selection traces are looked at on the way; the best state seen is kept.
+        checkpoints: How often the selection traces are looked at on the way; the best state seen is kept.
         starts: Random starts, for networks that are fitted from nothing; half of them are dropped at each look.
         seed: Seed of the first start; the others count up from it.
         stride: Every so-manieth sample counts in the loss.
@@ -47,8 +47,8 @@ class JointTraining:
             counted, and so does the one before it: what comes with a jump is not missed (``counted_rows.py``).
         leverage: How many times as long as their median, at the start, a row of the Jacobian may be before it counts
             less: where sensitivities explode, the few rows that do would forbid every step (``leverage.py``).
-        soft_margin: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
-            its logarithm, so that a few traces on which the free run is lost do not rule the loss (``soft_margin.py``).
+        robust_scale: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
+            its logarithm (Cauchy loss): a few traces on which the free run is lost do not rule it (``robust_loss.py``).
         workers: Records that are worked on at the same time.
     """
 
@@ -56,20 +56,20 @@ class JointTraining:
     max_time_s: float = float("inf")
     tolerance: float = 1e-3
     patience: int = 20
-    looks: int = 10
+    checkpoints: int = 10
     starts: int = 1
     seed: int = 0
     stride: int = 1
     moves: float = float("inf")
     leverage: float = float("inf")
-    soft_margin: float = float("inf")
+    robust_scale: float = float("inf")
     workers: int = 2
 
     def __post_init__(self) -> None:
-        for name in ("max_iterations", "patience", "looks", "starts", "stride", "workers"):
+        for name in ("max_iterations", "patience", "checkpoints", "starts", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        for name in ("moves", "leverage", "soft_margin"):
+        for name in ("moves", "leverage", "robust_scale"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
 
@@ -103,7 +103,7 @@ class JointTraining:
             stride=self.stride,
             moves=self.moves,
             leverage=self.leverage,
-            soft_margin=self.soft_margin,
+            robust_scale=self.robust_scale,
             workers=self.workers,
         )
 
@@ -252,7 +252,7 @@ class Joint:
         seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
         alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
         interrupted = False
-        for look in range(1, training.looks + 1):
+        for look in range(1, training.checkpoints + 1):
             reached: list[tuple[int | None, Solution]] = []
             for number, (seed, where) in enumerate(alive):
                 name = f"start {'as given' if seed is None else seed}, look {look}"
@@ -302,7 +302,7 @@ class Joint:
             )
 
         limits = Termination(
-            max_iterations=max(1, round(training.max_iterations * look / training.looks)),
+            max_iterations=max(1, round(training.max_iterations * look / training.checkpoints)),
             max_time_s=max(0.0, training.max_time_s - (time.perf_counter() - began)),
             tolerance=training.tolerance,
             patience=training.patience,

@@ -75,8 +75,8 @@ class CascadeProvider(AbstractProvider):
             counted, and so does the one before it (``counted_rows.py``).
         leverage: How many times as long as their median, at the start, a row of the Jacobian may be before it counts
             less in gradient and Gauss-Newton matrix (``leverage.py``); infinity for all alike.
-        soft_margin: Root mean squared residual of a trace from which on it counts by its logarithm
-            (``soft_margin.py``); infinity for plain squares.
+        robust_scale: Root mean squared residual of a trace from which on it counts by its logarithm
+            (``robust_scale.py``); infinity for plain squares.
         workers: Records that are worked on at the same time.
 
     Raises:
@@ -91,7 +91,7 @@ class CascadeProvider(AbstractProvider):
     stride: int = 1
     moves: float = np.inf
     leverage: float = np.inf
-    soft_margin: float = np.inf
+    robust_scale: float = np.inf
     workers: int = 1
     n_samples: int = field(init=False)
     _trained: TrainedMembers = field(init=False, repr=False)
@@ -137,7 +137,7 @@ class CascadeProvider(AbstractProvider):
 
         def one(record: _Record) -> float:
             passed = self._pass(program, record, keep=False)
-            return counted(self._residual(record, passed.values), self.soft_margin, _counted(record))[0]
+            return counted(self._residual(record, passed.values), self.robust_scale, _counted(record))[0]
 
         total = sum(self._each(one))
         return total if np.isfinite(total) else np.inf
@@ -253,7 +253,7 @@ class CascadeProvider(AbstractProvider):
     ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         passed = self._pass(program, record, keep=True)
         residual = self._residual(record, passed.values)
-        loss, weights = counted(residual, self.soft_margin, _counted(record))
+        loss, weights = counted(residual, self.robust_scale, _counted(record))
         gradient, matrix = np.zeros(n), np.zeros((n, n))
         waiting: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in self.errors]
         gathered = 0

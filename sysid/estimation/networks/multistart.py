@@ -47,7 +47,7 @@ Network: TypeAlias = NARXModel | NeuralStateSpaceModel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Race:
+class Multistart:
     """Everything that the starts of one fit have in common.
 
     Args:
@@ -62,7 +62,7 @@ class Race:
         initial: Plain parameters of the first start; ``None`` for a random one.
         on_progress: Called after every iteration, from the threads that train.
         resume: Where the first start was put aside; ``None`` to begin it.
-        prelude: Where a random start is drawn and trained one step ahead before anything else; ``None`` for none.
+        pretraining: Where a random start is drawn and trained one step ahead before anything else; ``None`` for none.
     """
 
     training: Training
@@ -75,11 +75,11 @@ class Race:
     initial: NDArray[np.float64] | None
     on_progress: Callable[[FitProgress], None]
     resume: Checkpoint | None = None
-    prelude: StepSamples | None = None
+    pretraining: StepSamples | None = None
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
-    """Where the runs of this race, and of others of the same fit, are kept."""
+    """Where the runs of this multistart, and of others of the same fit, are kept."""
     name: str = ""
-    """Of the race, where a fit has several."""
+    """Of the multistart, where a fit has several."""
     stop: threading.Event = field(default_factory=threading.Event)
     iterations: dict[int, int] = field(default_factory=dict)
     """Iterations done by each start, for the progress bar."""
@@ -99,7 +99,7 @@ class Candidate:
         solution: Where its fit stands.
         model: The model there.
         score: Geometric mean over the selection traces of the mean squared error; NaN without such traces.
-        members: Starts that a committee unites, once for each vote; empty for a single start.
+        members: Starts that an ensemble unites, once for each pick; empty for a single start.
         without: Inputs that it does without.
     """
 
@@ -123,18 +123,18 @@ class Candidate:
         return self.solution.at.loss
 
 
-def run(race: Race) -> list[Candidate]:
-    """Race the starts; an interruption from the keyboard ends the race, and what there is comes back.
+def run(multistart: Multistart) -> list[Candidate]:
+    """Multistart the starts; an interruption from the keyboard ends the multistart, and what there is comes back.
 
     Threads suffice: the kernels and BLAS release the interpreter.
 
     Args:
-        race: What they have in common.
+        multistart: What they have in common.
 
     Returns:
         Every start at every rung that it reached.
     """
-    training = race.training
+    training = multistart.training
     rungs = _rungs(training)
     numbers = list(range(training.starts))
     latest: dict[int, Candidate] = {}
@@ -145,9 +145,9 @@ def run(race: Race) -> list[Candidate]:
         for rung, share in enumerate(rungs):
             before = rungs[rung - 1] if rung else 0.0
             seconds = training.max_time_s * (share - before) * training.workers / total
-            reached = _rung(race, numbers, latest, share, seconds)
+            reached = _rung(multistart, numbers, latest, share, seconds)
             seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
-            if race.stop.is_set():
+            if multistart.stop.is_set():
                 break
             latest = reached
             order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
@@ -156,26 +156,28 @@ def run(race: Race) -> list[Candidate]:
 
 
 def _rung(
-    race: Race, numbers: Sequence[int], latest: dict[int, Candidate], share: float, seconds: float
+    multistart: Multistart, numbers: Sequence[int], latest: dict[int, Candidate], share: float, seconds: float
 ) -> dict[int, Candidate]:
-    """One rung of the race. The workers leave what they reach in a table: an interruption at any moment loses none."""
+    """One rung of the multistart. Workers leave what they reach in a table: an interruption loses none of it."""
     reached: dict[int, Candidate] = {}
 
     def work(number: int) -> None:
-        if not race.stop.is_set():
-            reached[number] = _advance(race, number, latest.get(number), share, seconds)
+        if not multistart.stop.is_set():
+            reached[number] = _advance(multistart, number, latest.get(number), share, seconds)
 
-    with ThreadPoolExecutor(min(race.training.workers, len(numbers))) as pool:  # leaving it waits for those that run
+    with ThreadPoolExecutor(
+        min(multistart.training.workers, len(numbers))
+    ) as pool:  # leaving it waits for those that run
         try:
             for future in [pool.submit(work, number) for number in numbers]:
                 future.result()
         except KeyboardInterrupt:
-            race.stop.set()
+            multistart.stop.set()
         except BaseException:
-            race.stop.set()  # nobody waits for the others
+            multistart.stop.set()  # nobody waits for the others
             raise
     if not reached and not latest:  # interrupted before anything had begun: the start as it is
-        reached[numbers[0]] = _advance(race, numbers[0], None, share, seconds)
+        reached[numbers[0]] = _advance(multistart, numbers[0], None, share, seconds)
     return reached
 
 
@@ -184,7 +186,7 @@ def _rungs(training: Training) -> tuple[float, ...]:
 
 
 def planned_iterations(training: Training) -> float:
-    """Iterations of the whole race, all starts together, if none of them converges early.
+    """Iterations of the whole multistart, all starts together, if none of them converges early.
 
     Args:
         training: How to train.
@@ -202,69 +204,71 @@ def planned_iterations(training: Training) -> float:
 
 
 def _work(starts: int, rungs: Sequence[float]) -> float:
-    """Iterations of the whole race, in units of one start's."""
+    """Iterations of the whole multistart, in units of one start's."""
     work, before, n = 0.0, 0.0, starts
     for share in rungs:
         work, before, n = work + n * (share - before), share, max(1, (n + 1) // 2)
     return work
 
 
-def _advance(race: Race, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
-    training = race.training
+def _advance(multistart: Multistart, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
+    training = multistart.training
     iterations = max(1, round(share * training.max_iterations))
-    engine, keep = _engine(race, number, iterations, seconds), race.checkpoints
-    run = f"{race.name}start {number + 1}, to {iterations}"
-    if before is None and number == 0 and race.resume is not None:
-        prior = race.layout.prior(_in_basis(race, race.layout.centre()), alpha=INITIAL_ALPHA, beta=1.0)
+    engine, keep = _engine(multistart, number, iterations, seconds), multistart.checkpoints
+    run = f"{multistart.name}start {number + 1}, to {iterations}"
+    if before is None and number == 0 and multistart.resume is not None:
+        prior = multistart.layout.prior(
+            _in_basis(multistart, multistart.layout.centre()), alpha=INITIAL_ALPHA, beta=1.0
+        )
         seed: int | None = training.seed
-        solution = keep.resume(run, engine, race.provider, race.resume.state(race.provider, prior))
+        solution = keep.resume(run, engine, multistart.provider, multistart.resume.state(multistart.provider, prior))
     elif before is None:
-        seed, theta, centre = _begin(race, number)
-        if race.prelude is not None and seed is not None:
-            theta = _prelude(race, race.prelude, number, seed, centre)
-        prior = first_prior(training, race.layout, race.provider, theta, centre)
-        solution = keep.minimise(run, engine, race.provider, theta, prior)
+        seed, theta, centre = _begin(multistart, number)
+        if multistart.pretraining is not None and seed is not None:
+            theta = _pretraining(multistart, multistart.pretraining, number, seed, centre)
+        prior = first_prior(training, multistart.layout, multistart.provider, theta, centre)
+        solution = keep.minimise(run, engine, multistart.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
-        seed, solution = before.seed, keep.resume(run, engine, race.provider, before.solution.state)
+        seed, solution = before.seed, keep.resume(run, engine, multistart.provider, before.solution.state)
     else:
         return before
-    race.iterations[number] = solution.state.iteration  # one that was taken as it was kept has told nobody
-    model = race.model(solution.theta)
-    return Candidate(number=number, seed=seed, solution=solution, model=model, score=score(race, model))
+    multistart.iterations[number] = solution.state.iteration  # one that was taken as it was kept has told nobody
+    model = multistart.model(solution.theta)
+    return Candidate(number=number, seed=seed, solution=solution, model=model, score=score(multistart, model))
 
 
-def _prelude(
-    race: Race, prelude: StepSamples, number: int, seed: int, centre: NDArray[np.float64]
+def _pretraining(
+    multistart: Multistart, pretraining: StepSamples, number: int, seed: int, centre: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """A random start after its prelude."""
-    training = race.training
-    scale = race.template.scaling.output_scale**2
+    """A random start after its pretraining."""
+    training = multistart.training
+    scale = multistart.template.scaling.output_scale**2
 
     def report(entry: Iteration) -> None:
-        race.on_progress(
+        multistart.on_progress(
             FitProgress(
-                stage=f"prelude {entry.iteration} of {training.prelude_iterations}",
+                stage=f"pretraining {entry.iteration} of {training.pretraining_iterations}",
                 start=number + 1,
                 starts=training.starts,
                 iteration=0,  # the free run's, which have not begun
                 max_iterations=training.max_iterations,
                 mse=entry.mse * scale,
                 elapsed_s=entry.elapsed_s,
-                fraction=min(1.0, sum(race.iterations.values()) / planned_iterations(training)),
+                fraction=min(1.0, sum(multistart.iterations.values()) / planned_iterations(training)),
             )
         )
 
     engine = LevenbergMarquardt(
         termination=Termination(
-            max_iterations=training.prelude_iterations, tolerance=training.tolerance, patience=training.patience
+            max_iterations=training.pretraining_iterations, tolerance=training.tolerance, patience=training.patience
         ),
         on_iteration=report,
-        should_stop=race.stop.is_set,
+        should_stop=multistart.stop.is_set,
     )
-    theta = prelude.draw(np.random.default_rng(seed), centre)
-    prior = first_prior(training, race.layout, prelude, theta, centre)
-    name = f"{race.name}start {number + 1}, one step ahead"
-    return race.checkpoints.minimise(name, engine, prelude, theta, prior).theta
+    theta = pretraining.draw(np.random.default_rng(seed), centre)
+    prior = first_prior(training, multistart.layout, pretraining, theta, centre)
+    name = f"{multistart.name}start {number + 1}, one step ahead"
+    return multistart.checkpoints.minimise(name, engine, pretraining, theta, prior).theta
 
 
 def first_prior(
@@ -294,28 +298,28 @@ def first_prior(
     return layout.prior(centre, alpha=INITIAL_ALPHA if given is None else given * beta, beta=beta)
 
 
-def _begin(race: Race, number: int) -> tuple[int | None, NDArray[np.float64], NDArray[np.float64]]:
-    centre = _in_basis(race, race.layout.centre())
-    if number == 0 and race.initial is not None:
-        return None, _in_basis(race, race.initial), centre
-    seed = race.training.seed + number
-    return seed, race.layout.draw(np.random.default_rng(seed), centre), centre
+def _begin(multistart: Multistart, number: int) -> tuple[int | None, NDArray[np.float64], NDArray[np.float64]]:
+    centre = _in_basis(multistart, multistart.layout.centre())
+    if number == 0 and multistart.initial is not None:
+        return None, _in_basis(multistart, multistart.initial), centre
+    seed = multistart.training.seed + number
+    return seed, multistart.layout.draw(np.random.default_rng(seed), centre), centre
 
 
-def _in_basis(race: Race, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    if race.to_plain.shape[0] == race.to_plain.shape[1]:
-        return np.asarray(np.linalg.solve(race.to_plain, theta), dtype=np.float64)
-    return np.asarray(np.linalg.lstsq(race.to_plain, theta, rcond=None)[0], dtype=np.float64)
+def _in_basis(multistart: Multistart, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    if multistart.to_plain.shape[0] == multistart.to_plain.shape[1]:
+        return np.asarray(np.linalg.solve(multistart.to_plain, theta), dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(multistart.to_plain, theta, rcond=None)[0], dtype=np.float64)
 
 
-def _engine(race: Race, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
-    training = race.training
-    scale = race.template.scaling.output_scale**2
+def _engine(multistart: Multistart, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
+    training = multistart.training
+    scale = multistart.template.scaling.output_scale**2
     work = training.max_iterations * _work(training.starts, _rungs(training))
 
     def report(entry: Iteration) -> None:
-        race.iterations[number] = entry.iteration
-        race.on_progress(
+        multistart.iterations[number] = entry.iteration
+        multistart.on_progress(
             FitProgress(
                 stage="free run" if training.loop is Loop.CLOSED else "one step ahead",
                 start=number + 1,
@@ -324,7 +328,7 @@ def _engine(race: Race, number: int, iterations: int, seconds: float) -> Levenbe
                 max_iterations=training.max_iterations,
                 mse=entry.mse * scale,
                 elapsed_s=entry.elapsed_s,
-                fraction=min(1.0, sum(race.iterations.values()) / work),
+                fraction=min(1.0, sum(multistart.iterations.values()) / work),
             )
         )
 
@@ -333,27 +337,27 @@ def _engine(race: Race, number: int, iterations: int, seconds: float) -> Levenbe
     )
     if training.regularisation is not None:
         return LevenbergMarquardt(
-            termination=limits, on_iteration=report, should_stop=race.stop.is_set, evidence_after=None
+            termination=limits, on_iteration=report, should_stop=multistart.stop.is_set, evidence_after=None
         )
-    return LevenbergMarquardt(termination=limits, on_iteration=report, should_stop=race.stop.is_set)
+    return LevenbergMarquardt(termination=limits, on_iteration=report, should_stop=multistart.stop.is_set)
 
 
-def score(race: Race, model: Network) -> float:
+def score(multistart: Multistart, model: Network) -> float:
     """Geometric mean over the selection traces: one trace on which every start fails must not choose alone.
 
     Args:
-        race: The race, for its selection traces.
+        multistart: The multistart, for its selection traces.
         model: A model.
 
     Returns:
         Of the mean squared errors, in the output's unit squared; NaN without selection traces.
     """
     errors = []
-    for trace in race.selection:
+    for trace in multistart.selection:
         inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
-        begun = beginning(model, inputs, target, race.start, trace.usable_samples)
+        begun = beginning(model, inputs, target, multistart.start, trace.usable_samples)
         n, history = begun.first, begun.history
-        if race.training.loop is Loop.CLOSED:
+        if multistart.training.loop is Loop.CLOSED:
             output = model.simulate(inputs[n:], history)
         else:
             output = model.predict(inputs[n:], target[n:], history)

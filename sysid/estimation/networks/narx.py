@@ -16,16 +16,16 @@ from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import lagged
-from sysid.estimation.networks import ensemble as committee
+from sysid.estimation.networks import ensemble
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
+from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
 from sysid.estimation.networks.posterior import calibrate, laplace
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import RecursionProvider
-from sysid.estimation.networks.raced import raced_result, raced_status
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import check_initial, grown
 from sysid.estimation.result import FitResult, Loop
@@ -77,13 +77,13 @@ def fit_narx(
     """
     began = time.perf_counter()
     training, start = training or Training(), start or Start()
-    committee.check(training, selection)
+    ensemble.check(training, selection)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     lags = network.lags(len(mapping.inputs))
     experiments = tuple(e.from_measured(lags) for e in experiments_of(traces, mapping, start, rest))
     experiments = (*experiments, *_offset(experiments, mapping, training))
     task = _Task.of(_template(traces[0], mapping, network, experiments, rest), experiments, training)
-    race = starts.Race(
+    multistart = starts.Multistart(
         training=training,
         layout=task.layout,
         provider=task.provider,
@@ -95,16 +95,16 @@ def fit_narx(
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
         resume=resume,
-        prelude=_prelude(training, task, experiments),
+        pretraining=_pretraining(training, task, experiments),
     )
-    tasks = _raced(race, task, experiments)
+    tasks = _started(multistart, task, experiments)
     on_checkpoint(Checkpoint.of(choose(list(tasks), training.choose_by).chosen.solution.state))
-    tasks |= _with_committee(race, list(tasks), experiments, vet)
+    tasks |= _with_ensemble(multistart, list(tasks), experiments, vet)
     choice = choose(list(tasks), training.choose_by, vet)
     chosen = choice.chosen
     records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     records += [(t.columns(mapping.inputs), None) for t in selection]
-    status = raced_status(chosen, list(tasks), records, interrupted=race.stop.is_set())
+    status = multistart_status(chosen, list(tasks), records, interrupted=multistart.stop.is_set())
     posterior = laplace(
         chosen.solution.state,
         chosen.model,
@@ -117,13 +117,13 @@ def fit_narx(
         posterior = calibrate(
             posterior, chosen.model, [Experiment.for_model(t, chosen.model, start) for t in selection]
         )
-    seconds = race.checkpoints.earlier_s + time.perf_counter() - began
-    fit = raced_result(choice, list(tasks), training, status, seconds)
+    seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
+    fit = multistart_result(choice, list(tasks), training, status, seconds)
     return replace(fit, posterior=posterior)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Task(committee.Task):
+class _Task(ensemble.Task):
     """What is minimised for one size of the network and one set of its inputs.
 
     Args:
@@ -154,13 +154,17 @@ class _Task(committee.Task):
         return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider, inner=inner)
 
 
-def _raced(race: starts.Race, task: _Task, experiments: Sequence[Experiment]) -> dict[starts.Candidate, _Task]:
+def _started(
+    multistart: starts.Multistart, task: _Task, experiments: Sequence[Experiment]
+) -> dict[starts.Candidate, _Task]:
     """Every start at every look with what it minimises; those that do without some inputs race among themselves."""
     tasks: dict[starts.Candidate, _Task] = {}
-    for view in views(race.training, task.template.mapping):
-        own = replace(race, training=view.training, on_progress=view.report(race.on_progress), iterations={})
+    for view in views(multistart.training, task.template.mapping):
+        own = replace(
+            multistart, training=view.training, on_progress=view.report(multistart.on_progress), iterations={}
+        )
         if view.without:
-            part = _Task.of(task.template, experiments, race.training, view.without)
+            part = _Task.of(task.template, experiments, multistart.training, view.without)
             own = replace(
                 own,
                 name=f"without {', '.join(view.without)}, ",
@@ -169,41 +173,41 @@ def _raced(race: starts.Race, task: _Task, experiments: Sequence[Experiment]) ->
                 to_plain=part.to_plain,
                 initial=None,
                 resume=None,
-                prelude=_prelude(view.training, part, experiments),
+                pretraining=_pretraining(view.training, part, experiments),
             )
         found = starts.run(own)
         named = [replace(one, number=one.number + view.first, without=view.without) for one in found]
         tasks |= dict.fromkeys(named, part if view.without else task)
-        if race.stop.is_set():
+        if multistart.stop.is_set():
             break
     return tasks
 
 
-def _with_committee(
-    race: starts.Race,
+def _with_ensemble(
+    multistart: starts.Multistart,
     candidates: Sequence[starts.Candidate],
     experiments: Sequence[Experiment],
     vet: Callable[[starts.Network], bool] | None,
 ) -> dict[starts.Candidate, _Task]:
-    """The committee as one more candidate, with its task; none where no second vote helps, or nobody waits for it."""
-    if race.training.committee == 1 or race.stop.is_set():
+    """The ensemble as one more candidate, with its task; none where no second pick helps, or nobody waits for it."""
+    if multistart.training.ensemble == 1 or multistart.stop.is_set():
         return {}
     try:
-        found = committee.elected(race, candidates, vet)
+        found = ensemble.selected(multistart, candidates, vet)
     except KeyboardInterrupt:  # the starts are there, and the best of them stands
-        race.stop.set()
+        multistart.stop.set()
         return {}
     if found is None:
         return {}
-    task = _Task.of(found[0].model, experiments, race.training)
-    return {committee.seated(race, *found, task): task}
+    task = _Task.of(found[0].model, experiments, multistart.training)
+    return {ensemble.as_candidate(multistart, *found, task): task}
 
 
-def _prelude(training: Training, task: _Task, experiments: Sequence[Experiment]) -> StepSamples | None:
-    if not training.prelude or not task.layout.linear or not task.layout.neurons:
+def _pretraining(training: Training, task: _Task, experiments: Sequence[Experiment]) -> StepSamples | None:
+    if not training.pretraining or not task.layout.linear or not task.layout.neurons:
         return None
     return StepSamples.of(
-        task.template, experiments, task.layout, task.basis, samples=training.prelude, seed=training.seed
+        task.template, experiments, task.layout, task.basis, samples=training.pretraining, seed=training.seed
     )
 
 

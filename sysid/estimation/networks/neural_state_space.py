@@ -14,15 +14,15 @@ from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
+from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
-from sysid.estimation.networks.raced import raced_result, raced_status
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import FitResult, Loop
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start
 from sysid.traces import Trace
 
-LAGGED_ONLY = ("basis", "offsets", "prelude", "stride", "committee", "leave_out")
+LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_subsets")
 """Options of a training that concern lagged regressors."""
 
 
@@ -69,7 +69,7 @@ def fit_neural_state_space(
     experiments = experiments_of(traces, mapping, start, rest)
     template = _template(traces[0], mapping, network, experiments, rest)
     provider = NeuralProvider(template=template.recursion, experiments=experiments)
-    race = starts.Race(
+    multistart = starts.Multistart(
         training=training,
         layout=NeuralLayout(sizes=template.recursion.sizes, base=linear_start(provider)),
         provider=provider,
@@ -81,13 +81,13 @@ def fit_neural_state_space(
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
     )
-    candidates = starts.run(race)
+    candidates = starts.run(multistart)
     choice = choose(candidates, training.choose_by, vet)
     records = [(e.inputs, e.history) for e in experiments]
     records += [(e.inputs, e.history) for e in experiments_of(selection, mapping, start, rest)]
-    status = raced_status(choice.chosen, candidates, records, interrupted=race.stop.is_set())
-    seconds = race.checkpoints.earlier_s + time.perf_counter() - began
-    return raced_result(choice, candidates, training, status, seconds)
+    status = multistart_status(choice.chosen, candidates, records, interrupted=multistart.stop.is_set())
+    seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
+    return multistart_result(choice, candidates, training, status, seconds)
 
 
 def check_training(training: Training) -> None:

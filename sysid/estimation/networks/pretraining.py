@@ -1,9 +1,9 @@
-r"""The prelude to a free run: one step ahead on samples that fill the space of the regressors.
+r"""The pretraining to a free run: one step ahead on samples that fill the space of the regressors.
 
 A free run is dear to train from a random start: each iteration runs over every sample of every record, most of which
 say the same (a system at rest, held, slowly charging), and far from a minimum the errors of all earlier samples stand
 in the way of each one. The step that the recursion makes is a function of its regressors, though, and a function can be
-learnt from few samples if they are the right ones. The prelude therefore
+learnt from few samples if they are the right ones. The pretraining therefore
 
 1. takes ``samples`` of all records, with probability falling with the root of how many others stand in the same cell
    of the regressors' space. Cells are spaced by :math:`\operatorname{arsinh}(x / 0.01)`: what drives a system is often
@@ -16,8 +16,8 @@ learnt from few samples if they are the right ones. The prelude therefore
 What comes out is not yet a simulator, since errors one step ahead say little of how they add up, but it is a start from
 which the free run converges in tens of iterations instead of hundreds.
 
-Limits: with measured noise the one-step minimum is biased (errors in the regressors), and a prelude of many iterations
-leads away from where a short one does; the samples chosen are in memory with their Jacobian block by block.
+Limits: with measured noise the one-step minimum is biased (errors in the regressors), and many iterations lead away
+from where a few lead; the samples chosen are in memory with their Jacobian block by block.
 """
 
 from __future__ import annotations

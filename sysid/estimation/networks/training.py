@@ -39,16 +39,16 @@ class Training:
             copies that differ in level alone tell the network which to follow, and how far a sensor may be off.
         regularisation: ``None`` lets the evidence weigh the weights' sizes against the residuals, group by group. A
             number is that weight, the same for all and never changed: 0 is plain Levenberg-Marquardt (``trainlm``).
-        prelude: Samples on which a random start is trained one step ahead before the free run (``pretraining.py``):
-            cheap iterations that find what switches where. 0 for none.
-        prelude_iterations: Iterations of the prelude.
+        pretraining: Samples on which a random start is trained one step ahead before the free run
+            (``pretraining.py``): cheap iterations that find what switches where. 0 for none.
+        pretraining_iterations: Iterations of the pretraining.
         stride: Every so-manieth sample counts in the loss. Residuals of a free run are correlated over tens of samples:
             a few of them say nearly as much as all, and the price of the normal equations falls with them.
-        committee: Votes that unite the candidates of the race into one network whose one-step map is the mean of theirs
-            (``ensemble.py``), elected on the selection traces; 1 for none. Each member adds its neurons.
-        leave_out: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs and
-            networks that do without each of the sets (``input_subsets.py``), for a committee whose members differ in
-            what they rely on. All see everything by default.
+        ensemble: Picks that unite the candidates of the race into one network whose one-step map is the mean of theirs
+            (``ensemble.py``), selected on the selection traces; 1 for none. Each member adds its neurons.
+        input_subsets: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs
+            and networks that do without each of the sets (``input_subsets.py``), for an ensemble whose members differ
+            in what they rely on. All see everything by default.
     """
 
     loop: Loop = Loop.CLOSED
@@ -63,16 +63,16 @@ class Training:
     basis: str = "levels and rates"
     offsets: tuple[Mapping[str, float], ...] = ()
     regularisation: float | None = None
-    prelude: int = 0
-    prelude_iterations: int = 300
+    pretraining: int = 0
+    pretraining_iterations: int = 300
     stride: int = 1
-    committee: int = 1
-    leave_out: tuple[tuple[str, ...], ...] = ()
+    ensemble: int = 1
+    input_subsets: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loop", Loop(self.loop))
         object.__setattr__(self, "offsets", tuple(dict(offset) for offset in self.offsets))
-        object.__setattr__(self, "leave_out", tuple(tuple(names) for names in self.leave_out))
+        object.__setattr__(self, "input_subsets", tuple(tuple(names) for names in self.input_subsets))
         for name, choices in CHOICES.items():
             if getattr(self, name) not in choices:
                 raise ConfigError(
@@ -87,22 +87,24 @@ class Training:
             "patience",
             "starts",
             "workers",
-            "prelude_iterations",
+            "pretraining_iterations",
             "stride",
-            "committee",
+            "ensemble",
         ):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        if self.leave_out and self.starts <= len(self.leave_out):
+        if self.input_subsets and self.starts <= len(self.input_subsets):
             raise ConfigError(
                 "not every set of inputs has a start",
-                where="leave_out",
-                expected=f"{1 + len(self.leave_out)} starts or more",
+                where="input_subsets",
+                expected=f"{1 + len(self.input_subsets)} starts or more",
                 got=f"{self.starts} starts",
                 remedy="raise starts, or leave out fewer sets",
             )
-        if self.prelude < 0:
-            raise ConfigError("prelude is too small", where="prelude", expected="0 or more", got=self.prelude)
+        if self.pretraining < 0:
+            raise ConfigError(
+                "pretraining is too small", where="pretraining", expected="0 or more", got=self.pretraining
+            )
         if self.regularisation is not None and not 0.0 <= self.regularisation < float("inf"):
             raise ConfigError(
                 "not a regularisation",

@@ -54,7 +54,7 @@ class Davis:
 
 
 def modified_davis(mass: float, axles: int, *, drag: float = 0.07) -> Davis:
-    """The modified Davis equation of Committee 16 of the American Railway Engineering Association.
+    """The modified Davis equation of Ensemble 16 of the American Railway Engineering Association.
 
     ``R = 0.6 W + 20 n + 0.01 W V + K V^2`` with R in lb, W in short tons, n axles, V in mph, as A. A. Trani prints it
     (per ton) in "Rail Resistance Equations", Virginia Tech CEE 3604. K is 0.07 for conventional equipment, 0.0935 for

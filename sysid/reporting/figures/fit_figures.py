@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from sysid.reporting.figures.style import DASHES, PALETTE, PUBLISHED, TARGET, new_figure, series_style, styled
 from sysid.reporting.figures.thinning import distinct_points, thin
-from sysid.reporting.moments import Moment
 from sysid.reporting.numbers import number
 from sysid.reporting.results import CaseRecord, LearningCurve, Results
 from sysid.reporting.signals import CaseSignals
+from sysid.reporting.worst_instants import Instant
 
 _COLUMNS = 450
 _FREE_RUN: dict[str, Any] = {"color": PALETTE[0], "linestyle": DASHES[1], "linewidth": 1.5}
@@ -127,39 +127,39 @@ def _limit(above: Axes, below: Axes, target: NDArray[np.float64], simulated: NDA
     above.text(0.01, 0.95, text, transform=above.transAxes, color=PALETTE[0], va="top", weight="bold")
 
 
-def moments_figure(
-    moments: Sequence[Moment], signals: Dict[str, CaseSignals], *, title: str, label: str, unit: str
+def instants_figure(
+    instants: Sequence[Instant], signals: Dict[str, CaseSignals], *, title: str, label: str, unit: str
 ) -> Figure:
-    """Zooms at the worst moments of a free run.
+    """Zooms at the worst instants of a free run.
 
     Args:
-        moments: At least one, worst first.
+        instants: At least one, worst first.
         signals: By case.
         title: Stands above.
         label: What the output is, for the axes.
         unit: Its unit.
 
     Returns:
-        The figure: one panel a moment.
+        The figure: one panel an instant.
     """
     with styled():
-        columns = min(3, len(moments))
-        rows = -(-len(moments) // columns)
+        columns = min(3, len(instants))
+        rows = -(-len(instants) // columns)
         figure = new_figure(7.6, 0.5 + 2.2 * rows)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for number, (axes, moment) in enumerate(zip(panels, moments, strict=False)):
-            case = signals[moment.case]
-            window = slice(moment.first, moment.last + 1)
+        for number, (axes, instant) in enumerate(zip(panels, instants, strict=False)):
+            case = signals[instant.case]
+            window = slice(instant.first, instant.last + 1)
             _line(axes, case.time[window], case.target[window], _COLUMNS, color=TARGET, linewidth=1.1, label="target")
             _line(axes, case.time[window], case.simulated[window], _COLUMNS, **_FREE_RUN, label="free run")
-            axes.axvline(moment.time, color=PALETTE[1], linewidth=0.9, linestyle=DASHES[2])
-            error = f"{moment.error:+.3g} {unit}" if np.isfinite(moment.error) else "diverged"
-            axes.set_title(f"{number + 1}. {moment.case}, {moment.time:g} s: {error}", fontsize=8.5)
+            axes.axvline(instant.time, color=PALETTE[1], linewidth=0.9, linestyle=DASHES[2])
+            error = f"{instant.error:+.3g} {unit}" if np.isfinite(instant.error) else "diverged"
+            axes.set_title(f"{number + 1}. {instant.case}, {instant.time:g} s: {error}", fontsize=8.5)
             axes.set_xlabel("time [s]")
             axes.set_ylabel(f"{label} [{unit}]" if number % columns == 0 else "")
             axes.locator_params(nbins=4)
-        for axes in panels[len(moments) :]:
+        for axes in panels[len(instants) :]:
             axes.set_visible(False)
         panels[0].legend(loc="best")
         return figure

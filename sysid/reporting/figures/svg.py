@@ -39,7 +39,7 @@ def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
     buffer = io.StringIO()
     with styled():
         figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-    root = ET.fromstring(buffer.getvalue())  # noqa: S314 - our own drawing, made a moment ago
+    root = ET.fromstring(buffer.getvalue())  # noqa: S314 - our own drawing, made an instant ago
     _plain_names(root)
     _without(root, {"metadata", "style"})
     _short_ids(root, name)

@@ -9,19 +9,19 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from sysid.composite import Composite, TrainingPlan
 from sysid.models import Limit
 from sysid.workbench.assembly.extending import extending_schema
-from sysid.workbench.assembly.member_config import KnownConfig, MemberConfig, StandingConfig
-from sysid.workbench.assembly.proof_config import LineConfig, PublishedConfig, StressConfig
+from sysid.workbench.assembly.member_config import FixedConfig, MemberConfig, StandingConfig
+from sysid.workbench.assembly.proof_config import InterpolationConfig, MonteCarloConfig, PublishedConfig
 from sysid.workbench.assembly.stage_config import (
-    GrowConfig,
-    LessonsConfig,
+    AblationConfig,
+    ActiveLearningConfig,
     OneStepConfig,
     RetrainConfig,
     TogetherConfig,
     check_rounds,
     names_in,
 )
-from sysid.workbench.fields import STRICT
 from sysid.workbench.fits.config import ExportConfig
+from sysid.workbench.old_words import ASSEMBLY, STRICT, Words
 from sysid.workbench.stability import ExcursionConfig
 from sysid.yaml_files import FieldError
 
@@ -35,7 +35,7 @@ class LimitConfig(BaseModel):
     high: float | str | None = None
 
 
-class AssemblyConfig(BaseModel):
+class AssemblyConfig(Words):
     """A pipeline of kind ``assembly``.
 
     Args:
@@ -52,9 +52,9 @@ class AssemblyConfig(BaseModel):
         choose_on: Outputs whose error on the selection traces chooses; those that are scored by default.
         definitions: Anything, to be repeated by YAML's anchors; not read.
         members: The members.
-        known: Members that are declared, not fitted; members may read them, and they the members.
-        begin: Bundle of a trained whole to go on from, seen from the folder of the YAML: its networks stand where the
-            members would be fitted, and ``together`` trains them on, and ``grow``.
+        fixed: Members that are declared, not fitted; members may read them, and they the members.
+        warm_start: Bundle of a trained whole to go on from, seen from the folder of the YAML: its networks stand where
+            the members would be fitted; ``together`` trains them on, and ``active_learning``.
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
         limits: Limits of outputs; in its other places a member has those of its first, unless they have their own.
         stability: How the free run of each candidate is checked by itself. It says so in the candidate's status; by
@@ -62,20 +62,21 @@ class AssemblyConfig(BaseModel):
         one_step: Each candidate fitted one step ahead as well, to see what becomes of it in free run.
         retrain: Members to train again on what the others put out.
         together: Training end to end.
-        grow: Growing its data by what the whole is worst at.
-        line: Places between those that are modelled.
-        stress: Random sequences on which the whole has to hold.
+        active_learning: Growing its data by what the whole is worst at.
+        interpolation: Places between those that are modelled.
+        monte_carlo: Random sequences on which the whole has to hold.
         published: Published figures by output.
         published_models: A table of ``reports/published`` with models of single members: where it has one of the same
             mapping and structure as a candidate, its figures stand beside the candidate's.
         published_whole: What that table calls the whole, such as ``STP -> BP -> BC``: all that it has of such wholes
             stands beside the stages.
-        lessons: What was published on the lessons that the stages put to the test.
+        ablation: What was published on the lessons that the stages put to the test.
         seed: Seed of everything random.
         export: What leaves the workbench; ``null`` for nothing.
     """
 
     model_config = ConfigDict(**STRICT, json_schema_extra=extending_schema)
+    OLD = ASSEMBLY
 
     kind: Literal["assembly"]
     extends: str | None = None
@@ -88,21 +89,21 @@ class AssemblyConfig(BaseModel):
     choose_on: tuple[str, ...] = ()
     definitions: dict[str, Any] = Field(default_factory=dict)
     members: tuple[MemberConfig, ...] = Field(min_length=1)
-    known: tuple[KnownConfig, ...] = ()
-    begin: str | None = None
+    fixed: tuple[FixedConfig, ...] = ()
+    warm_start: str | None = None
     rest: dict[str, float | str] = Field(default_factory=dict)
     limits: dict[str, LimitConfig] = Field(default_factory=dict)
     stability: ExcursionConfig = ExcursionConfig(choose=False)
     one_step: OneStepConfig | None = None
     retrain: RetrainConfig | None = None
     together: TogetherConfig | None = None
-    grow: GrowConfig | None = None
-    line: LineConfig | None = None
-    stress: StressConfig | None = None
+    active_learning: ActiveLearningConfig | None = None
+    interpolation: InterpolationConfig | None = None
+    monte_carlo: MonteCarloConfig | None = None
     published: dict[str, PublishedConfig] = Field(default_factory=dict)
     published_models: str | None = None
     published_whole: str | None = None
-    lessons: LessonsConfig = LessonsConfig()
+    ablation: AblationConfig = AblationConfig()
     seed: int = Field(default=0, ge=0)
     export: ExportConfig | None = ExportConfig(formats=("onnx", "c"))
 
@@ -111,7 +112,7 @@ class AssemblyConfig(BaseModel):
         """What stands in the whole, as it is trained."""
         return Composite(
             members=tuple(one.member(self.seed, self.stability.options()) for one in self.members),
-            fixed=tuple(one.fixed() for one in self.known),
+            fixed=tuple(one.fixed() for one in self.fixed),
             rest=self.rest,
             limits={name: Limit(low=one.low, high=one.high) for name, one in self.limits.items()},
         )
@@ -125,13 +126,13 @@ class AssemblyConfig(BaseModel):
             one_step=None if self.one_step is None else self.one_step.options(),
             retrain=None if self.retrain is None else self.retrain.options(),
             rounds=tuple(one.plan(self.seed) for one in self.joint),
-            active_learning=None if self.grow is None else self.grow.options(growing),
+            active_learning=None if self.active_learning is None else self.active_learning.options(growing),
         )
 
     @property
     def standing(self) -> tuple[StandingConfig, ...]:
         """All members, the fitted ones first."""
-        return (*self.members, *self.known)
+        return (*self.members, *self.fixed)
 
     @property
     def joint(self) -> tuple[TogetherConfig, ...]:
@@ -141,13 +142,17 @@ class AssemblyConfig(BaseModel):
     @property
     def growing(self) -> tuple[TogetherConfig, ...]:
         """The rounds of training end to end that each round of growth goes through."""
-        return self.joint[-1].followed_by(self.grow.train) if self.grow and self.joint else ()
+        return self.joint[-1].followed_by(self.active_learning.train) if self.active_learning and self.joint else ()
 
     @property
     def wanted(self) -> tuple[str, ...]:
         """Outputs that are asked of the whole; what none of them depends on only the training looked at."""
-        stressed = (self.stress.output,) if self.stress else ()
-        line = (self.line.channel, *self.line.knots, *self.line.outputs) if self.line else ()
+        stressed = (self.monte_carlo.output,) if self.monte_carlo else ()
+        line = (
+            (self.interpolation.channel, *self.interpolation.knots, *self.interpolation.outputs)
+            if self.interpolation
+            else ()
+        )
         return tuple(dict.fromkeys((*self.outputs, *self.choose_on, *stressed, *line)))
 
     @model_validator(mode="after")
@@ -163,7 +168,7 @@ class AssemblyConfig(BaseModel):
 
     @model_validator(mode="after")
     def _check_begin(self) -> AssemblyConfig:
-        if self.begin is None:
+        if self.warm_start is None:
             return self
         fitted = {
             "candidates": any(member.candidates > 1 for member in self.members),
@@ -176,14 +181,14 @@ class AssemblyConfig(BaseModel):
             raise FieldError(
                 f"a whole that is begun from another one has {', '.join(asked)}",
                 expected="begin and together: there is one beginning, and no fit of a member alone",
-                got=f"begin: {self.begin}, and {', '.join(asked)}",
+                got=f"warm_start: {self.warm_start}, and {', '.join(asked)}",
                 remedy=f"leave out {', '.join(asked)}, or begin",
             )
         return self
 
     @model_validator(mode="after")
-    def _check_grow(self) -> AssemblyConfig:
-        if self.grow is None:
+    def _check_active_learning(self) -> AssemblyConfig:
+        if self.active_learning is None:
             return self
         if self.together is None:
             raise FieldError(
@@ -193,11 +198,12 @@ class AssemblyConfig(BaseModel):
                 remedy="add together, or leave grow out",
             )
         check_rounds(self.growing)
-        if (used := self._data).get(self.grow.data):
+        pool = self.active_learning.data
+        if (used := self._data).get(pool):
             raise FieldError(
-                f"the pool to grow by is used otherwise: {self.grow.data} is under {used[self.grow.data]}",
+                f"the pool of active_learning is used otherwise: {pool} is under {used[pool]}",
                 expected="a data set that nothing else trains on, chooses by or scores",
-                got=f"grow, data: {self.grow.data}",
+                got=f"active_learning, data: {self.active_learning.data}",
                 remedy="name another pool",
             )
         return self
@@ -207,7 +213,7 @@ class AssemblyConfig(BaseModel):
         """Every data set but the pool, and which field names it."""
         training = (self.training,) if isinstance(self.training, str) else self.training
         also = self.together.data if self.together else ()
-        beside = {"stress, data": self.stress, "line, data": self.line}
+        beside = {"monte_carlo, data": self.monte_carlo, "interpolation, data": self.interpolation}
         return {
             self.data: "data",
             **{one.data: field for field, one in beside.items() if one},
@@ -219,7 +225,7 @@ class AssemblyConfig(BaseModel):
     @model_validator(mode="after")
     def _check_outputs(self) -> AssemblyConfig:
         bases = [member.mapping.output for member in self.members]
-        written = [f"{one.mapping.output}{place}" for one in self.standing for place in one.places]
+        written = [f"{one.mapping.output}{place}" for one in self.standing for place in one.instances]
         if len(set(written)) < len(written):
             raise FieldError(
                 "two members write one channel",
@@ -232,12 +238,14 @@ class AssemblyConfig(BaseModel):
             "choose_on": self.choose_on,
             "limits": tuple(self.limits),
             "published": tuple(self.published),
-            "stress": (self.stress.output,) if self.stress else (),
-            "grow, outputs": self.grow.outputs if self.grow else (),
-            "line": (self.line.channel, *self.line.knots, *self.line.outputs) if self.line else (),
+            "monte_carlo": (self.monte_carlo.output,) if self.monte_carlo else (),
+            "active_learning, outputs": self.active_learning.outputs if self.active_learning else (),
+            "interpolation": (self.interpolation.channel, *self.interpolation.knots, *self.interpolation.outputs)
+            if self.interpolation
+            else (),
         }
         named = {"retrain, members": self.retrain.members if self.retrain else ()}
-        for stage, rounds in (("together", self.joint), ("grow, train", self.growing)):
+        for stage, rounds in (("together", self.joint), ("active_learning, train", self.growing)):
             for field, names in names_in(rounds).items():
                 (named if field == "members" else asked)[f"{stage}, {field}"] = names
         for known, places in ((written, asked), (bases, named)):

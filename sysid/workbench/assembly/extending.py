@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from sysid.errors import ConfigError
 from sysid.models import Mapping
 from sysid.workbench.kinds import DEFAULT
+from sysid.workbench.old_words import ASSEMBLY, with_new_words
 from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import Loc, Origins, read_yaml, yaml_text
 
@@ -75,7 +76,7 @@ def read_joined(path: Path) -> Joined:
 
 def _read(path: Path, before: tuple[Path, ...]) -> Joined:
     """The same, for a file to which others have led."""
-    data, own = read_yaml(path), Origins(file=path)
+    data, own = with_new_words(read_yaml(path), ASSEMBLY), Origins(file=path)
     text = path.read_bytes()
     if data.get("extends") is None:
         return Joined(data=data, origins=own, files=(path,), text=text)
@@ -137,7 +138,7 @@ def _join(base: Joined, data: dict[str, Any], own: Origins) -> tuple[dict[str, A
             whole[key], parts[key,] = theirs, (base.origins, (key,))
         elif ours is None and key in base.data and key not in NULL_MEANS:
             continue
-        elif key == "known" and isinstance(theirs, list) and isinstance(ours, list):
+        elif key == "fixed" and isinstance(theirs, list) and isinstance(ours, list):
             entries = dict(enumerate(_join_known(_listed(theirs, base.origins), _listed(ours, own))))
             whole[key] = [entry.value for entry in entries.values()]
         elif key == "limits" and isinstance(theirs, dict) and isinstance(ours, dict):
@@ -150,7 +151,7 @@ def _join(base: Joined, data: dict[str, Any], own: Origins) -> tuple[dict[str, A
 
 
 def _listed(known: list[Any], origins: Origins) -> list[_Entry]:
-    return [_Entry(one, origins, ("known", at)) for at, one in enumerate(known)]
+    return [_Entry(one, origins, ("fixed", at)) for at, one in enumerate(known)]
 
 
 def _join_known(theirs: list[_Entry], ours: list[_Entry]) -> list[_Entry]:

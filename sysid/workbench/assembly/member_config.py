@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, cast
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, cast
 
 from pydantic import BaseModel, Field, ValidationInfo, ValidatorFunctionWrapHandler, field_validator, model_validator
 
@@ -11,7 +12,6 @@ from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training
 from sysid.models import NARX
 from sysid.workbench.fields import (
-    STRICT,
     MappingField,
     StructureField,
     TrainingConfig,
@@ -19,28 +19,29 @@ from sysid.workbench.fields import (
     given_options,
     options_config,
 )
+from sysid.workbench.old_words import STRICT, Words
 from sysid.yaml_files import FieldError
 
 
-class StandingConfig(BaseModel):
+class StandingConfig(Words):
     """What stands in one place or in several.
 
     Args:
         mapping: Inputs and output, such as ``BP+AR -> BC``; in the first place as they are.
-        places: Suffixes of the channel names, one for each place where it stands: ``["", "10"]`` puts it at
+        instances: Suffixes of the channel names, one for each place where it stands: ``["", "10"]`` puts it at
             ``BP -> AR`` and ``BP10 -> AR10``.
         shared: Inputs that have the same name in every place.
     """
 
-    model_config = STRICT
+    OLD: ClassVar[Mapping[str, str]] = {"places": "instances"}
 
     mapping: MappingField
-    places: Annotated[tuple[str, ...], Field(min_length=1)] = ("",)
+    instances: Annotated[tuple[str, ...], Field(min_length=1)] = ("",)
     shared: tuple[str, ...] = ()
 
     def standing(self) -> dict[str, Any]:
         """Where it stands, in the words of :class:`sysid.composite.Standing`."""
-        return {"mapping": self.mapping, "instances": self.places, "shared": self.shared}
+        return {"mapping": self.mapping, "instances": self.instances, "shared": self.shared}
 
 
 class SweepSource(BaseModel):
@@ -124,7 +125,7 @@ class MemberConfig(StandingConfig):
         )
 
 
-class KnownConfig(StandingConfig):
+class FixedConfig(StandingConfig):
     """A member that is declared and not fitted: a weighted sum of its inputs, held between two bounds.
 
     Args:
@@ -146,7 +147,7 @@ class KnownConfig(StandingConfig):
     unit: str = "1"
 
     @model_validator(mode="after")
-    def _check(self) -> KnownConfig:
+    def _check(self) -> FixedConfig:
         try:
             self.fixed()
         except ConfigError as error:

@@ -8,7 +8,7 @@ from pathlib import Path
 from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name, candidate_title
 from sysid.names import slug, task_slug
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.finish import EXPORT, MEMBERS, PLACES, SCORING, STRESS, WHOLE
+from sysid.workbench.assembly.evaluation import EXPORT, MEMBERS, PLACES, SCORING, STRESS, WHOLE
 from sysid.workbench.fits.data import unmade_data
 from sysid.workbench.runner.run import REPORT
 from sysid.workbench.runner.steps import Estimate, Outlined
@@ -30,7 +30,7 @@ def outline(config: AssemblyConfig, beside: Path) -> list[Outlined]:
 def _data(config: AssemblyConfig, beside: Path) -> list[Outlined]:
     training = (config.training,) if isinstance(config.training, str) else config.training
     names = [config.data, *training, config.selection, *(config.together.data if config.together else ())]
-    names += [] if config.grow is None else [config.grow.data]
+    names += [] if config.active_learning is None else [config.active_learning.data]
     return [_loading(name, beside) for name in dict.fromkeys(names) if name is not None]
 
 
@@ -41,7 +41,7 @@ def _loading(name: str, beside: Path) -> Outlined:
 
 def _training(config: AssemblyConfig) -> Iterator[Outlined]:
     plan = config.plan
-    if config.begin is None:
+    if config.warm_start is None:
         yield from _members(config)
     for number in range(1, len(plan.rounds) + 1):
         name = "together" if number == 1 else f"together-{number}"
@@ -79,11 +79,11 @@ def _members(config: AssemblyConfig) -> Iterator[Outlined]:
 def _proof(config: AssemblyConfig, beside: Path) -> Iterator[Outlined]:
     yield SCORING
     yield WHOLE
-    if config.stress is not None:
-        yield from (_loading(config.stress.data, beside), STRESS)
-    if config.line is not None:
-        yield from (_loading(config.line.data, beside), PLACES)
+    if config.monte_carlo is not None:
+        yield from (_loading(config.monte_carlo.data, beside), STRESS)
+    if config.interpolation is not None:
+        yield from (_loading(config.interpolation.data, beside), PLACES)
     if config.export is not None:
         yield EXPORT
-    if config.begin is None:
+    if config.warm_start is None:
         yield MEMBERS

@@ -6,11 +6,11 @@ from itertools import pairwise
 
 from pydantic import BaseModel, Field, model_validator
 
-from sysid.workbench.fields import STRICT
+from sysid.workbench.old_words import STRICT
 from sysid.yaml_files import FieldError
 
 
-class StressConfig(BaseModel):
+class MonteCarloConfig(BaseModel):
     """Random sequences of the reference, on which the whole has to hold.
 
     Args:
@@ -28,14 +28,14 @@ class StressConfig(BaseModel):
     states: str | None = None
 
 
-class LineConfig(BaseModel):
+class InterpolationConfig(BaseModel):
     """Places between those that are modelled: a channel is interpolated to them, and the members stand there too.
 
     Args:
         channel: What the members at a place read, by its name in the first place.
         knots: Position of each place that is modelled, increasing, by the channel's name there.
         outputs: What is had at every place, by the names in the first place.
-        data: Data set with the reference at places: the output at place 17 is the output's name with 17 behind it.
+        data: Data set with the reference at instances: the output at place 17 is the output's name with 17 behind it.
         judged: Outputs that are scored there; all by default.
     """
 
@@ -48,7 +48,7 @@ class LineConfig(BaseModel):
     judged: tuple[str, ...] = ()
 
     @model_validator(mode="after")
-    def _check(self) -> LineConfig:
+    def _check(self) -> InterpolationConfig:
         positions = list(self.knots.values())
         if any(after <= before for before, after in pairwise(positions)):
             raise FieldError(

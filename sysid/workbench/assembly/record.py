@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.composite.active_learning import Growth, Look
 from sysid.composite.limits_held import Holding
-from sysid.composite.monte_carlo import Stress
+from sysid.composite.monte_carlo import MonteCarlo
 from sysid.composite.round import TrainedRound
 from sysid.composite.training import TrainedComposite
 from sysid.models import Activity, Cascade
@@ -21,9 +21,9 @@ from sysid.reporting.assembly.results import AssemblyResults
 from sysid.reporting.records import RESULTS_FILE, parse_record
 from sysid.reporting.signals import MONTE_CARLO_FILE, SIGNALS_FILE
 from sysid.traces import Trace, TraceSet
+from sysid.workbench.assembly.ablation import Ablation
 from sysid.workbench.assembly.context import Context
-from sysid.workbench.assembly.lessons import Lesson
-from sysid.workbench.assembly.line import LineScores
+from sysid.workbench.assembly.interpolation import InterpolationScores
 from sysid.workbench.assembly.member_scores import CandidateScores, MemberScores
 from sysid.workbench.assembly.written import written
 from sysid.workbench.runner.store import strict, write_arrays
@@ -48,11 +48,11 @@ class Outcome:
         stressed: What came of the random sequences.
         worst: The sequences that the whole did worst on, whose signals are kept.
         unseen: By stage of growth, how it does on the random sequences.
-        line: How the places do between those that are modelled, if they were asked for.
+        interpolation: How the places do between those that are modelled, if they were asked for.
         exported: The bundle, if one was asked for.
         holding: Which limits hold the outputs in free run.
         members: The members' candidates by themselves, where there are several or they were fitted one step ahead too.
-        lessons: What the stages say of each step of modelling by parts.
+        ablation: What the stages say of each step of modelling by parts.
     """
 
     whole: Cascade
@@ -60,14 +60,14 @@ class Outcome:
     selection: Mapping[str, float]
     chosen: str
     timing: Mapping[str, float]
-    stressed: Stress | None
+    stressed: MonteCarlo | None
     worst: Sequence[Trace] = ()
     unseen: Mapping[str, Look] = field(default_factory=dict)
-    line: LineScores | None = None
+    interpolation: InterpolationScores | None = None
     exported: Bundle | None = None
     holding: Sequence[Holding] = ()
     members: Sequence[MemberScores] = ()
-    lessons: Sequence[Lesson] = ()
+    ablation: Sequence[Ablation] = ()
 
 
 def assembly_results(
@@ -113,11 +113,11 @@ def assembly_results(
         "members": [_member(one) for one in found.members],
         "rounds": [_round(one) for one in trained.rounds],
         "active_learning": [] if trained.growth is None else [_growth(trained.growth, found.unseen)],
-        "ablation": [asdict(one) for one in found.lessons],
+        "ablation": [asdict(one) for one in found.ablation],
         "monte_carlo": None if found.stressed is None else _stress(found.stressed),
         "limits": [_holding(one) for one in found.holding],
         "limit_check": asdict(trained.limits) if trained.limits.limits else None,
-        "interpolation": None if found.line is None else _line(found.line),
+        "interpolation": None if found.interpolation is None else _line(found.interpolation),
         "exports": [] if found.exported is None else _exports(found.exported),
         "notes": list(notes),
     }
@@ -237,7 +237,7 @@ def _growth(grown: Growth, unseen: Mapping[str, Look]) -> dict[str, Any]:
     }
 
 
-def _stress(one: Stress) -> dict[str, Any]:
+def _stress(one: MonteCarlo) -> dict[str, Any]:
     return {**asdict(one), "worst": [{"name": name, "rmse": error} for name, error in one.worst]}
 
 
@@ -250,7 +250,7 @@ def _activity(one: Activity | None) -> dict[str, Any] | None:
     return None if one is None else {name: getattr(one, name) for name in ("low", "high", "lost", "samples")}
 
 
-def _line(scores: LineScores) -> dict[str, Any]:
+def _line(scores: InterpolationScores) -> dict[str, Any]:
     return {
         "outputs": {
             name: {

@@ -11,15 +11,15 @@ from sysid.models import Cascade, cascade_from_dict
 from sysid.reporting.assembly.document import headline
 from sysid.reporting.assembly.results import AssemblyResults
 from sysid.reporting.comparing.published import read_published
-from sysid.workbench.assembly.begun import read_whole
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
+from sysid.workbench.assembly.data import AssemblyData
+from sysid.workbench.assembly.evaluation import ASSEMBLY, LINE, Evaluating
 from sysid.workbench.assembly.extending import read_joined
-from sysid.workbench.assembly.finish import ASSEMBLY, LINE, Finish
-from sysid.workbench.assembly.line import StoredLine
-from sysid.workbench.assembly.material import Material
+from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.assembly.outline import outline
 from sysid.workbench.assembly.swept import swept
+from sysid.workbench.assembly.warm_start import read_whole
 from sysid.workbench.judging.runner import closing
 from sysid.workbench.runner.program import Program
 from sysid.workbench.runner.run import Run
@@ -64,14 +64,14 @@ def _run(context: Context) -> AssemblyResults:
         read_published(config.published_models)  # a wrong name is said now, not when all is trained
     cases = context.load(config.data)
     context.cases.append(cases)
-    material, begin = Material.of(context), None
-    if config.begin is not None:
-        begin, said = read_whole(context.beside / config.begin)
+    data, begin = AssemblyData.of(context), None
+    if config.warm_start is not None:
+        begin, said = read_whole(context.beside / config.warm_start)
         notes.append(said)
     given = {member.mapping.output: swept(context, member) for member in config.members}
-    trained = train(config.composite, config.plan, material.data, begin=begin, given=given, keeper=context)
-    finish = Finish(context=context, trained=trained, notes=(*notes, *trained.notes))
-    results = finish.results(cases, material)
+    trained = train(config.composite, config.plan, data.data, begin=begin, given=given, keeper=context)
+    finish = Evaluating(context=context, trained=trained, notes=(*notes, *trained.notes))
+    results = finish.results(cases, data)
     page = context.run.report(results)
     context.run.then(lambda: finish.track(results, page.value))
     return results
@@ -92,7 +92,7 @@ def read_assembly(folder: Path) -> Cascade:
     return cascade_from_dict(_left(folder, ASSEMBLY, "the run has no assembly"))
 
 
-def read_line(folder: Path) -> StoredLine:
+def read_line(folder: Path) -> StoredInterpolation:
     """The line that a run left: every place between those that it modelled.
 
     Args:
@@ -104,7 +104,7 @@ def read_line(folder: Path) -> StoredLine:
     Raises:
         ConfigError: If the run has not come so far, or its pipeline has no ``line``.
     """
-    return StoredLine.from_dict(_left(folder, LINE, "the run has no line"))
+    return StoredInterpolation.from_dict(_left(folder, LINE, "the run has no line"))
 
 
 def _left(folder: Path, name: str, what: str) -> Any:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
 from sysid.composite import ActiveLearning, OneStep, Retraining, RoundPlan
 from sysid.errors import ConfigError
 from sysid.estimation import JointTraining
-from sysid.workbench.fields import STRICT, JointConfig, LagsField, as_field_error
+from sysid.workbench.fields import JointConfig, LagsField, as_field_error
+from sysid.workbench.old_words import JOINT_TRAINING, STRICT, Words
 from sysid.yaml_files import FieldError
 
 
@@ -32,7 +33,7 @@ class OneStepConfig(BaseModel):
         return OneStep(max_iterations=self.max_iterations, starts=self.starts)
 
 
-class LessonsConfig(BaseModel):
+class AblationConfig(BaseModel):
     """What was published on each of the lessons that the stages of an assembly put to the test; words for the report.
 
     Args:
@@ -74,34 +75,34 @@ Reads = dict[str, dict[str, LagsField]]
 """By the output of a member, lags of the channels that it reads more."""
 
 
-OF_TRAINING = ("max_iterations", "moves", "leverage", "soft_margin")
+OF_TRAINING = ("max_iterations", "moves", "leverage", "robust_scale")
 """Options of a training that a round may have for itself."""
 
 
-class RoundConfig(BaseModel):
+class RoundConfig(Words):
     """A round of training end to end as far as it is another one than that before; what it does not name stays.
 
     Args:
         members: Outputs of the members that are trained.
         measured: As under ``together``; ``[]`` for none any more.
-        everywhere: As under ``together``.
+        share_weights: As under ``together``.
         targets: The error of each output that counts as one, in its unit.
         max_iterations: Of its training.
         moves: Of its training.
         leverage: Of its training.
-        soft_margin: Of its training.
+        robust_scale: Of its training.
     """
 
-    model_config = STRICT
+    OLD: ClassVar[Mapping[str, str]] = {"everywhere": "share_weights", **JOINT_TRAINING}
 
     members: tuple[str, ...] | None = Field(default=None, min_length=1)
     measured: tuple[str, ...] | None = None
-    everywhere: bool | None = None
+    share_weights: bool | None = None
     targets: dict[str, float] | None = Field(default=None, min_length=1)
     max_iterations: int | None = Field(default=None, ge=1)
     moves: float | None = Field(default=None, gt=0)
     leverage: float | None = Field(default=None, gt=0)
-    soft_margin: float | None = Field(default=None, gt=0)
+    robust_scale: float | None = Field(default=None, gt=0)
 
 
 class AgainConfig(RoundConfig):
@@ -113,19 +114,19 @@ class AgainConfig(RoundConfig):
         also: Data sets as under ``together``.
     """
 
-    reads: Reads = {}
+    reads: Reads = Field(default_factory=dict)
     traces: int | None = Field(default=None, ge=1)
     also: tuple[str, ...] | None = None
 
 
-class TogetherConfig(BaseModel):
+class TogetherConfig(Words):
     """Members that are trained end to end, for the free run of the whole.
 
     Args:
         members: Outputs of the members that are trained; all by default.
         measured: Outputs that are as measured while the others are trained, such as a switch: where the free run
             decides when it flips, the loss has an edge there, and no step of the training sees across it.
-        everywhere: Whether the members keep one set of weights for all places where they stand. They are trained in
+        share_weights: Whether the members keep one set of weights for all places where they stand. They are trained in
             their first place, on traces of every place in turn; what they read from elsewhere is as measured, or as the
             whole puts it out.
         targets: The error of each output that counts as one, in its unit.
@@ -140,13 +141,13 @@ class TogetherConfig(BaseModel):
         again: Further rounds, for what is too slow from the beginning, such as more traces.
     """
 
-    model_config = STRICT
+    OLD: ClassVar[Mapping[str, str]] = {"everywhere": "share_weights"}
 
     members: tuple[str, ...] | None = None
     measured: tuple[str, ...] = ()
-    everywhere: bool = False
+    share_weights: bool = False
     targets: dict[str, float] = Field(min_length=1)
-    reads: Reads = {}
+    reads: Reads = Field(default_factory=dict)
     training: JointConfig = Field(default_factory=JointConfig)
     traces: int | None = Field(default=None, ge=1)
     also: tuple[str, ...] = ()
@@ -202,7 +203,7 @@ class TogetherConfig(BaseModel):
             targets=self.targets,
             members=self.members,
             measured=self.measured,
-            share_weights=self.everywhere,
+            share_weights=self.share_weights,
             reads=self.reads,
             training=JointTraining(**{"seed": seed, **given}),
             traces=self.traces,
@@ -247,7 +248,7 @@ def names_in(rounds: Sequence[TogetherConfig]) -> dict[str, tuple[str, ...]]:
 Count = Annotated[int, Field(ge=1)]
 
 
-class GrowConfig(BaseModel):
+class ActiveLearningConfig(BaseModel):
     """Training data that grow by what the whole is worst at, round by round, behind the rounds of ``together``.
 
     Args:
@@ -280,7 +281,7 @@ class GrowConfig(BaseModel):
     train: tuple[RoundConfig, ...] = Field(default=(RoundConfig(),), min_length=1)
 
     @model_validator(mode="after")
-    def _check(self) -> GrowConfig:
+    def _check(self) -> ActiveLearningConfig:
         if isinstance(self.add, tuple) and self.rounds is not None and self.rounds != len(self.add):
             raise FieldError(
                 f"{self.rounds} rounds of growth, and what to add in {len(self.add)}",

@@ -13,7 +13,7 @@ from sysid.errors import ConfigError
 from sysid.export.command_table import read_command
 from sysid.ingest import write_trace
 from sysid.traces import Channel, Trace
-from sysid.workbench.assembly.line import StoredLine
+from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.assembly.runner import read_line
 from sysid.workbench.commands.simulate import check_picture
 from sysid.workbench.runner.console import console
@@ -72,7 +72,7 @@ def simulate_line_command(
     _draw(stored, trace, positions, plot or out.with_suffix(".png"), title=folder.name)
 
 
-def simulate_line(stored: StoredLine, given: Trace, positions: list[float]) -> Trace:
+def simulate_line(stored: StoredInterpolation, given: Trace, positions: list[float]) -> Trace:
     """Every place of a line as one trace.
 
     Args:
@@ -144,7 +144,7 @@ def _cannot(text: str, got: str) -> ConfigError:
     )
 
 
-def _draw(stored: StoredLine, trace: Trace, positions: list[float], plot: Path, *, title: str) -> None:
+def _draw(stored: StoredInterpolation, trace: Trace, positions: list[float], plot: Path, *, title: str) -> None:
     from sysid.reporting.figures.simulation_figure import simulation_figure
     from sysid.reporting.figures.style import styled
 

@@ -25,7 +25,6 @@ from sysid.models import Start, StartKind
 from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
-    STRICT,
     FormatField,
     MappingField,
     OptionsConfig,
@@ -35,6 +34,7 @@ from sysid.workbench.fields import (
     given_options,
     options_config,
 )
+from sysid.workbench.old_words import STRICT
 from sysid.workbench.stability import StabilityConfig
 from sysid.yaml_files import FieldError, check, parse_yaml, read_yaml
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from sysid.workbench.fields import STRICT
+from sysid.workbench.old_words import STRICT
 from sysid.yaml_files import FieldError
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
-from sysid.workbench.fields import STRICT
+from sysid.workbench.old_words import STRICT
 
 
 class MakingConfig(BaseModel):

@@ -109,7 +109,7 @@ class Checks:
         job, outcome = self.driver.last[trial.number], self._outcome(trial)
         if outcome["checkpoint"] is None:
             return fit
-        training = {**job.training, "starts": 1, "committee": 1, "leave_out": ()}
+        training = {**job.training, "starts": 1, "ensemble": 1, "input_subsets": ()}
         again, _ = train(self.bench, replace(job, after=job.key, resume=True, training=training), outcome)
         if not np.array_equal(again.model.recursion.numbers, fit.model.recursion.numbers):
             # An ensemble is no single start's: all of the trial is done again.

@@ -10,8 +10,9 @@ from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import Start, StartKind
 from sysid.reporting.sweep.record import FIGURES
-from sysid.workbench.fields import STRICT, MappingField, StartField, as_field_error
+from sysid.workbench.fields import MappingField, StartField, as_field_error
 from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig, ReportConfig
+from sysid.workbench.old_words import STRICT, TRAINING, with_new_words
 from sysid.workbench.stability import StabilityConfig
 from sysid.workbench.sweep.search_space import Space, parse_space
 from sysid.yaml_files import FieldError
@@ -152,7 +153,9 @@ class SweepConfig(BaseModel):
         tuple[dict[str, Any], ...],
         BeforeValidator(_as_list, json_schema_input_type=dict[str, Any] | tuple[dict[str, Any], ...]),
     ] = Field(min_length=1)
-    training: dict[str, Any] = Field(default_factory=dict)
+    training: Annotated[dict[str, Any], BeforeValidator(lambda given: with_new_words(given, TRAINING))] = Field(
+        default_factory=dict
+    )
     method: Annotated[MethodConfig, BeforeValidator(_named, json_schema_input_type=str | MethodConfig)] = MethodConfig()
     objectives: tuple[str, ...] = Field(default=("free_run_mse", "run_time"), min_length=1)
     choose: ChooseConfig = ChooseConfig()

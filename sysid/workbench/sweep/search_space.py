@@ -16,7 +16,8 @@ from sysid.estimation import Training
 from sysid.estimation.estimators import ESTIMATORS, Estimator
 from sysid.models import AbstractStructure
 from sysid.models.ranges import WORD, AbstractRange, declared_ranges, parse_range
-from sysid.workbench.fields import STRICT, StructureField, given_options, options_of
+from sysid.workbench.fields import StructureField, given_options, options_of
+from sysid.workbench.old_words import STRICT
 from sysid.workbench.runner.store import digest
 from sysid.yaml_files import check
 

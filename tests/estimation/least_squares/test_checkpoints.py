@@ -31,7 +31,7 @@ def neural(told: Callable[[Any], None]) -> Any:
 
 
 def cascade(told: Callable[[Any], None]) -> Any:
-    training = JointTraining(max_iterations=12, looks=3)
+    training = JointTraining(max_iterations=12, checkpoints=3)
     return fit_cascade(disturbed(), [measured()], training=training, selection=[measured(seed=2)], on_progress=told)
 
 
@@ -41,7 +41,7 @@ class CutOffError(Exception):
 
 FITS = {
     "one start": narx(),
-    "one step ahead first": narx(prelude=200, prelude_iterations=6, starts=2, workers=1),
+    "one step ahead first": narx(pretraining=200, pretraining_iterations=6, starts=2, workers=1),
     "raced": narx(starts=4, workers=1),
     "raced by two": narx(starts=4, workers=2),
     "open loop": narx(loop="open", starts=2, workers=1),

@@ -60,5 +60,5 @@ def test_a_trace_that_is_all_gap_counts_nothing():
 
 @pytest.mark.parametrize("margin", [0.0, -1.0, float("nan")])
 def test_a_margin_that_is_none_is_refused(margin):
-    with pytest.raises(ConfigError, match="soft_margin"):
-        JointTraining(soft_margin=margin)
+    with pytest.raises(ConfigError, match="robust_scale"):
+        JointTraining(robust_scale=margin)

@@ -1,4 +1,4 @@
-"""Committees: one network that is the mean of several, elected where a vote helps."""
+"""Committees: one network that is the mean of several, selected where a pick helps."""
 
 from collections import Counter
 from dataclasses import replace
@@ -27,7 +27,7 @@ NETWORKS = {
 tank = partial(record, n=400)
 SMALL = NARX(input_delays=1, output_delays=1, neurons=3, gated=True)
 PLAIN = NARX(input_delays=1, output_delays=1, neurons=4)
-ELECTION = Training(max_iterations=60, starts=6, committee=4)
+ELECTION = Training(max_iterations=60, starts=6, ensemble=4)
 
 
 def member(network: NARX, seed: int, size: float = 0.2) -> NARXModel:
@@ -47,15 +47,15 @@ def member(network: NARX, seed: int, size: float = 0.2) -> NARXModel:
 
 
 @pytest.mark.parametrize("network", NETWORKS.values(), ids=NETWORKS)
-@given(votes=st.lists(st.integers(1, 5), min_size=1, max_size=4), seed=st.integers(0, 1000))
-def test_the_united_network_predicts_the_mean_of_its_members_by_their_votes(network, votes, seed):
-    members = [member(network, seed + k) for k in range(len(votes))]
+@given(picks=st.lists(st.integers(1, 5), min_size=1, max_size=4), seed=st.integers(0, 1000))
+def test_the_united_network_predicts_the_mean_of_its_members_by_their_picks(network, picks, seed):
+    members = [member(network, seed + k) for k in range(len(picks))]
     rng = np.random.default_rng(seed)
     inputs, output = rng.uniform(-1.0, 3.0, (30, 2)), rng.uniform(-2.0, 2.0, 30)
-    whole = united(members, votes)
-    expected = np.average([m.predict(inputs, output) for m in members], axis=0, weights=votes)
+    whole = united(members, picks)
+    expected = np.average([m.predict(inputs, output) for m in members], axis=0, weights=picks)
     np.testing.assert_allclose(whole.predict(inputs, output), expected, atol=1e-12)
-    assert whole.network.neurons == len(votes) * network.neurons
+    assert whole.network.neurons == len(picks) * network.neurons
 
 
 def test_a_network_united_with_itself_runs_as_it_does_alone():
@@ -77,29 +77,29 @@ def distance(target: float):
     return lambda model: abs(float(model.recursion.constant) - target) + 1e-6
 
 
-def test_votes_go_to_whoever_helps_most_and_more_than_once_if_need_be():
+def test_picks_go_to_whoever_helps_most_and_more_than_once_if_need_be():
     models = [linear(0.0), linear(4.0), linear(9.0)]
     score = distance(4.0 / 3.0)  # (0 + 0 + 4) / 3
-    committee = elect(models, [score(m) for m in models], score, votes=4)
-    assert Counter(committee.votes) == Counter({0: 2, 1: 1})
-    assert committee.score == pytest.approx(score(committee.model))
-    assert committee.score < min(score(m) for m in models)
+    ensemble = elect(models, [score(m) for m in models], score, picks=4)
+    assert Counter(ensemble.picks) == Counter({0: 2, 1: 1})
+    assert ensemble.score == pytest.approx(score(ensemble.model))
+    assert ensemble.score < min(score(m) for m in models)
 
 
-def test_no_vote_is_cast_that_brings_too_little():
+def test_no_pick_is_cast_that_brings_too_little():
     models = [linear(0.0), linear(0.01)]
     score = distance(0.5)
-    committee = elect(models, [score(m) for m in models], score, votes=6)
-    assert committee.score > (1.0 - WORTH) * score(models[1])
-    assert committee.votes == {1: 1}
+    ensemble = elect(models, [score(m) for m in models], score, picks=6)
+    assert ensemble.score > (1.0 - WORTH) * score(models[1])
+    assert ensemble.picks == {1: 1}
 
 
-def test_no_more_votes_are_cast_than_there_are():
+def test_no_more_picks_are_cast_than_there_are():
     models = [linear(0.0), linear(1.0)]
     score = distance(np.pi / 6.0)
     seen = []
-    committee = elect(models, [score(m) for m in models], score, votes=3, on_vote=seen.append)
-    assert sum(committee.votes.values()) <= 3
+    ensemble = elect(models, [score(m) for m in models], score, picks=3, on_pick=seen.append)
+    assert sum(ensemble.picks.values()) <= 3
     assert seen == list(range(1, 1 + len(seen)))
 
 
@@ -112,13 +112,13 @@ def test_whoever_makes_it_unstable_is_passed_over_with_all_of_his_start():
         seen.append(float(model.recursion.constant))
         return seen[-1] not in {2.0, 2.1}  # with either of the second start
 
-    committee = elect(models, [1.0, 2.0, 2.0, 3.0], score, votes=2, origins=[0, 1, 1, 2], accept=accept)
-    assert committee.votes == {0: 1, 3: 1}
+    ensemble = elect(models, [1.0, 2.0, 2.0, 3.0], score, picks=2, origins=[0, 1, 1, 2], accept=accept)
+    assert ensemble.picks == {0: 1, 3: 1}
     assert 2.1 not in seen  # one refusal is enough
-    assert elect(models, [1.0, 2.0, 2.0, 3.0], score, votes=2, accept=lambda _: False) is None
+    assert elect(models, [1.0, 2.0, 2.0, 3.0], score, picks=2, accept=lambda _: False) is None
 
 
-def test_a_committee_that_passes_is_checked_once():
+def test_a_ensemble_that_passes_is_checked_once():
     models, asked = [linear(0.0), linear(4.0), linear(9.0)], []
     score = distance(4.0 / 3.0)
 
@@ -126,17 +126,17 @@ def test_a_committee_that_passes_is_checked_once():
         asked.append(model)
         return True
 
-    committee = elect(models, [score(m) for m in models], score, votes=3, accept=accept)
-    assert sum(committee.votes.values()) == 3
-    assert asked == [committee.model]
+    ensemble = elect(models, [score(m) for m in models], score, picks=3, accept=accept)
+    assert sum(ensemble.picks.values()) == 3
+    assert asked == [ensemble.model]
 
 
 def test_the_network_that_was_accepted_is_the_one_that_comes_back():
     models, accepted = [linear(0.0), linear(4.0)], []
     score = distance(2.0)
-    committee = elect(models, [1.0, 2.0], score, votes=2, accept=lambda model: accepted.append(model) is None)
-    assert committee.votes == {0: 1, 1: 1}
-    assert committee.model is accepted[-1]
+    ensemble = elect(models, [1.0, 2.0], score, picks=2, accept=lambda model: accepted.append(model) is None)
+    assert ensemble.picks == {0: 1, 1: 1}
+    assert ensemble.model is accepted[-1]
 
 
 def test_whoever_diverged_or_is_far_behind_is_not_eligible():
@@ -148,7 +148,7 @@ def test_whoever_diverged_or_is_far_behind_is_not_eligible():
         asked.append(model.recursion.constant)
         return 1.0
 
-    elect(models, scores, score, votes=2, workers=2)
+    elect(models, scores, score, picks=2, workers=2)
     assert len(asked) == ELIGIBLE
     assert min(asked) > -(ELIGIBLE + 1)
     assert max(asked) < 0.0
@@ -159,7 +159,7 @@ def fit():
     return fit_narx([tank(9)], TANK, PLAIN, ELECTION, selection=[tank(2), tank(5)])
 
 
-def test_a_committee_does_better_on_the_selection_traces_than_any_of_its_members(fit):
+def test_a_ensemble_does_better_on_the_selection_traces_than_any_of_its_members(fit):
     (chosen,) = (attempt for attempt in fit.attempts if attempt.chosen)
     single = [attempt.selection_mse for attempt in fit.attempts if not attempt.members]
     assert chosen.members
@@ -169,10 +169,10 @@ def test_a_committee_does_better_on_the_selection_traces_than_any_of_its_members
     assert chosen.selection_mse == pytest.approx(np.exp(np.mean([np.log(np.mean(e**2)) for e in errors])))
     # a start may sit in it twice, as it was at two looks
     assert fit.model.network.neurons in {k * PLAIN.neurons for k in range(2, len(chosen.members) + 1)}
-    assert "committee" in fit.notes[1]
+    assert "ensemble" in fit.notes[1]
 
 
-def test_a_committee_has_evidence_a_posterior_and_a_learning_curve_of_its_own(fit):
+def test_a_ensemble_has_evidence_a_posterior_and_a_learning_curve_of_its_own(fit):
     error = float(np.mean((fit.model.simulate(tank(9).columns(["pump"])) - tank(9)["level"]) ** 2))
     assert 0.0 < fit.evidence.total_effective_parameters <= fit.model.n_parameters
     assert fit.posterior.covariance.shape == (fit.model.n_parameters,) * 2
@@ -181,12 +181,12 @@ def test_a_committee_has_evidence_a_posterior_and_a_learning_curve_of_its_own(fi
     assert fit.status.usable
 
 
-def test_the_same_committee_is_elected_again_whatever_the_number_of_workers(fit):
+def test_the_same_ensemble_is_selected_again_whatever_the_number_of_workers(fit):
     again = fit_narx([tank(9)], TANK, PLAIN, replace(ELECTION, workers=1), selection=[tank(2), tank(5)])
     np.testing.assert_array_equal(again.model.theta, fit.model.theta)
 
 
-def test_a_committee_that_is_not_stable_gives_way_to_the_best_single_start():
+def test_a_ensemble_that_is_not_stable_gives_way_to_the_best_single_start():
     asked = []
 
     def alone(model) -> bool:
@@ -200,36 +200,36 @@ def test_a_committee_that_is_not_stable_gives_way_to_the_best_single_start():
 
 
 def test_an_interruption_of_the_election_leaves_the_best_single_start():
-    def vote(progress) -> None:
-        if progress.stage == "vote 2 of 4":
+    def pick(progress) -> None:
+        if progress.stage == "pick 2 of 4":
             raise KeyboardInterrupt
 
-    fit = fit_narx([tank(9)], TANK, PLAIN, ELECTION, selection=[tank(2), tank(5)], on_progress=vote)
+    fit = fit_narx([tank(9)], TANK, PLAIN, ELECTION, selection=[tank(2), tank(5)], on_progress=pick)
     assert fit.status is Status.INTERRUPTED
     assert fit.model.network == PLAIN
     assert fit.model.simulate(tank(2).columns(["pump"])) == pytest.approx(tank(2)["level"], abs=0.1)
 
 
-def test_a_fixed_regularisation_leaves_a_committee_without_evidence():
-    training = Training(max_iterations=10, starts=3, committee=3, regularisation=1e-6)
+def test_a_fixed_regularisation_leaves_a_ensemble_without_evidence():
+    training = Training(max_iterations=10, starts=3, ensemble=3, regularisation=1e-6)
     fit = fit_narx([tank(1)], TANK, SMALL, training, selection=[tank(2)])
     assert (fit.evidence, fit.posterior) == (None, None)
 
 
 @pytest.mark.parametrize("fields", [{}, {"choose_by": "evidence"}], ids=["nothing to choose by", "by the evidence"])
-def test_a_committee_needs_traces_that_elect_it(fields):
+def test_a_ensemble_needs_traces_that_elect_it(fields):
     selection = [tank(2)] if fields else []
-    with pytest.raises(ConfigError, match="nobody can elect a committee"):
-        fit_narx([tank(1)], TANK, SMALL, Training(committee=2, **fields), selection=selection)
+    with pytest.raises(ConfigError, match="nobody can elect an ensemble"):
+        fit_narx([tank(1)], TANK, SMALL, Training(ensemble=2, **fields), selection=selection)
 
 
 def test_hidden_states_have_no_common_coordinates():
-    with pytest.raises(ConfigError, match="committee"):
-        fit_neural_state_space([tank(1)], TANK, NeuralStateSpace(states=1, neurons=2), Training(committee=2))
+    with pytest.raises(ConfigError, match="ensemble"):
+        fit_neural_state_space([tank(1)], TANK, NeuralStateSpace(states=1, neurons=2), Training(ensemble=2))
 
 
-def test_one_step_ahead_a_committee_is_scored_one_step_ahead():
-    training = Training(loop=Loop.OPEN, max_iterations=15, starts=4, committee=3)
+def test_one_step_ahead_a_ensemble_is_scored_one_step_ahead():
+    training = Training(loop=Loop.OPEN, max_iterations=15, starts=4, ensemble=3)
     fit = fit_narx([tank(1)], TANK, SMALL, training, selection=[tank(2)])
     (chosen,) = (attempt for attempt in fit.attempts if attempt.chosen)
     error = fit.model.predict(tank(2).columns(["pump"]), tank(2)["level"]) - tank(2)["level"]

@@ -24,7 +24,7 @@ NETWORKS = {
     "without feedthrough": NARX(input_delays=[[1, 2], [3]], output_delays=1, neurons=4, feedthrough=False),
 }
 SMALL = NARX(input_delays=[[1], [0, 1]], output_delays=1, neurons=3, gated=True)
-SHARED = Training(max_iterations=15, starts=5, leave_out=[["rumour"]], workers=1)
+SHARED = Training(max_iterations=15, starts=5, input_subsets=[["rumour"]], workers=1)
 
 
 def told(seed: int, n: int = 400, *, sound: bool = True) -> Trace:
@@ -71,7 +71,7 @@ def test_a_part_inside_the_whole_is_the_network_over_its_own_inputs(network, kep
 
 
 def test_a_start_that_does_without_an_input_is_trained_as_the_network_that_has_none():
-    training = Training(max_iterations=25, starts=2, leave_out=[["rumour"]], workers=1)
+    training = Training(max_iterations=25, starts=2, input_subsets=[["rumour"]], workers=1)
     both = fit_narx([told(1)], BOTH, SMALL, training, selection=[told(2, sound=False)])
     alone = fit_narx([told(1)], ALONE, network_over(SMALL, (0,)), Training(max_iterations=25, seed=1))
     (without,) = (attempt for attempt in both.attempts if attempt.without)
@@ -92,8 +92,8 @@ def test_starts_are_shared_out_and_keep_numbers_and_seeds_of_their_own():
     assert origins == {1: (0, ()), 2: (1, ()), 3: (2, ()), 4: (3, ("rumour",)), 5: (4, ("rumour",))}
 
 
-def test_a_committee_unites_those_that_see_an_input_and_those_that_do_not():
-    training = replace(SHARED, committee=5, starts=12, max_iterations=25)
+def test_a_ensemble_unites_those_that_see_an_input_and_those_that_do_not():
+    training = replace(SHARED, ensemble=5, starts=12, max_iterations=25)
     fit = fit_narx([told(1)], BOTH, SMALL, training, selection=[told(2), told(4)])
     without = {attempt.start for attempt in fit.attempts if attempt.without}
     (chosen,) = (attempt for attempt in fit.attempts if attempt.chosen)
@@ -126,15 +126,15 @@ def test_time_is_shared_out_with_the_starts():
 
 
 def test_an_input_that_is_none_cannot_be_left_out():
-    with pytest.raises(ChannelError, match="leave_out"):
-        views(Training(starts=2, leave_out=[["noise"]]), BOTH)
+    with pytest.raises(ChannelError, match="input_subsets"):
+        views(Training(starts=2, input_subsets=[["noise"]]), BOTH)
 
 
 def test_something_has_to_be_left_to_see():
     with pytest.raises(ConfigError, match="nothing is left to see"):
-        views(Training(starts=2, leave_out=[["rumour", "pump"]]), BOTH)
+        views(Training(starts=2, input_subsets=[["rumour", "pump"]]), BOTH)
 
 
 def test_every_set_needs_a_start():
     with pytest.raises(ConfigError, match="not every set of inputs has a start"):
-        Training(leave_out=[["rumour"]], starts=1)
+        Training(input_subsets=[["rumour"]], starts=1)

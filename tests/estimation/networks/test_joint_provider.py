@@ -96,9 +96,9 @@ def test_normal_equations_equal_the_dense_ones(stride, moves, workers):
     assert_allclose(at.gauss_newton, J.T @ (weights[:, None] * J), rtol=1e-9, atol=1e-9)
 
 
-def test_beyond_the_soft_margin_a_trace_counts_by_the_logarithm_of_its_error():
+def test_beyond_the_robust_scale_a_trace_counts_by_the_logarithm_of_its_error():
     """The gradient against finite differences of the loss; the matrix is that of the squares, weighted by trace."""
-    one = provider(service(), soft_margin=20.0, stride=2)
+    one = provider(service(), robust_scale=20.0, stride=2)
     theta, at = one.theta, one.linearise(one.theta)
     assert_allclose(at.loss, one.loss(theta))
     slopes = finite_difference_jacobian(lambda there: np.array([one.loss(there)]), theta)[0]
@@ -125,7 +125,7 @@ def test_long_rows_count_less_in_the_matrix_and_not_in_the_loss():
 
 def test_a_gap_does_not_make_a_trace_count_as_better_than_it_is():
     usable = np.arange(60) >= 40
-    one = provider(service(), traces=(trace(service(), usable=usable),), soft_margin=20.0)
+    one = provider(service(), traces=(trace(service(), usable=usable),), robust_scale=20.0)
     S = np.mean(one.residuals(one.theta).reshape(3, 60)[:, usable] ** 2, axis=1)
     assert_allclose(one.loss(one.theta), 0.5 * np.sum(20 * 20.0**2 * np.log1p(S / 20.0**2)))
 

@@ -17,7 +17,7 @@ from sysid.traces import Role, TraceSet
 from tests.models.cascades import command, linear, network, service
 
 TRUTH = service()
-TRAINING = JointTraining(max_iterations=20, looks=4)
+TRAINING = JointTraining(max_iterations=20, checkpoints=4)
 
 
 def measured(cascade: Cascade = TRUTH, n: int = 400, seed: int = 0):
@@ -100,7 +100,7 @@ def test_what_is_exactly_right_does_not_outweigh_the_rest():
 
 
 def test_a_fit_is_the_same_every_time():
-    training = replace(TRAINING, max_iterations=4, looks=2)
+    training = replace(TRAINING, max_iterations=4, checkpoints=2)
     results = [fit_cascade(disturbed(), [measured(), measured(seed=1)], training=training) for _ in range(2)]
     assert_array_equal(*(one.model.simulate_trace(measured()).values for one in results))
 
@@ -162,7 +162,7 @@ class TestUpstream:
 
 
 @pytest.mark.parametrize(
-    "asked", [{"stride": 3}, {"moves": 2.0}, {"leverage": 9.0}, {"soft_margin": 0.5}, {"workers": 1}], ids=str
+    "asked", [{"stride": 3}, {"moves": 2.0}, {"leverage": 9.0}, {"robust_scale": 0.5}, {"workers": 1}], ids=str
 )
 def test_every_option_that_says_what_counts_reaches_the_residuals(asked: dict[str, float]) -> None:
     provider = JointTraining(**asked).provider(TRUTH, [measured(n=50)], {"BC": 1.0}, ["BC"])

@@ -1,4 +1,4 @@
-"""The prelude: one step ahead on samples that fill the space, before the free run."""
+"""The pretraining: one step ahead on samples that fill the space, before the free run."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_on_all_samples_it_is_the_open_loop(network: NARX):
     basis = RegressorBasis.levels_and_rates(LAYOUT.lags, np.random.default_rng(0).standard_normal((50, 4)))
     theta = 0.3 * np.random.default_rng(2).standard_normal(layout.n_parameters)
     one = all_samples(basis, *records, network=network)
-    # Without bounds, as the prelude has none: what is far off has to be seen to be mended.
+    # Without bounds, as the pretraining has none: what is far off has to be seen to be mended.
     template = replace(model(network).recursion, low=-np.inf, high=np.inf)
     other = RecursionProvider(template=template, experiments=records, closed=False)
     P = basis.to_plain(layout)
@@ -132,7 +132,7 @@ def test_a_valve_that_switches_is_learnt_with_it_in_iterations_in_which_it_is_no
     network = NARX(input_delays="0:1", output_delays=1, neurons=8)
     common = {"max_iterations": 15, "starts": 1, "seed": 3}
     mse = {}
-    for name, options in {"with": {"prelude": 800, "prelude_iterations": 60}, "without": {}}.items():
+    for name, options in {"with": {"pretraining": 800, "pretraining_iterations": 60}, "without": {}}.items():
         fit = fit_narx([trace], Mapping.parse("u -> y"), network, Training(**common, **options), rest_output=0.0)
         mse[name] = np.mean((fit.model.simulate(u[:, None]) - y) ** 2)
     assert mse["with"] < 3e-5

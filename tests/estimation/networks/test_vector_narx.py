@@ -47,7 +47,7 @@ def test_a_coupled_system_is_found_in_free_run():
     assert fit.seed in {0, 1}
     assert len(fit.notes) >= 3
     again = fit_vector_narx(
-        [coupled()], MAPPING, NETWORK, JointTraining(max_iterations=2, looks=1), initial=fit.model.models[0]
+        [coupled()], MAPPING, NETWORK, JointTraining(max_iterations=2, checkpoints=1), initial=fit.model.models[0]
     )
     assert again.seed is None
     with pytest.raises(ConfigError, match="another structure"):
@@ -55,7 +55,7 @@ def test_a_coupled_system_is_found_in_free_run():
 
 
 def test_a_fit_is_its_seed():
-    training = JointTraining(max_iterations=4, looks=2, seed=5)
+    training = JointTraining(max_iterations=4, checkpoints=2, seed=5)
     one, two = (fit_vector_narx([coupled()], MAPPING, NETWORK, training).model.models[0].theta for _ in range(2))
     assert_array_equal(one, two)
 
@@ -114,7 +114,7 @@ def test_a_record_on_which_the_run_is_lost_counts_less_in_a_robust_loss():
         values=shifted.values + np.where(np.arange(len(shifted)) > 400, 20.0, 0.0)[:, None] * [0.0, 1.0, 1.0],
     )
     plain, robust = (
-        fit_vector_narx([coupled(), lost], MAPPING, NETWORK, JointTraining(max_iterations=3, soft_margin=margin)).model
+        fit_vector_narx([coupled(), lost], MAPPING, NETWORK, JointTraining(max_iterations=3, robust_scale=margin)).model
         for margin in (np.inf, 1.0)
     )
     assert not np.array_equal(plain.models[0].theta, robust.models[0].theta)

@@ -22,7 +22,7 @@ seed: 3
 limits:
   lower: {low: 0}
 definitions:
-  short: &short {loop: closed, prelude: 400, prelude_iterations: 30, max_iterations: 10, workers: 1}
+  short: &short {loop: closed, pretraining: 400, pretraining_iterations: 30, max_iterations: 10, workers: 1}
 members:
   - mapping: pump+lower -> upper
     structure: {kind: NARX, input_delays: [[0, 1], [1]], output_delays: 1, neurons: 3}
@@ -36,8 +36,8 @@ members:
 retrain: {members: [lower], max_iterations: 5}
 together:
   targets: {upper: 0.1, lower: 0.1}
-  training: {max_iterations: 4, stride: 2, looks: 2}
-stress: {data: tanks, output: lower, within: 0.5}
+  training: {max_iterations: 4, stride: 2, checkpoints: 2}
+monte_carlo: {data: tanks, output: lower, within: 0.5}
 published:
   lower: {source: Table 1, target: 0.5, mse: {V: 0.4}}
 export: null

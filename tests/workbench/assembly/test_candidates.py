@@ -25,7 +25,8 @@ BASE = (
     PIPELINE.replace("    candidates: 2\n", "")
     .replace("retrain: {members: [lower], max_iterations: 5}\n", "")
     .replace(
-        "together:\n  targets: {upper: 0.1, lower: 0.1}\n  training: {max_iterations: 4, stride: 2, looks: 2}\n", ""
+        "together:\n  targets: {upper: 0.1, lower: 0.1}\n  training: {max_iterations: 4, stride: 2, checkpoints: 2}\n",
+        "",
     )
 )
 LOWER = "structure: {kind: NARX, input_delays: [0], output_delays: 1, neurons: 3}\n"

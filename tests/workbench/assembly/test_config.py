@@ -21,7 +21,7 @@ members:
   - mapping: BP+STP -> AR
     structure: {kind: NARX, input_delays: [0, 1, 3], output_delays: 2, neurons: 3}
     rest: 90
-    places: ["", "9"]
+    instances: ["", "9"]
     shared: [STP]
 rest: {BP: STP, AR: STP}
 limits: {AR: {high: BP}}

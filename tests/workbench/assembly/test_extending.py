@@ -27,7 +27,7 @@ outputs: [upper, lower]
 limits:
   upper: {low: 0, high: UH}
   lower: {low: 0}
-known:
+fixed:
   - {mapping: pump -> FULL, gains: {pump: 1}, low: 0, high: 1, rest: 0}
   - {mapping: upper -> UH, gains: {upper: 1}, low: 0, high: 9, rest: 9}
   - {mapping: lower -> LH, gains: {lower: 1}, low: 0, high: 9, rest: 9}
@@ -36,7 +36,7 @@ members:
     structure: &tank {kind: NARX, input_delays: 1, output_delays: 1, neurons: 3}
     rest: 0
   - {mapping: upper -> lower, structure: *tank, rest: 0}
-stress: {data: tanks, output: lower, within: 0.5}
+monte_carlo: {data: tanks, output: lower, within: 0.5}
 export: {formats: [c]}
 """
 HEAD = "kind: assembly\nextends: base.yaml\nname: grown\n"
@@ -59,7 +59,7 @@ def load(file: Path) -> AssemblyConfig:
 
 
 BASE_DATA = parse_yaml(BASE, where="base")
-FULL, UH, LH = BASE_DATA["known"]
+FULL, UH, LH = BASE_DATA["fixed"]
 NEW_UH = {"mapping": "upper+pump -> UH", "gains": {"upper": 2, "pump": 1}, "low": 0, "high": 9, "rest": 9}
 NEW = {"mapping": "upper -> NEW", "gains": {"upper": 1}, "low": 0, "high": 1, "rest": 0}
 UPPER, LOWER = BASE_DATA["limits"]["upper"], BASE_DATA["limits"]["lower"]
@@ -71,11 +71,11 @@ UPPER, LOWER = BASE_DATA["limits"]["upper"], BASE_DATA["limits"]["lower"]
         pytest.param("", "data", "tanks", id="what is not given is the base's"),
         pytest.param("seed: 7", "seed", 7, id="what the base has not is added"),
         pytest.param("outputs: [lower]", "outputs", ["lower"], id="what is given stands instead"),
-        pytest.param("stress: {data: more}", "stress", {"data": "more"}, id="whole, not key by key"),
-        pytest.param("known: []", "known", [FULL, UH, LH], id="known: none of one's own"),
-        pytest.param(f"known: [{NEW}]", "known", [FULL, UH, LH, NEW], id="known: another channel comes after"),
-        pytest.param(f"known: [{NEW_UH}]", "known", [FULL, NEW_UH, LH], id="known: the same channel in its place"),
-        pytest.param(f"known: [{NEW}, {NEW_UH}]", "known", [FULL, NEW_UH, LH, NEW], id="known: in either order"),
+        pytest.param("monte_carlo: {data: more}", "monte_carlo", {"data": "more"}, id="whole, not key by key"),
+        pytest.param("fixed: []", "fixed", [FULL, UH, LH], id="fixed: none of one's own"),
+        pytest.param(f"fixed: [{NEW}]", "fixed", [FULL, UH, LH, NEW], id="fixed: another channel comes after"),
+        pytest.param(f"fixed: [{NEW_UH}]", "fixed", [FULL, NEW_UH, LH], id="fixed: the same channel in its place"),
+        pytest.param(f"fixed: [{NEW}, {NEW_UH}]", "fixed", [FULL, NEW_UH, LH, NEW], id="fixed: in either order"),
         pytest.param("limits: {}", "limits", {"upper": UPPER, "lower": LOWER}, id="limits: none of one's own"),
         pytest.param(
             "limits: {upper: {high: 5}, pump: {low: 0}}",
@@ -91,25 +91,25 @@ def test_what_is_joined_and_how(tmp_path: Path, text: str, key: str, value: obje
     assert joined(tmp_path, HEAD + text) == {**BASE_DATA, "name": "grown", key: value}
 
 
-@pytest.mark.parametrize("key", ["known", "limits", "stress", "description"])
+@pytest.mark.parametrize("key", ["fixed", "limits", "monte_carlo", "description"])
 def test_null_takes_the_bases_away(tmp_path: Path, key: str) -> None:
     kept = {name: value for name, value in BASE_DATA.items() if name != key}
     assert joined(tmp_path, f"{HEAD}{key}: null\n") == {**kept, "name": "grown"}
 
 
 def test_a_channel_that_is_written_by_several_entries_is_replaced_in_all_places(tmp_path: Path) -> None:
-    at_ten = {**UH, "places": ["10"]}
+    at_ten = {**UH, "instances": ["10"]}
     base = BASE.replace("members:", f"  - {at_ten}\nmembers:")
-    assert joined(tmp_path, f"{HEAD}known: [{NEW_UH}]", base)["known"] == [FULL, NEW_UH, LH]
+    assert joined(tmp_path, f"{HEAD}known: [{NEW_UH}]", base)["fixed"] == [FULL, NEW_UH, LH]
 
 
 def test_a_base_may_extend_another(tmp_path: Path) -> None:
-    (tmp_path / "middle.yaml").write_text(f"{HEAD}known: [{NEW}]\nseed: 7\nstress: null\n", encoding="utf-8")
+    (tmp_path / "middle.yaml").write_text(f"{HEAD}known: [{NEW}]\nseed: 7\nmonte_carlo: null\n", encoding="utf-8")
     text = HEAD.replace("base.yaml", "middle.yaml").replace("grown", "last")
     data = joined(tmp_path, f"{text}known: [{NEW_UH}]\n")
     assert data == {
-        **{key: value for key, value in BASE_DATA.items() if key != "stress"},
-        **{"name": "last", "seed": 7, "known": [FULL, NEW_UH, LH, NEW]},
+        **{key: value for key, value in BASE_DATA.items() if key != "monte_carlo"},
+        **{"name": "last", "seed": 7, "fixed": [FULL, NEW_UH, LH, NEW]},
     }
 
 
@@ -133,7 +133,7 @@ def test_a_pipeline_that_extends_is_the_one_written_out(tmp_path: Path) -> None:
     written_out = text.replace("name: combined-brake-held", "name: grown").replace("seed: 0\n", "seed: 4\n")
     written_out = written_out.replace("  BP10: {low: 0, high: BH10}", "  BP10: {low: 1, high: BH10}")
     written_out = written_out.replace(at_rest, held)
-    known = "known: [{mapping: BP+AR -> RM, gains: {BP: 1, AR: -1}, " + held + "]\n"
+    known = "fixed: [{mapping: BP+AR -> RM, gains: {BP: 1, AR: -1}, " + held + "]\n"
     extends = HEAD.replace("base.yaml", str(base)) + known + "limits: {BP10: {low: 1, high: BH10}}\nseed: 4\n"
     config = load(write(tmp_path, extends, base=written_out))
     assert config == load(tmp_path / "base.yaml")
@@ -147,10 +147,10 @@ WRONG_OWN = [
     pytest.param("seed: one", "line 4, field seed", "integer", id="a key"),
     pytest.param("strss: null", "line 4, field strss", "did you mean stress?", id="nothing to take away"),
     pytest.param(f"known:\n  - {NEW}\n  - {BAD}", "line 6, field known[1]", "bounds", id="a known member"),
-    pytest.param(f"known: [{UNBOUND}]", "line 4, field known[0].low", "number", id="one in the place of the base's"),
-    pytest.param("known: [{}]", "line 4, field known[0].mapping", "missing", id="a known member without a mapping"),
-    pytest.param("known: [all]", "line 4, field known[0]", "KnownConfig", id="no known member at all"),
-    pytest.param("known: all", "line 4, field known", "tuple", id="no list of them"),
+    pytest.param(f"fixed: [{UNBOUND}]", "line 4, field known[0].low", "number", id="one in the place of the base's"),
+    pytest.param("fixed: [{}]", "line 4, field known[0].mapping", "missing", id="a known member without a mapping"),
+    pytest.param("fixed: [all]", "line 4, field known[0]", "FixedConfig", id="no known member at all"),
+    pytest.param("fixed: all", "line 4, field known", "tuple", id="no list of them"),
     pytest.param("limits: {upper: {lw: 1}}", "line 4, field limits.upper.lw", "did you mean low?", id="a limit"),
 ]  # fmt: skip
 WRONG_BASE = [
@@ -159,7 +159,7 @@ WRONG_BASE = [
     pytest.param("upper: 1}, low: 0", "upper: 1}, low: 10", "line 12, field known[1]", "bounds", id="a known member"),
     pytest.param("lower: {low", "lower: {lw", "line 9, field limits.lower.lw", "did you mean low?", id="a limit"),
 ]
-BESIDE = f"known: [{{mapping: pump -> FULL, gains: {{pump: 2}}, low: 0, high: 1, rest: 0}}, {NEW}]\nlimits: {{}}\n"
+BESIDE = f"fixed: [{{mapping: pump -> FULL, gains: {{pump: 2}}, low: 0, high: 1, rest: 0}}, {NEW}]\nlimits: {{}}\n"
 """Good, and joined with the base's."""
 
 
@@ -233,7 +233,7 @@ def test_what_cannot_be_extended_is_told(tmp_path: Path, extends: str, says: lis
 QUICK = PIPELINE.replace("candidates: 2", "candidates: 1").replace(
     "retrain: {members: [lower], max_iterations: 5}\n", ""
 )
-KNOWN = "known: [{mapping: upper -> LH, gains: {upper: 0.9}, low: 0, high: 100, rest: 0}]\n"
+KNOWN = "fixed: [{mapping: upper -> LH, gains: {upper: 0.9}, low: 0, high: 100, rest: 0}]\n"
 GROWN = f"{HEAD.replace('base', 'tanks')}limits: {{lower: {{high: LH}}}}\n{KNOWN}stress: null\n"
 
 

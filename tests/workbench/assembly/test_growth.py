@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from sysid.composite.round import JointRound
 from sysid.errors import ConfigError
-from sysid.workbench.assembly.stage_config import GrowConfig
+from sysid.workbench.assembly.stage_config import ActiveLearningConfig
 from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results, write_tanks
@@ -19,17 +19,19 @@ ASKED = {"data": "pool", "outputs": ("AR", "BP"), "within": 0.1, "add": 3, "roun
 
 
 def test_a_round_may_add_as_many_as_it_names():
-    assert GrowConfig.model_validate(ASKED | {"add": [10, 20, 40], "rounds": None}).additions == (10, 20, 40)
-    assert GrowConfig.model_validate(ASKED).additions == (3, 3, 3, 3)
-    assert GrowConfig(data="pool", outputs=("BC",), within=1.0).additions == (20,) * 5
+    assert ActiveLearningConfig.model_validate(ASKED | {"add": [10, 20, 40], "rounds": None}).additions == (10, 20, 40)
+    assert ActiveLearningConfig.model_validate(ASKED).additions == (3, 3, 3, 3)
+    assert ActiveLearningConfig(data="pool", outputs=("BC",), within=1.0).additions == (20,) * 5
 
 
-GROWN = "grow: {data: pool, outputs: [lower], within: 0.001, add: 1, rounds: 2, train: [{max_iterations: 2}]}\n"
+GROWN = (
+    "active_learning: {data: pool, outputs: [lower], within: 0.001, add: 1, rounds: 2, train: [{max_iterations: 2}]}\n"
+)
 LEAN = (
     PIPELINE.replace("candidates: 2", "candidates: 1")
     .replace("retrain: {members: [lower], max_iterations: 5}\n", "")
-    .replace("looks: 2}\n", "looks: 2}\n  traces: 1\n", 1)
-    .replace("stress: {data: tanks, output: lower, within: 0.5}\n", GROWN)
+    .replace("checkpoints: 2}\n", "checkpoints: 2}\n  traces: 1\n", 1)
+    .replace("monte_carlo: {data: tanks, output: lower, within: 0.5}\n", GROWN)
 )
 """Trained end to end on one trace, then grown by the two of the pool."""
 
@@ -71,7 +73,7 @@ def test_a_run_grows_resumes_and_reports(pooled: Path) -> None:
 
 
 def test_where_there_is_a_stress_each_round_is_put_to_it(pooled: Path) -> None:
-    text = LEAN + "stress: {data: tanks, output: lower, within: 0.5}\n"
+    text = LEAN + "monte_carlo: {data: tanks, output: lower, within: 0.5}\n"
     results = run(pooled, text)
     (chosen,) = [one for one in results.active_learning[0].rounds if one.stage == results.whole.stage]
     assert chosen.monte_carlo is not None
@@ -107,7 +109,7 @@ def test_each_round_goes_through_several_trainings_that_have_all_that_was_added(
 
 def test_what_is_begun_from_another_whole_grows_too(pooled: Path) -> None:
     run(pooled, LEAN.replace("export: null", "export: {formats: [c]}").replace(GROWN, ""))
-    results = run(pooled, LEAN.replace("seed: 3", "seed: 3\nbegin: ../runs/tanks/bundle"), "further")
+    results = run(pooled, LEAN.replace("seed: 3", "seed: 3\nwarm_start: ../runs/tanks/bundle"), "further")
     stages = ["as it was begun from", "trained end to end", "grown, round 1", "grown, round 2"]
     assert [one.name for one in results.stages] == stages
 
@@ -125,11 +127,11 @@ def test_a_pool_without_sequences_that_train_nothing_is_refused(pooled: Path) ->
         ("data: pool", "data: tanks", "the pool to grow by is used otherwise: tanks is under training"),
         ("training: tanks", "training: [tanks, pool]", "pool is under training"),
         ("data: tanks\n", "data: pool\n", "pool is under data"),
-        ("outputs: [lower], within", "outputs: [level], within", "grow, outputs names level"),
-        ("{max_iterations: 2}]", "{members: [level]}]", "grow, train, members names level"),
-        ("{max_iterations: 2}]", "{targets: {level: 1}}]", "grow, train, targets names level"),
+        ("outputs: [lower], within", "outputs: [level], within", "active_learning, outputs names level"),
+        ("{max_iterations: 2}]", "{members: [level]}]", "active_learning, train, members names level"),
+        ("{max_iterations: 2}]", "{targets: {level: 1}}]", "active_learning, train, targets names level"),
         ("{max_iterations: 2}]", "{measured: [lower]}]", "lower is to be as measured, and trained or judged"),
-        ("{max_iterations: 2}]", "{everywhere: true}]", "that shares weights names no members"),
+        ("{max_iterations: 2}]", "{share_weights: true}]", "that shares weights names no members"),
         ("{max_iterations: 2}]", "{traces: 2}]", "traces"),
         ("{max_iterations: 2}]", "{reads: {upper: {lower: 2}}}]", "reads"),
         ("{max_iterations: 2}]", "]", "train"),
@@ -163,4 +165,4 @@ def test_the_rounds_of_growth_are_the_last_one_before_but_for_what_they_name():
 
 def test_a_share_of_none_is_nothing_to_aim_at():
     with pytest.raises(ValidationError, match="until"):
-        GrowConfig(data="pool", outputs=("BC",), within=1.0, until=0.0)
+        ActiveLearningConfig(data="pool", outputs=("BC",), within=1.0, until=0.0)

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sysid.errors import ConfigError
-from sysid.workbench.assembly.member_config import KnownConfig
+from sysid.workbench.assembly.member_config import FixedConfig
 from sysid.workbench.assembly.runner import read_assembly
 from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
@@ -18,8 +18,8 @@ from sysid.yaml_files import check, parse_yaml
 FIELDS = "{mapping: a+b -> d, gains: {a: 2, b: -1}, constant: 0.5, low: -1, high: 3, rest: 0}"
 
 
-def known(text: str) -> KnownConfig:
-    return check(KnownConfig, parse_yaml(text, where="text"), where="text")
+def known(text: str) -> FixedConfig:
+    return check(FixedConfig, parse_yaml(text, where="text"), where="text")
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_members_read_it_and_the_whole_runs_it(workspace: Path):
         "  - mapping: head -> lower\n    structure: {kind: NARX, input_delays: [1]",
     )
     declared = (
-        "known: [{mapping: upper+lower -> head, gains: {upper: 1, lower: -0.3}, low: 0, high: 9, rest: 0, unit: m}]\n"
+        "fixed: [{mapping: upper+lower -> head, gains: {upper: 1, lower: -0.3}, low: 0, high: 9, rest: 0, unit: m}]\n"
     )
     file.write_text(text.replace("retrain:", f"{declared}retrain:"), encoding="utf-8")
     assert run_request(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0
@@ -69,7 +69,7 @@ def test_members_read_it_and_the_whole_runs_it(workspace: Path):
 
 def test_what_only_the_training_looked_at_is_no_part_of_the_surrogate(workspace: Path):
     file = workspace / "pipelines" / "tanks.yaml"
-    declared = "known: [{mapping: upper -> near, gains: {upper: 1}, low: 1, high: 2, rest: 1, unit: cm}]\n"
+    declared = "fixed: [{mapping: upper -> near, gains: {upper: 1}, low: 1, high: 2, rest: 1, unit: cm}]\n"
     text = file.read_text(encoding="utf-8").replace("retrain:", f"{declared}retrain:")
     file.write_text(text.replace("targets: {upper: 0.1", "targets: {near: 0.05, upper: 0.1"), encoding="utf-8")
     assert run_request(RunRequest(path=file, typed="tanks", fresh=False, tracking=False)) == 0

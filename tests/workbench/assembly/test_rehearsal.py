@@ -11,7 +11,7 @@ from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
 
 UPPER = "pump+lower -> upper\n    structure: {kind: NARX, input_delays: [[0, 1], [1]]"
-DECLARED = "known: [{mapping: lower -> near, gains: {lower: 1}, low: 0, high: 9, rest: 0, unit: cm}]\nretrain:"
+DECLARED = "fixed: [{mapping: lower -> near, gains: {lower: 1}, low: 0, high: 9, rest: 0, unit: cm}]\nretrain:"
 
 
 @pytest.mark.parametrize(

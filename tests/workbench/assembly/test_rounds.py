@@ -17,7 +17,7 @@ TWO = (
     PIPELINE.replace("candidates: 2", "candidates: 1")
     .replace("retrain: {members: [lower], max_iterations: 5}\n", "")
     .replace("targets: {upper: 0.1, lower: 0.1}", "targets: {upper: 0.1}\n  members: [upper]\n  measured: [lower]")
-    .replace("looks: 2}\n", "looks: 2}\n  again: [{measured: [], members: [upper, lower], traces: 1}]\n", 1)
+    .replace("checkpoints: 2}\n", "checkpoints: 2}\n  again: [{measured: [], members: [upper, lower], traces: 1}]\n", 1)
 )
 """The upper tank behind the measured lower one, on both traces; then both tanks, on one."""
 

@@ -113,8 +113,8 @@ def test_every_stage_is_tracked_once(workspace: Path, empty_store: Path) -> None
 def test_rounds_end_to_end_go_on_from_one_another_and_are_found_again(workspace: Path) -> None:
     pipeline = workspace / "pipelines" / "tanks.yaml"
     text = pipeline.read_text(encoding="utf-8").replace(
-        "stride: 2, looks: 2}\n",
-        "stride: 2, looks: 2}\n  traces: 1\n  again:\n    - {traces: 2}\n"
+        "stride: 2, checkpoints: 2}\n",
+        "stride: 2, checkpoints: 2}\n  traces: 1\n  again:\n    - {traces: 2}\n"
         "    - {targets: {upper: 0.2, lower: 0.1}, max_iterations: 2}\n",
     )
     pipeline.write_text(text, encoding="utf-8")
@@ -171,7 +171,7 @@ def test_a_circle_may_be_closed_in_a_later_round(workspace: Path) -> None:
     pipeline = workspace / "pipelines" / "tanks.yaml"
     text = pipeline.read_text(encoding="utf-8").replace("mapping: pump+lower -> upper", "mapping: pump -> upper")
     text = text.replace("input_delays: [[0, 1], [1]]", "input_delays: [0, 1]").replace(
-        "stride: 2, looks: 2}\n", "stride: 2, looks: 2}\n  again: [{reads: {upper: {lower: 1}}}]\n"
+        "stride: 2, checkpoints: 2}\n", "stride: 2, checkpoints: 2}\n  again: [{reads: {upper: {lower: 1}}}]\n"
     )
     pipeline.write_text(text, encoding="utf-8")
     assert run(workspace) == 0
@@ -256,7 +256,9 @@ def test_a_round_may_have_traces_that_no_stage_before_it_has(workspace: Path) ->
     file = more / "dataset.yaml"
     file.write_text(file.read_text(encoding="utf-8").replace("name: tanks", "name: more"), encoding="utf-8")
     pipeline = workspace / "pipelines" / "tanks.yaml"
-    text = pipeline.read_text(encoding="utf-8").replace("looks: 2}\n", "looks: 2}\n  again: [{traces: 4}]\n")
+    text = pipeline.read_text(encoding="utf-8").replace(
+        "checkpoints: 2}\n", "checkpoints: 2}\n  again: [{traces: 4}]\n"
+    )
     pipeline.write_text(text, encoding="utf-8")
     assert run(workspace) == 0
     folder = workspace / "runs" / "tanks"
@@ -283,7 +285,9 @@ def test_data_of_a_round_choose_as_well(workspace: Path, monkeypatch: pytest.Mon
     shutil.copytree(workspace / "datasets" / "tanks", workspace / "datasets" / "more")
     pipeline = workspace / "pipelines" / "tanks.yaml"
     text = pipeline.read_text(encoding="utf-8")
-    pipeline.write_text(text.replace("looks: 2}\n", "looks: 2}\n  again: [{also: [more]}]\n"), encoding="utf-8")
+    pipeline.write_text(
+        text.replace("checkpoints: 2}\n", "checkpoints: 2}\n  again: [{also: [more]}]\n"), encoding="utf-8"
+    )
     assert run(workspace) == 0
     assert chosen_by[1] == 2 * chosen_by[0] > 0
 
@@ -295,7 +299,7 @@ def test_data_of_a_round_without_estimation_traces_are_refused(workspace: Path) 
     text = file.read_text(encoding="utf-8").replace("name: tanks", "name: more")
     file.write_text(text.replace("role: estimation", "role: validation"), encoding="utf-8")
     pipeline = workspace / "pipelines" / "tanks.yaml"
-    asked = pipeline.read_text(encoding="utf-8").replace("looks: 2}\n", "looks: 2}\n  also: [more]\n")
+    asked = pipeline.read_text(encoding="utf-8").replace("checkpoints: 2}\n", "checkpoints: 2}\n  also: [more]\n")
     pipeline.write_text(asked, encoding="utf-8")
     with pytest.raises(ConfigError, match="the data of a round lack a role"):
         run(workspace)
@@ -312,7 +316,9 @@ def test_what_is_declared_beside_a_member_leaves_its_fit_as_it_was(workspace: Pa
     text = pipeline.read_text(encoding="utf-8").replace("retrain: {members: [lower], max_iterations: 5}\n", "")
     text = text.replace("targets: {upper: 0.1, lower: 0.1}", "measured: [lower]\n  targets: {upper: 0.1}")
     text = text.replace("candidates: 2", "candidates: 1")
-    text = text.replace("looks: 2}\n", "looks: 2}\n  again: [{measured: [], targets: {upper: 0.1, lower: 0.1}}]\n")
+    text = text.replace(
+        "checkpoints: 2}\n", "checkpoints: 2}\n  again: [{measured: [], targets: {upper: 0.1, lower: 0.1}}]\n"
+    )
     pipeline.write_text(text, encoding="utf-8")
     assert run(workspace) == 0
     folder = workspace / "runs" / "tanks"
@@ -320,7 +326,7 @@ def test_what_is_declared_beside_a_member_leaves_its_fit_as_it_was(workspace: Pa
     stamps = [file.stat().st_mtime_ns for file in files]
     whole = CascadeFit.from_dict(json.loads((folder / "together.json").read_text(encoding="utf-8")))
     held = text.replace("  lower: {low: 0}", "  lower: {low: LL}")
-    known = "known: [{mapping: upper -> LL, gains: {upper: -100}, low: 0, high: 100, rest: 0}]\n"
+    known = "fixed: [{mapping: upper -> LL, gains: {upper: -100}, low: 0, high: 100, rest: 0}]\n"
     pipeline.write_text(held + known, encoding="utf-8")
     assert run(workspace) == 0
     changed = [file.stat().st_mtime_ns != stamp for file, stamp in zip(files, stamps, strict=True)]

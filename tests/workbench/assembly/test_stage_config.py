@@ -10,7 +10,7 @@ from sysid.workbench.assembly.stage_config import TogetherConfig, names_in
 
 
 def together(**fields) -> TogetherConfig:
-    given = {"targets": {"BC": 0.1}, "traces": 2, "training": {"max_iterations": 9, "stride": 3, "soft_margin": 2.0}}
+    given = {"targets": {"BC": 0.1}, "traces": 2, "training": {"max_iterations": 9, "stride": 3, "robust_scale": 2.0}}
     return TogetherConfig.model_validate(given | fields)
 
 
@@ -20,11 +20,11 @@ def test_without_again_there_is_one_round():
 
 
 def test_a_round_keeps_what_it_does_not_name():
-    first, second, third = together(again=[{"traces": 5}, {"max_iterations": 4, "soft_margin": 1.0}]).rounds
+    first, second, third = together(again=[{"traces": 5}, {"max_iterations": 4, "robust_scale": 1.0}]).rounds
     assert (first.traces, second.traces, third.traces) == (2, 5, 5)
     assert second.targets == first.targets
     options = [one.plan(seed=7).training for one in (first, second, third)]
-    assert [(one.max_iterations, one.soft_margin) for one in options] == [(9, 2.0), (9, 2.0), (4, 1.0)]
+    assert [(one.max_iterations, one.robust_scale) for one in options] == [(9, 2.0), (9, 2.0), (4, 1.0)]
     assert {(one.stride, one.seed) for one in options} == {(3, 7)}
 
 
@@ -57,8 +57,8 @@ def test_a_round_that_inherits_a_measured_channel_does_not_judge_it():
         together(measured=["BP"], again=[{"targets": {"BP": 0.2}}])
 
 
-def test_without_a_soft_margin_squares_count():
-    assert together(training={"max_iterations": 9}).plan(seed=0).training.soft_margin == np.inf
+def test_without_a_robust_scale_squares_count():
+    assert together(training={"max_iterations": 9}).plan(seed=0).training.robust_scale == np.inf
 
 
 def test_a_round_may_count_jumps_and_exploded_sensitivities_otherwise():
@@ -67,7 +67,7 @@ def test_a_round_may_count_jumps_and_exploded_sensitivities_otherwise():
     assert [(one.moves, one.leverage) for one in options] == [(np.inf, np.inf), (10.0, np.inf), (10.0, 100.0)]
 
 
-@pytest.mark.parametrize("name", ["soft_margin", "moves", "leverage"])
+@pytest.mark.parametrize("name", ["robust_scale", "moves", "leverage"])
 @pytest.mark.parametrize("value", [0, -1.0])
 def test_a_limit_of_a_round_that_is_none_is_refused(name, value):
     with pytest.raises(ValidationError, match=name):

@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose
 from sysid.composite.members import assembled
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Role, Trace, TraceSet
-from sysid.workbench.assembly.line import line_of, places_of, score_line
-from sysid.workbench.assembly.proof_config import LineConfig
+from sysid.workbench.assembly.interpolation import line_of, places_of, score_line
+from sysid.workbench.assembly.proof_config import InterpolationConfig
 from tests.composite.composites import models, pipe, trace
 from tests.workbench.assembly.test_config import TWO_PLACES, config
 
-ASKED = LineConfig(channel="BP", knots={"BP": 1, "BP9": 9}, outputs=("AR",), data="places")
+ASKED = InterpolationConfig(channel="BP", knots={"BP": 1, "BP9": 9}, outputs=("AR",), data="places")
 
 
 def whole():
@@ -77,7 +77,7 @@ def test_data_without_places_are_refused():
 )
 def test_a_line_that_cannot_be_is_refused(line, match):
     with pytest.raises(ConfigError, match=match):
-        config(TWO_PLACES + f"line: {{channel: BP, data: places, {line}}}\n")
+        config(TWO_PLACES + f"interpolation: {{channel: BP, data: places, {line}}}\n")
 
 
 def test_outputs_that_do_not_follow_from_the_channel_are_refused():

@@ -1,11 +1,11 @@
-"""The worst moments: the right ones, and no two of the same."""
+"""The worst instants: the right ones, and no two of the same."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sysid.reporting.moments import worst_moments
 from sysid.reporting.signals import CaseSignals
+from sysid.reporting.worst_instants import worst_instants
 
 
 def _case(errors: dict[int, float], samples: int = 1000) -> CaseSignals:
@@ -17,8 +17,8 @@ def _case(errors: dict[int, float], samples: int = 1000) -> CaseSignals:
 
 
 def test_the_largest_errors_of_all_cases_come_first_whatever_their_sign() -> None:
-    moments = worst_moments({"A": _case({100: 1.0, 500: -3.0}), "B": _case({700: 2.0})}, 5)
-    assert [(m.case, m.sample, m.time, m.error) for m in moments] == [
+    instants = worst_instants({"A": _case({100: 1.0, 500: -3.0}), "B": _case({700: 2.0})}, 5)
+    assert [(m.case, m.sample, m.time, m.error) for m in instants] == [
         ("A", 500, 250.0, -3.0),
         ("B", 700, 350.0, 2.0),
         ("A", 100, 50.0, 1.0),
@@ -26,36 +26,36 @@ def test_the_largest_errors_of_all_cases_come_first_whatever_their_sign() -> Non
 
 
 def test_neighbours_of_a_moment_are_part_of_it() -> None:
-    moments = worst_moments({"A": _case({500: 3.0, 501: 2.9, 530: 2.8, 600: 1.0})}, 5)
-    assert [m.sample for m in moments] == [500, 600]
-    assert (moments[0].first, moments[0].last) == (480, 520)
+    instants = worst_instants({"A": _case({500: 3.0, 501: 2.9, 530: 2.8, 600: 1.0})}, 5)
+    assert [m.sample for m in instants] == [500, 600]
+    assert (instants[0].first, instants[0].last) == (480, 520)
 
 
 def test_a_window_is_so_narrow_that_the_error_can_be_seen() -> None:
     ramp = 0.1 * np.arange(4000.0)
     simulated = ramp.copy()
     simulated[2000] += 0.5
-    (moment,) = worst_moments({"A": CaseSignals(time=ramp, target=ramp, simulated=simulated, predicted=ramp)}, 1)
-    shown = slice(moment.first, moment.last + 1)
+    (instant,) = worst_instants({"A": CaseSignals(time=ramp, target=ramp, simulated=simulated, predicted=ramp)}, 1)
+    shown = slice(instant.first, instant.last + 1)
     assert np.ptp(ramp[shown]) <= 12 * 0.5
     assert np.ptp(ramp[shown]) > 6 * 0.5
-    assert moment.first < 2000 < moment.last
+    assert instant.first < 2000 < instant.last
 
 
 def test_a_window_stays_inside_its_case() -> None:
-    (first, last) = worst_moments({"A": _case({0: 1.0, 999: 2.0})}, 5)
+    (first, last) = worst_instants({"A": _case({0: 1.0, 999: 2.0})}, 5)
     assert (first.first, first.last) == (979, 999)
     assert (last.first, last.last) == (0, 20)
 
 
 def test_where_the_free_run_is_not_finite_is_worse_than_anything() -> None:
-    moments = worst_moments({"A": _case({100: 1e9}), "B": _case({300: np.nan})}, 1)
-    assert [(m.case, m.sample) for m in moments] == [("B", 300)]
+    instants = worst_instants({"A": _case({100: 1e9}), "B": _case({300: np.nan})}, 1)
+    assert [(m.case, m.sample) for m in instants] == [("B", 300)]
 
 
 def test_no_more_than_asked_for() -> None:
-    assert len(worst_moments({"A": _case(dict.fromkeys(range(0, 1000, 100), 1.0))}, 3)) == 3
+    assert len(worst_instants({"A": _case(dict.fromkeys(range(0, 1000, 100), 1.0))}, 3)) == 3
 
 
 def test_a_perfect_free_run_has_no_worst_moment() -> None:
-    assert worst_moments({"A": _case({})}, 5) == []
+    assert worst_instants({"A": _case({})}, 5) == []

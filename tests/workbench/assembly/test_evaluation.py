@@ -20,7 +20,9 @@ QUICK = (
     .replace("retrain: {members: [lower], max_iterations: 5}\n", "")
     .replace("export: null", "export: {formats: [c], tolerance: 1.0e-6}")
 )
-GROW = "grow: {data: pool, outputs: [lower], within: 0.001, add: 1, rounds: 1, train: [{max_iterations: 2}]}\n"
+GROW = (
+    "active_learning: {data: pool, outputs: [lower], within: 0.001, add: 1, rounds: 1, train: [{max_iterations: 2}]}\n"
+)
 
 
 def write_data(folder: Path, without: str) -> None:
@@ -39,7 +41,9 @@ def write_data(folder: Path, without: str) -> None:
             "training: tanks", "training: [tanks, plain]", ["tanks", "plain"], ["tanks"], id="two to train on"
         ),
         pytest.param("seed: 3", "seed: 3\nselection: judge", ["tanks"], ["tanks", "judge"], id="one that chooses"),
-        pytest.param("looks: 2}\n", "looks: 2}\n  also: [plain]\n", ["tanks", "plain"], ["tanks"], id="of a round"),
+        pytest.param(
+            "checkpoints: 2}\n", "checkpoints: 2}\n  also: [plain]\n", ["tanks", "plain"], ["tanks"], id="of a round"
+        ),
         pytest.param("stress:", f"{GROW}stress:", ["tanks", "pool"], ["tanks", "pool"], id="a pool"),
     ],
 )
@@ -73,7 +77,7 @@ def test_a_bundle_says_how_its_whole_came_about(workspace: Path) -> None:
     """A whole that was begun from another one was trained on that one's data too: its first line says which."""
     file, further = workspace / "pipelines" / "tanks.yaml", workspace / "pipelines" / "further.yaml"
     file.write_text(QUICK, encoding="utf-8")
-    further.write_text(QUICK.replace("name: tanks\n", "name: further\nbegin: ../runs/tanks/bundle\n", 1), "utf-8")
+    further.write_text(QUICK.replace("name: tanks\n", "name: further\nwarm_start: ../runs/tanks/bundle\n", 1), "utf-8")
     for one in (file, further):
         assert run_request(RunRequest(path=one, typed=one.stem, tracking=False)) == 0
     bundle = workspace / "runs" / "further" / "bundle"

@@ -12,7 +12,7 @@ from sysid.workbench.assembly.context import Context
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Material:
+class AssemblyData:
     """The traces of a run.
 
     Args:
@@ -26,7 +26,7 @@ class Material:
     chosen: tuple[str, ...]
 
     @classmethod
-    def of(cls, context: Context) -> Material:
+    def of(cls, context: Context) -> AssemblyData:
         """Load what a pipeline names.
 
         Args:
@@ -47,7 +47,7 @@ class Material:
         if not estimation or not selection:
             raise _lacks_a_role("the training data lack a role", *training)
         beside = {name: context.load(name) for name in (config.together.data if config.together else ())}
-        pool = None if config.grow is None else context.load(config.grow.data)
+        pool = None if config.active_learning is None else context.load(config.active_learning.data)
         sources, held_out = (None, ()) if pool is None else _pool(pool)
         more = [*beside.values(), *([] if pool is None else [pool])]
         return cls(

@@ -17,7 +17,7 @@ from sysid.composite.members import geometric_mean
 from sysid.composite.training import ALONE, CHOSEN, ONE_STEP, RETRAINED, TOGETHER
 from sysid.traces import Role, TraceSet
 from sysid.workbench.assembly.member_scores import MemberScores
-from sysid.workbench.assembly.stage_config import LessonsConfig
+from sysid.workbench.assembly.stage_config import AblationConfig
 
 Scores = Mapping[str, Mapping[str, float]]
 Step = Literal["close_loop", "choose_together", "retrain", "train_together"]
@@ -41,7 +41,7 @@ class Comparison:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lesson:
+class Ablation:
     """A step of modelling by parts, put to the test.
 
     Args:
@@ -55,9 +55,9 @@ class Lesson:
     published: str
 
 
-def lessons_of(
-    stages: Mapping[str, Scores], members: Sequence[MemberScores], cases: TraceSet, published: LessonsConfig
-) -> list[Lesson]:
+def ablations_of(
+    stages: Mapping[str, Scores], members: Sequence[MemberScores], cases: TraceSet, published: AblationConfig
+) -> list[Ablation]:
     """What the stages of a run say of each lesson.
 
     Args:
@@ -92,18 +92,18 @@ def lessons_of(
     trained = [stage for stage in stages if stage.startswith(TOGETHER)]
     parts = [stage for stage in stages if stage in {ALONE, CHOSEN, RETRAINED}]
     found = [
-        Lesson(
+        Ablation(
             step="close_loop",
             comparisons=(*alone, *compared(ONE_STEP, ALONE)),
             published=published.closing,
         ),
-        Lesson(step="choose_together", comparisons=compared(ALONE, CHOSEN), published=published.together),
-        Lesson(
+        Ablation(step="choose_together", comparisons=compared(ALONE, CHOSEN), published=published.together),
+        Ablation(
             step="retrain",
             comparisons=compared(CHOSEN if CHOSEN in stages else ALONE, RETRAINED),
             published=published.retraining,
         ),
-        Lesson(
+        Ablation(
             step="train_together",
             comparisons=compared(parts[-1] if parts else None, trained[-1] if trained else None),
             published=published.end_to_end,

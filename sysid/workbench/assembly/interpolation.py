@@ -1,4 +1,4 @@
-"""The whole line from an assembly that is modelled at a few places: made from its members, and judged at the others."""
+"""Interpolation over positions: every place of a line from an assembly that is modelled at a few of them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from sysid.errors import ConfigError
 from sysid.models import Cascade, Line
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference
-from sysid.workbench.assembly.proof_config import LineConfig
+from sysid.workbench.assembly.proof_config import InterpolationConfig
 
 WORKERS = 2
 """Threads of the timed runs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LineScores:
+class InterpolationScores:
     """How the line does at places, seen and unseen.
 
     Args:
@@ -39,7 +39,7 @@ class LineScores:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StoredLine:
+class StoredInterpolation:
     """A line as a run leaves it: with the channels that go in and come out, in their units.
 
     Args:
@@ -53,7 +53,7 @@ class StoredLine:
     outputs: tuple[Channel, ...]
 
     @classmethod
-    def of(cls, asked: LineConfig, line: Line, case: Trace) -> StoredLine:
+    def of(cls, asked: InterpolationConfig, line: Line, case: Trace) -> StoredInterpolation:
         """A line with the channels of a trace.
 
         Args:
@@ -81,7 +81,7 @@ class StoredLine:
         return {**self.line.to_dict(), "channels": channels}
 
     @classmethod
-    def from_dict(cls, fields: Mapping[str, Any]) -> StoredLine:
+    def from_dict(cls, fields: Mapping[str, Any]) -> StoredInterpolation:
         """What :meth:`to_dict` wrote.
 
         Args:
@@ -111,7 +111,7 @@ class StoredLine:
         return cls(line=line, **sides)
 
 
-def line_of(asked: LineConfig, whole: Cascade) -> Line:
+def line_of(asked: InterpolationConfig, whole: Cascade) -> Line:
     """The line of an assembly: what the knots need runs along it, what the outputs need stands at every place.
 
     Args:
@@ -129,7 +129,7 @@ def line_of(asked: LineConfig, whole: Cascade) -> Line:
     if unread or asked.channel not in there.inputs:
         raise ConfigError(
             "the outputs cannot be had at a place of the line",
-            where="line, outputs",
+            where="interpolation, outputs",
             expected=f"outputs that follow from {asked.channel} and the inputs of the whole",
             got=f"{', '.join(asked.outputs)} from {', '.join(there.inputs)}",
             remedy="name the channel that the places read, and outputs of members that stand there",
@@ -152,7 +152,7 @@ def places_of(case: Trace, output: str) -> dict[float, str]:
     return dict(sorted(found.items()))
 
 
-def score_line(asked: LineConfig, line: Line, cases: TraceSet) -> LineScores:
+def score_line(asked: InterpolationConfig, line: Line, cases: TraceSet) -> InterpolationScores:
     """Score a line at the places of a data set.
 
     Args:
@@ -188,7 +188,7 @@ def score_line(asked: LineConfig, line: Line, cases: TraceSet) -> LineScores:
             rows = [everywhere.index(position) for position in found]
             mse[name][trace.name] = _errors(run[name][rows], trace, list(found.values()))
     knots = list(line.knots.values())
-    return LineScores(
+    return InterpolationScores(
         mse=mse,
         places={name: np.array(list(found)) for name, found in places.items()},
         seen={name: np.isin(list(found), knots) for name, found in places.items()},

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 from sysid.composite.active_learning import Look, sequence_errors
 from sysid.composite.keeper import Decision
 from sysid.composite.limits_held import holding
-from sysid.composite.monte_carlo import Stress, stress
+from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
 from sysid.composite.training import TrainedComposite
 from sysid.models import Cascade
 from sysid.reporting.assembly.results import AssemblyResults
 from sysid.traces import Trace, TraceSet
 from sysid.validation import evaluate_cascade
 from sysid.workbench.annotation import find_annotator
+from sysid.workbench.assembly.ablation import ablations_of
 from sysid.workbench.assembly.context import Context
-from sysid.workbench.assembly.lessons import lessons_of
-from sysid.workbench.assembly.line import LineScores, StoredLine, line_of, score_line
-from sysid.workbench.assembly.material import Material
+from sysid.workbench.assembly.data import AssemblyData
+from sysid.workbench.assembly.interpolation import InterpolationScores, StoredInterpolation, line_of, score_line
 from sysid.workbench.assembly.member_scores import score_candidates
 from sysid.workbench.assembly.record import Outcome, assembly_results, write_signals
 from sysid.workbench.runner import events
@@ -35,14 +35,14 @@ ASSEMBLY, LINE = "assembly.json", "line.json"
 
 SCORING = Outlined(name="scoring", title="Scoring every stage")
 WHOLE = Outlined(name="assembly", title="Choosing the stage that does best", called="assembly")
-STRESS = Outlined(name="stress", title="Running the whole on random sequences")
-PLACES = Outlined(name="line", title="Running every place of the line")
+STRESS = Outlined(name="monte_carlo", title="Running the whole on random sequences")
+PLACES = Outlined(name="interpolation", title="Running every place of the line")
 EXPORT = Outlined(name="export", title="Exporting the assembly")
 MEMBERS = Outlined(name="member-scores", title="Scoring the members alone")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Finish:
+class Evaluating:
     """The end of one run.
 
     Args:
@@ -55,21 +55,21 @@ class Finish:
     trained: TrainedComposite
     notes: tuple[str, ...]
 
-    def results(self, cases: TraceSet, material: Material) -> AssemblyResults:
+    def results(self, cases: TraceSet, data: AssemblyData) -> AssemblyResults:
         """Score every stage, choose one, and prove and export it.
 
         Args:
             cases: The cases that are scored.
-            material: What was trained on, and chooses.
+            data: What was trained on, and chooses.
 
         Returns:
             What is stored.
         """
-        found = self._outcome(cases, material)
+        found = self._outcome(cases, data)
         write_signals(self.context.store.path, found, self.context.config.outputs, cases)
         return self.context.run.results(assembly_results(self.context, self.trained, found, cases, self.notes))
 
-    def _outcome(self, cases: TraceSet, material: Material) -> Outcome:
+    def _outcome(self, cases: TraceSet, data: AssemblyData) -> Outcome:
         """Every stage scored, one chosen by the selection traces, proven and exported."""
         config = self.context.config
         scored = self._scored(cases)
@@ -78,16 +78,16 @@ class Finish:
         whole = self._chosen()
         stressed, worst, sequences = self._stressed(whole)
         line = self._line(whole)
-        exported = self._export(whole, cases, evaluate_cascade(whole, cases), material)
+        exported = self._export(whole, cases, evaluate_cascade(whole, cases), data)
         candidates = self.trained.candidates
         members = []
         if candidates is not None:
             members = self.context.compute(MEMBERS, lambda _: score_candidates(candidates, tuple(cases)))
         return Outcome(
             whole=whole, stages=scores, selection=chosen_by, chosen=chosen, timing=timing[chosen], stressed=stressed,
-            worst=worst, line=line, unseen=self._unseen(sequences), exported=exported,
+            worst=worst, interpolation=line, unseen=self._unseen(sequences), exported=exported,
             holding=holding(whole, config.outputs, tuple(cases), sequences), members=members,
-            lessons=lessons_of(scores, members, cases, config.lessons),
+            ablation=ablations_of(scores, members, cases, config.ablation),
         )  # fmt: skip
 
     def _scored(self, cases: TraceSet) -> dict[str, Any]:
@@ -142,19 +142,19 @@ class Finish:
         )
         return self.context.run.do(step).value
 
-    def _stressed(self, whole: Cascade) -> tuple[Stress | None, tuple[Trace, ...], tuple[Trace, ...]]:
+    def _stressed(self, whole: Cascade) -> tuple[MonteCarlo | None, tuple[Trace, ...], tuple[Trace, ...]]:
         """What came of the random sequences, those that the whole did worst on, and all of them."""
-        asked = self.context.config.stress
+        asked = self.context.config.monte_carlo
         if asked is None:
             return None, (), ()
-        annotator = None if asked.states is None else find_annotator(asked.states, where="stress, states")
+        annotator = None if asked.states is None else find_annotator(asked.states, where="monte_carlo, states")
         sequences = self.context.load(asked.data)
 
-        def make(work: Work) -> Stress:
+        def make(work: Work) -> MonteCarlo:
             def report(done: int) -> None:
                 work.say(f"{done} of {len(sequences)}", done / len(sequences))
 
-            return stress(whole, tuple(sequences), asked.output, asked.within, report, annotator=annotator)
+            return run_monte_carlo(whole, tuple(sequences), asked.output, asked.within, report, annotator=annotator)
 
         found = self.context.compute(
             STRESS, make, outcome=lambda one: f"{one.lost} of {one.sequences} diverged, {100 * one.within:.3g} % within"
@@ -163,7 +163,7 @@ class Finish:
 
     def _unseen(self, sequences: Sequence[Trace]) -> dict[str, Look]:
         """Every stage of growth on the random sequences, which had no say in anything."""
-        asked, stages = self.context.config.stress, self.trained.stages
+        asked, stages = self.context.config.monte_carlo, self.trained.stages
         rounds = [] if self.trained.growth is None else [one.stage for one in self.trained.growth.rounds]
         if asked is None or not rounds:
             return {}
@@ -173,19 +173,19 @@ class Finish:
             for stage, whole in wholes.items()
         }
 
-    def _line(self, whole: Cascade) -> LineScores | None:
-        asked = self.context.config.line
+    def _line(self, whole: Cascade) -> InterpolationScores | None:
+        asked = self.context.config.interpolation
         if asked is None:
             return None
         line, cases = line_of(asked, whole), self.context.load(asked.data)
-        write_json(self.context.store.path / LINE, StoredLine.of(asked, line, next(iter(cases))).to_dict())
+        write_json(self.context.store.path / LINE, StoredInterpolation.of(asked, line, next(iter(cases))).to_dict())
         return self.context.compute(
             PLACES,
             lambda _: score_line(asked, line, cases),
             outcome=lambda scores: f"all places of the longest case in {max(scores.timing.values()):.3g} s",
         )
 
-    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any, material: Material) -> Bundle | None:
+    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any, data: AssemblyData) -> Bundle | None:
         from sysid.export import export_bundle
 
         asked = self.context.config.export
@@ -195,8 +195,8 @@ class Finish:
             "pipeline": self.context.config.name,
             "command": self.context.run.command,
             "training": {
-                "fitted": [self._data(name) for name in material.fitted],
-                "chosen": [self._data(name) for name in material.chosen],
+                "fitted": [self._data(name) for name in data.fitted],
+                "chosen": [self._data(name) for name in data.chosen],
                 "notes": list(self.notes),
             },
         }

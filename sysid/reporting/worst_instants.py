@@ -1,4 +1,4 @@
-"""The worst moments of a free run: where to look first."""
+"""The worst instants of a free run: where to look first."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ READABLE: Final = 12.0
 """How many times the error the target may move in a window: beyond, the two lines cannot be told apart."""
 
 NARROWEST: Final = 10
-"""Samples on each side of a moment that are always shown."""
+"""Samples on each side of an instant that are always shown."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moment:
+class Instant:
     """A sample with a large error, and the window around it.
 
     Args:
@@ -46,7 +46,7 @@ class Moment:
         return self.simulated - self.target
 
 
-def worst_moments(signals: Dict[str, CaseSignals], count: int, *, share: float = 0.02) -> list[Moment]:
+def worst_instants(signals: Dict[str, CaseSignals], count: int, *, share: float = 0.02) -> list[Instant]:
     """The samples with the largest errors, no two of them in one window.
 
     Args:
@@ -56,17 +56,19 @@ def worst_moments(signals: Dict[str, CaseSignals], count: int, *, share: float =
             less where the target moves so far that the error could not be seen.
 
     Returns:
-        The moments, worst first; a sample where the free run is not finite is worse than any other.
+        The instants, worst first; a sample where the free run is not finite is worse than any other.
     """
-    candidates = [moment for case, signal in signals.items() for moment in _moments_of_case(case, signal, count, share)]
-    return sorted(candidates, key=lambda moment: _badness(moment.error), reverse=True)[:count]
+    candidates = [
+        instant for case, signal in signals.items() for instant in _instants_of_case(case, signal, count, share)
+    ]
+    return sorted(candidates, key=lambda instant: _badness(instant.error), reverse=True)[:count]
 
 
 def _badness(error: float) -> float:
     return abs(error) if np.isfinite(error) else np.inf
 
 
-def _moments_of_case(case: str, signal: CaseSignals, count: int, share: float) -> list[Moment]:
+def _instants_of_case(case: str, signal: CaseSignals, count: int, share: float) -> list[Instant]:
     size = np.abs(signal.simulated - signal.target)
     size[~np.isfinite(size)] = np.inf
     half = max(20, round(share * len(size)))
@@ -77,7 +79,7 @@ def _moments_of_case(case: str, signal: CaseSignals, count: int, share: float) -
             break
         around = _readable(signal.target, sample, half, size[sample])
         first, last = max(0, sample - around), min(len(size) - 1, sample + around)
-        found.append(_moment(case, signal, sample, (first, last)))
+        found.append(_instant(case, signal, sample, (first, last)))
         _blank(size, max(0, sample - 2 * half), sample + 2 * half)
     return found
 
@@ -93,8 +95,8 @@ def _blank(size: NDArray[np.float64], first: int, last: int) -> None:
     size[first : last + 1] = -1.0
 
 
-def _moment(case: str, signal: CaseSignals, sample: int, window: tuple[int, int]) -> Moment:
-    return Moment(
+def _instant(case: str, signal: CaseSignals, sample: int, window: tuple[int, int]) -> Instant:
+    return Instant(
         case=case,
         sample=sample,
         time=float(signal.time[sample]),

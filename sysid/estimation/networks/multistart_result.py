@@ -15,7 +15,7 @@ from sysid.estimation.result import FitResult, Status
 from sysid.models import History
 
 
-def raced_status(
+def multistart_status(
     chosen: starts.Candidate,
     candidates: Sequence[starts.Candidate],
     records: Sequence[tuple[NDArray[np.float64], History | None]],
@@ -47,7 +47,7 @@ def _leaves_its_bounds(model: starts.Network, inputs: NDArray[np.float64], histo
     return not bool(np.all(np.abs(scaled) < model.clamp * (1.0 - 1e-9)))
 
 
-def raced_result(
+def multistart_result(
     choice: Choice,
     candidates: Sequence[starts.Candidate],
     training: Training,
@@ -125,7 +125,7 @@ def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Tra
             if not c.members and stable is not False and np.isfinite(c.score)
         ]
         notes.append(
-            f"A committee: the mean of {len(choice.chosen.members)} one-step maps as one network. Its error on the "
+            f"An ensemble: the mean of {len(choice.chosen.members)} one-step maps as one network. Its error on the "
             f"selection traces is {choice.chosen.score:.3g}, that of the best single start {min(single):.3g}."
         )
     refused = sum(stable is False for stable in choice.stable)

@@ -21,8 +21,8 @@ QUICK = PIPELINE.replace("candidates: 2", "candidates: 1").replace(
     "retrain: {members: [lower], max_iterations: 5}\n", ""
 )
 FIRST = QUICK.replace("export: null", "export: {formats: [c]}")
-KNOWN = "known: [{mapping: upper -> LH, gains: {upper: 0.9}, low: 0, high: 100, rest: 0}]\n"
-SECOND = QUICK.replace("name: tanks\n", "name: further\nbegin: ../runs/tanks/bundle\n", 1)
+KNOWN = "fixed: [{mapping: upper -> LH, gains: {upper: 0.9}, low: 0, high: 100, rest: 0}]\n"
+SECOND = QUICK.replace("name: tanks\n", "name: further\nwarm_start: ../runs/tanks/bundle\n", 1)
 
 
 def run(workspace: Path, name: str, text: str) -> Path:
@@ -70,10 +70,12 @@ def test_a_round_may_have_closed_a_circle_before(workspace: Path) -> None:
     chain = FIRST.replace("mapping: pump+lower -> upper", "mapping: pump -> upper").replace(
         "input_delays: [[0, 1], [1]]", "input_delays: [0, 1]"
     )
-    closed = chain.replace("stride: 2, looks: 2}\n", "stride: 2, looks: 2}\n  again: [{reads: {upper: {lower: 1}}}]\n")
+    closed = chain.replace(
+        "stride: 2, checkpoints: 2}\n", "stride: 2, checkpoints: 2}\n  again: [{reads: {upper: {lower: 1}}}]\n"
+    )
     given = read_assembly(run(workspace, "tanks", closed))
     folder = run(
-        workspace, "further", chain.replace("name: tanks\n", "name: further\nbegin: ../runs/tanks/bundle\n", 1)
+        workspace, "further", chain.replace("name: tanks\n", "name: further\nwarm_start: ../runs/tanks/bundle\n", 1)
     )
     assert str(read_assembly(folder).member("upper").mapping) == str(given.member("upper").mapping)
 
@@ -120,7 +122,7 @@ def test_a_line_is_published_beside_the_page_as_it_is(workspace: Path) -> None:
     """Whatever the line is of: it is copied, and the page says where it lies."""
     folder = run(workspace, "tanks", QUICK)
     shutil.rmtree(folder / "bundle", ignore_errors=True)
-    (folder / "line.json").write_text('{"a": "line"}', encoding="utf-8")
+    (folder / "line.json").write_text('{"a": "interpolation"}', encoding="utf-8")
     page = publish_run(folder, workspace / "reports", bundle=True)
     assert "[line.json](line.json)" in page.read_text(encoding="utf-8")
     assert not (page.parent / "bundle").exists()

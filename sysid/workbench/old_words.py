@@ -1,0 +1,90 @@
+"""Words of the release before: read for one release, with a word about the new one.
+
+A group of fields that has renamed some says so in :attr:`Words.OLD`; everything else happens here.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from sysid.yaml_files import FieldError
+
+STRICT = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+"""A field that is not known is an error; nothing changes once it is read."""
+
+TRAINING = {
+    "prelude": "pretraining",
+    "prelude_iterations": "pretraining_iterations",
+    "committee": "ensemble",
+    "leave_out": "input_subsets",
+}
+"""Options of a network's training."""
+
+JOINT_TRAINING = {"looks": "checkpoints", "soft_margin": "robust_scale"}
+"""Options of training several models as one."""
+
+ASSEMBLY = {
+    "known": "fixed",
+    "begin": "warm_start",
+    "grow": "active_learning",
+    "line": "interpolation",
+    "stress": "monte_carlo",
+    "lessons": "ablation",
+}
+"""Parts of a pipeline of kind ``assembly``."""
+
+
+class OldWordWarning(FutureWarning):
+    """A word that the next release no longer reads."""
+
+
+class Words(BaseModel):
+    """A group of fields that still reads their old names."""
+
+    model_config = STRICT
+
+    OLD: ClassVar[Mapping[str, str]] = {}
+    """New name of each old one."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_old_words(cls, data: Any) -> Any:
+        return with_new_words(data, cls.OLD)
+
+
+def with_new_words(data: Any, old: Mapping[str, str]) -> Any:
+    """The same fields under their new names; each old one is told once, as a warning.
+
+    Args:
+        data: Fields by name; what is no mapping is given back as it is.
+        old: New name of each old one.
+
+    Returns:
+        A mapping with new names alone.
+
+    Raises:
+        FieldError: If a field stands there under both of its names.
+
+    Example:
+        >>> with_new_words({"seed": 1}, {"sead": "seed"})
+        {'seed': 1}
+    """
+    if not isinstance(data, Mapping) or not any(word in data for word in old):
+        return data
+    both = [(word, new) for word, new in old.items() if word in data and new in data]
+    if both:
+        raise FieldError(
+            f"{both[0][1]} stands there under its old name too",
+            expected=both[0][1],
+            got=" and ".join(both[0]),
+            remedy=f"take {both[0][0]} out",
+        )
+    for word in old:
+        if word in data:
+            text = f"{word} is called {old[word]} now; the next release no longer reads the old word"
+            warnings.warn(text, OldWordWarning, stacklevel=2)
+    return {old.get(key, key) if isinstance(key, str) else key: value for key, value in data.items()}
