@@ -47,6 +47,7 @@ def run_cli(arguments: list[str]) -> int:
     speak_plainly()
     with warnings.catch_warnings():
         warnings.showwarning = _note
+        warnings.simplefilter("default", FutureWarning)  # once each, whatever the caller's filters say
         return _run(arguments, debug=debug)
 
 

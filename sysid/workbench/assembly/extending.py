@@ -1,10 +1,10 @@
 """``extends``: a pipeline that builds on another one, and says only what is different.
 
-A key that it gives stands instead of the base's, whole, but for two: entries of ``known`` are joined by the channel
+A key that it gives stands instead of the base's, whole, but for two: entries of ``fixed`` are joined by the channel
 that they write (one that the base writes too stands in its place, others come after), and ``limits`` by output. What
 is ``null`` takes the base's away; a ``name`` is each one's own. Files are joined before anything is checked: a run
 knows one pipeline, and what it stores depends on what is declared, whichever file that stands in. Paths in it, such as
-that of ``begin``, are seen from the folder of the file that is run.
+that of ``warm_start``, are seen from the folder of the file that is run.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def _base(given: object, path: Path, own: Origins) -> Path:
 
 
 class _Entry(NamedTuple):
-    """One of ``known`` or ``limits``: itself, and which one it is in whose file."""
+    """One of ``fixed`` or ``limits``: itself, and which one it is in whose file."""
 
     value: Any
     origins: Origins

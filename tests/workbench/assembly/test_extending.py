@@ -100,13 +100,13 @@ def test_null_takes_the_bases_away(tmp_path: Path, key: str) -> None:
 def test_a_channel_that_is_written_by_several_entries_is_replaced_in_all_places(tmp_path: Path) -> None:
     at_ten = {**UH, "instances": ["10"]}
     base = BASE.replace("members:", f"  - {at_ten}\nmembers:")
-    assert joined(tmp_path, f"{HEAD}known: [{NEW_UH}]", base)["fixed"] == [FULL, NEW_UH, LH]
+    assert joined(tmp_path, f"{HEAD}fixed: [{NEW_UH}]", base)["fixed"] == [FULL, NEW_UH, LH]
 
 
 def test_a_base_may_extend_another(tmp_path: Path) -> None:
-    (tmp_path / "middle.yaml").write_text(f"{HEAD}known: [{NEW}]\nseed: 7\nmonte_carlo: null\n", encoding="utf-8")
+    (tmp_path / "middle.yaml").write_text(f"{HEAD}fixed: [{NEW}]\nseed: 7\nmonte_carlo: null\n", encoding="utf-8")
     text = HEAD.replace("base.yaml", "middle.yaml").replace("grown", "last")
-    data = joined(tmp_path, f"{text}known: [{NEW_UH}]\n")
+    data = joined(tmp_path, f"{text}fixed: [{NEW_UH}]\n")
     assert data == {
         **{key: value for key, value in BASE_DATA.items() if key != "monte_carlo"},
         **{"name": "last", "seed": 7, "fixed": [FULL, NEW_UH, LH, NEW]},
@@ -145,18 +145,20 @@ BAD = {**NEW, "low": 2}
 UNBOUND = {**NEW_UH, "low": "no"}
 WRONG_OWN = [
     pytest.param("seed: one", "line 4, field seed", "integer", id="a key"),
-    pytest.param("strss: null", "line 4, field strss", "did you mean stress?", id="nothing to take away"),
-    pytest.param(f"known:\n  - {NEW}\n  - {BAD}", "line 6, field known[1]", "bounds", id="a known member"),
-    pytest.param(f"fixed: [{UNBOUND}]", "line 4, field known[0].low", "number", id="one in the place of the base's"),
-    pytest.param("fixed: [{}]", "line 4, field known[0].mapping", "missing", id="a known member without a mapping"),
-    pytest.param("fixed: [all]", "line 4, field known[0]", "FixedConfig", id="no known member at all"),
-    pytest.param("fixed: all", "line 4, field known", "tuple", id="no list of them"),
+    pytest.param("monte_carl: null", "line 4, field monte_carl", "did you mean monte_carlo?", id="nothing to take away"),
+    pytest.param(f"fixed:\n  - {NEW}\n  - {BAD}", "line 6, field fixed[1]", "bounds", id="a known member"),
+    pytest.param(f"fixed: [{UNBOUND}]", "line 4, field fixed[0].low", "number", id="one in the place of the base's"),
+    pytest.param("fixed: [{}]", "line 4, field fixed[0].mapping", "missing", id="a known member without a mapping"),
+    pytest.param("fixed: [all]", "line 4, field fixed[0]", "FixedConfig", id="no known member at all"),
+    pytest.param("fixed: all", "line 4, field fixed", "tuple", id="no list of them"),
     pytest.param("limits: {upper: {lw: 1}}", "line 4, field limits.upper.lw", "did you mean low?", id="a limit"),
 ]  # fmt: skip
 WRONG_BASE = [
     pytest.param("data: tanks", "data: []", "line 4, field data", "string", id="a key"),
-    pytest.param("stress:", "strss:", "line 19, field strss", "did you mean stress?", id="a misspelt key"),
-    pytest.param("upper: 1}, low: 0", "upper: 1}, low: 10", "line 12, field known[1]", "bounds", id="a known member"),
+    pytest.param(
+        "monte_carlo:", "monte_carl:", "line 19, field monte_carl", "did you mean monte_carlo?", id="a misspelt key"
+    ),
+    pytest.param("upper: 1}, low: 0", "upper: 1}, low: 10", "line 12, field fixed[1]", "bounds", id="a known member"),
     pytest.param("lower: {low", "lower: {lw", "line 9, field limits.lower.lw", "did you mean low?", id="a limit"),
 ]
 BESIDE = f"fixed: [{{mapping: pump -> FULL, gains: {{pump: 2}}, low: 0, high: 1, rest: 0}}, {NEW}]\nlimits: {{}}\n"
@@ -189,7 +191,7 @@ def test_what_is_wrong_in_the_bases_base_is_named_there(tmp_path: Path) -> None:
     )
     with pytest.raises(ConfigError, match="number") as caught:
         load(file)
-    assert caught.value.where == f"{tmp_path / 'base.yaml'}, line 12, field known[1].low"
+    assert caught.value.where == f"{tmp_path / 'base.yaml'}, line 12, field fixed[1].low"
 
 
 @pytest.mark.parametrize("name", ["", "name: null\n"])
@@ -234,7 +236,7 @@ QUICK = PIPELINE.replace("candidates: 2", "candidates: 1").replace(
     "retrain: {members: [lower], max_iterations: 5}\n", ""
 )
 KNOWN = "fixed: [{mapping: upper -> LH, gains: {upper: 0.9}, low: 0, high: 100, rest: 0}]\n"
-GROWN = f"{HEAD.replace('base', 'tanks')}limits: {{lower: {{high: LH}}}}\n{KNOWN}stress: null\n"
+GROWN = f"{HEAD.replace('base', 'tanks')}limits: {{lower: {{high: LH}}}}\n{KNOWN}monte_carlo: null\n"
 
 
 def run(workspace: Path, name: str, text: str, *, out: Path | None = None) -> Path:
