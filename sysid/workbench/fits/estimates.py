@@ -29,7 +29,7 @@ CALIBRATION_ITERATIONS = 6
 CALIBRATION_LIMIT_S = 10.0
 """Seconds that the timing of one fit may take."""
 
-FEW = ("max_iterations", "prelude_iterations", "starts", "committee", "leave_out", "max_time_s")
+FEW = ("max_iterations", "pretraining_iterations", "starts", "ensemble", "input_subsets", "max_time_s")
 """Options that make a training short."""
 
 SHARE = 8
@@ -69,10 +69,10 @@ def network_time(
     few = dataclasses.replace(
         training,
         max_iterations=CALIBRATION_ITERATIONS,
-        prelude_iterations=min(training.prelude_iterations, CALIBRATION_ITERATIONS),
+        pretraining_iterations=min(training.pretraining_iterations, CALIBRATION_ITERATIONS),
         starts=1,
-        committee=1,
-        leave_out=(),
+        ensemble=1,
+        input_subsets=(),
         max_time_s=CALIBRATION_LIMIT_S,
     )
     moments: list[tuple[str, float]] = []
@@ -85,7 +85,7 @@ def network_time(
     iteration, earlier = (each[True] or total) / share, each[False] or 0.0
     around = max(total - sum((each[stage == last] or 0.0) for stage, _ in moments), 0.0)
     iterations, side_by_side = planned_iterations(training), min(training.workers, training.starts, os.cpu_count() or 1)
-    before = earlier * training.prelude_iterations * training.starts if training.prelude else 0.0
+    before = earlier * training.pretraining_iterations * training.starts if training.pretraining else 0.0
     seconds = around + min((before + iterations * iteration) / side_by_side, training.max_time_s)
     trained = f"{iterations:.0f} iterations of {1e3 * iteration:.1f} ms, {side_by_side} at a time"
     ahead = f", {duration(before / side_by_side)} one step ahead" if before else ""
