@@ -47,10 +47,11 @@ def data() -> TrainingData:
     )
 
 
-class Shelf:
+class Shelf(MakeAll):
     """A keeper that keeps everything in memory, by name and terms."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.kept: dict[str, tuple[dict, FitResult | CascadeFit]] = {}
         self.made: list[str] = []
         self.heard: list[str] = []
@@ -65,9 +66,10 @@ class Shelf:
         self.kept[task.name] = (dict(task.terms), fit)
         return fit
 
-    def say(self, title: str, detail: str = "", *, done: bool = False) -> None:
-        if done:
-            self.heard.append(f"{title}: {detail}")
+    def decide(self, decision):
+        found = super().decide(decision)
+        self.heard.append(f"{decision.title}: {decision.outcome(found)}")
+        return found
 
 
 def test_every_stage_goes_on_from_the_one_before_and_the_best_is_chosen():

@@ -118,6 +118,7 @@ def test_a_cascade_with_a_linear_member_is_trained_too():
     assert mse(fit.model, record) < 1e-3 * mse(start, record)
 
 
+@pytest.mark.parametrize("fields", [{"starts": 0}, {"stride": 0}, {"moves": 0.0}], ids=str)
 def test_training_that_cannot_be_is_refused(fields):
     with pytest.raises(ConfigError):
         JointTraining(**fields)
