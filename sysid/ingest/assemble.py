@@ -115,7 +115,7 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
         notes += [note] if note else []
     return Record(
         table=replace(table, columns=(RawColumn(name="", values=stamps),), others=(), records=()),
-        rows=np.arange(len(table), dtype=np.intp),
+        rows=np.arange(len(table), dtype=np.int32),
         stamps=stamps,
         names=tuple(channel.name for channel in wanted.channels),
         values=np.column_stack(columns),

@@ -149,7 +149,11 @@ def _long(table: RawTable) -> dict[str, Any] | None:
 def _numbered(table: RawTable, numbers: Sequence[RawColumn]) -> dict[str, Any] | None:
     """A long table whose signals have numbers: each of them once at each time."""
     time = next(column.values for column in table.columns if column.name == table.time)
+    if bool((time[1:] > time[:-1]).all()):
+        return None
     for names, values in (numbers, numbers[::-1]):
+        if (names.values[:1000] != np.rint(names.values[:1000])).any():
+            continue
         found = np.unique(names.values)
         whole = len(found) > 1 and np.isfinite(found).all() and (found == np.rint(found)).all()
         pairs = np.unique(np.column_stack([time, names.values]), axis=0)

@@ -28,7 +28,7 @@ class Record:
     """
 
     table: RawTable
-    rows: NDArray[np.intp]
+    rows: NDArray[np.int32]
     stamps: NDArray[np.float64]
     names: tuple[str, ...]
     values: NDArray[np.float64]
