@@ -15,10 +15,11 @@ from sysid.ingest.numbers import usually_missing
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.reading import read_table
 from sysid.ingest.table import RawColumn, RawTable
-from sysid.ingest.words import known_states
+from sysid.ingest.words import PAIRS, TRUTH, known_states
 
 _LONG_SHARE = 0.6
 _CHANGE_SHARE = 0.5
+_FEW_TEXTS = 3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,12 +109,21 @@ def _thousands(table: RawTable) -> dict[str, Any] | None:
 
 
 def _missing(table: RawTable) -> dict[str, Any] | None:
-    """Texts that mostly stand for a missing value, where they are all that a column of numbers holds beside them."""
+    """Texts that stand for a missing value, where they are all that a column of numbers holds beside them.
+
+    Those that usually do, and a few others without a digit: what an instrument writes in place of a number.
+    """
     found: dict[str, None] = {}
     for column in table.columns:
-        if column.strange and all(map(usually_missing, column.strange)):
+        few = len(column.strange) <= _FEW_TEXTS
+        if column.strange and all(usually_missing(text) or (few and _is_remark(text)) for text in column.strange):
             found |= dict.fromkeys(column.strange)
     return {"missing": tuple(found)} if found else None
+
+
+def _is_remark(text: str) -> bool:
+    plain = text.casefold()
+    return not any(map(str.isdigit, text)) and plain not in TRUTH and not any(plain in pair for pair in PAIRS)
 
 
 def _states(table: RawTable) -> dict[str, Any] | None:

@@ -140,6 +140,10 @@ ZOO = {
     "a mark for missing values": Animal(
         text=table(lambda k: f"{T[k]:.1f},{U[k]},{'---' if k == 7 else f'{Y[k]:.6f}'}", HEAD), y="", told=("missing",)
     ),
+    "an instrument's word for no value": Animal(
+        text=table(lambda k: f"{T[k]:.1f},{U[k]},{'Overload' if k == 7 else f'{Y[k]:.6f}'}", HEAD),
+        y="", told=("missing", "Overload"),
+    ),
     "ISO time": Animal(text=table(lambda k: f"2024-05-01T{clock(k)},{U[k]},{Y[k]:.6f}", "Time,u [V],y [V]")),
     "German date and time": Animal(
         text=table(lambda k: f"12.03.2024 {clock(k)};{U[k]};{Y[k]:.6f}".replace(".", ",", 0), "Zeit;u [V];y [V]")
