@@ -285,6 +285,7 @@ def _of_records(whole: FileFinding, attempt: Attempt) -> FileFinding:
         first,
         columns=tuple(_merged([_by_name(case.finding, name) for case in chosen]) for name in names),
         samples=min(case.finding.samples for case in chosen),
+        distinct=min(case.finding.distinct for case in chosen),
         needed=RepairOptions.model_validate(merged),
         table=whole.table,
         notes=tuple(notes),

@@ -47,6 +47,7 @@ from tests.ingest.zoo_binary import (
 ALL = slice(0, N)
 SIDE = np.vstack([TIME, U, Y])
 FRAME = pd.DataFrame({"u": U, "y": Y}, index=pd.to_timedelta(TIME, unit="s"))
+SHORT = slice(0, 7)  # fewer samples than a record has by default
 TWO = {"est": ALL, "val": slice(0, 12)}
 RUNS = np.array([({"u": column(U[p]), "y": column(Y[p]), "Ts": 0.1}) for p in (ALL, slice(0, 12))], dtype=object)
 
@@ -100,6 +101,12 @@ ZOO: dict[str, tuple[str, Maker, Columns, Cases]] = {
         mat("5", u=cells(U, U[:12]), y=cells(Y, Y[:12]), Ts=0.1),
         ("u", "y"),
         {"record_1": ALL, "record_2": TWO["val"]},
+    ),
+    "MAT 5: cells, one of few samples": (
+        "a.mat",
+        mat("5", u=cells(U, U[SHORT]), y=cells(Y, Y[SHORT]), Ts=0.1),
+        ("u", "y"),
+        {"record_1": ALL, "record_2": SHORT},
     ),
     "MAT 7.3: cells": (
         "a.mat",
