@@ -15,7 +15,7 @@ setup: $(VENV)/.ready  ## environment with the tested versions
 $(VENV)/.ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --group dev --editable ".[mdf,tdms]"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --group dev --editable ".[excel,mdf,tdms]"
 	touch $@
 
 run: setup  ## the main job: traces, fits, export, report
