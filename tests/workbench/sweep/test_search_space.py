@@ -48,8 +48,8 @@ SPACES = {
         ["ARX [1; 2 5; 1 0]", "ARX [1; 2 5; 1 1]", "ARX [1; 3 5; 1 0]", "ARX [1; 3 5; 1 1]"],
     ),
     "poles and zeros, without what is no transfer function": (
-        [{"kind": "TransferFunction", "poles": {"from": 1, "to": 2}, "zeros": {"from": 0, "to": 1}, "delays": 1}],
-        ["TF [1 1; 0 0; 1 1]", "TF [2 2; 0 0; 1 1]", "TF [2 2; 1 1; 1 1]"],
+        [{"kind": "TransferFunction", "poles": {"from": 1, "to": 2}, "zeros": {"from": 1, "to": 2}, "delays": 1}],
+        ["TF [1 1; 1 1; 1 1]", "TF [2 2; 1 1; 1 1]", "TF [2 2; 2 2; 1 1]"],
     ),
     "several structures": (
         [
