@@ -12,11 +12,11 @@ from sysid.workbench.kinds import KINDS, kind_of, kinds
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_every_kind_has_a_strict_configuration_and_a_runner(name: str) -> None:
+def test_every_kind_has_a_strict_configuration_and_a_program(name: str) -> None:
     config = KINDS[name].load_config()
     assert issubclass(config, BaseModel)
     assert config.model_config["extra"] == "forbid"
-    assert callable(KINDS[name].load_runner())
+    assert callable(KINDS[name].load_program())
 
 
 @pytest.mark.parametrize(("text", "kind"), [("name: a", "fits"), ("kind: fits\nname: a", "fits")])
@@ -45,7 +45,7 @@ def test_a_pipeline_that_extends_another_says_its_kind(tmp_path: Path) -> None:
 def test_a_kind_that_a_package_brings_is_as_strict(name: str) -> None:
     config = kinds()[name].load_config()
     assert config.model_config["extra"] == "forbid"
-    assert callable(kinds()[name].load_runner())
+    assert callable(kinds()[name].load_program())
 
 
 def test_the_kinds_of_the_packages_that_are_installed_are_known() -> None:
