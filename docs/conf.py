@@ -18,7 +18,6 @@ extensions = [
 exclude_patterns = ["receivers"]
 html_theme = "furo"
 html_title = "sysid"
-html_static_path = ["_static"]
 html_theme_options = {"navigation_with_keys": True}
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
