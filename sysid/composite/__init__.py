@@ -2,7 +2,7 @@
 
 Declare the members and how they are wired (:class:`Composite`), say how they are trained (:class:`TrainingPlan`), and
 call :func:`train`; or call its stages one by one: :func:`fit_member`, :func:`choose_together`, :func:`retrain`,
-:func:`train_round`, :func:`grow`. :func:`stress` puts the whole to a Monte Carlo test.
+:func:`train_round`, :func:`grow`. :func:`run_monte_carlo` puts the whole to a Monte Carlo test.
 
 Nothing here knows a run folder, a screen or a tracker: a :class:`Keeper` is given from outside.
 """
