@@ -79,7 +79,7 @@ class Surrogate:
             models, wiring, limits = (source,), Wiring.of([source]), {}
         if not wiring.inputs:
             raise ConfigError(
-                "a model without input cannot be exported: nothing would tell its files how long to run",
+                "nothing goes into the models, so that nothing would tell exported files how long to run",
                 expected="at least one channel that no model computes",
                 got=", ".join(str(model.mapping) for model in models),
                 remedy="run it in Python: fit.simulate(n_samples, initial=...)",

@@ -31,7 +31,7 @@ def test_an_autoregressive_model_has_the_decay_s_pole() -> None:
     assert fit.model.structure.label == "AR [1]"
     assert_allclose(fit.model.coefficients, [0.9], atol=1e-12)
     assert_allclose(fit.simulate(N - 1, initial=2.0), decay()[1:], atol=1e-12)
-    with pytest.raises(ConfigError, match="without input cannot be exported"):
+    with pytest.raises(ConfigError, match="nothing goes into the models"):
         fit.save(Path("bundle"))
 
 

@@ -41,6 +41,7 @@ def a_provider(form: NeuralForm, *, n: int = 40, weights=None) -> NeuralProvider
                 output=rng.uniform(-1.0, 1.0, length),
                 history=History(inputs=rng.uniform(-1, 1, (past, 2)), output=rng.uniform(-1, 1, past)),
                 weights=None if weights is None else rng.choice(weights, length),
+                past=np.ones(past, dtype=np.bool_),
             )
             for length, past in ((n, 9), (n // 2, 1), (n // 2, 4))
         ],

@@ -52,7 +52,7 @@ def record(text: str | bytes, *says: str, id: str) -> Bad:  # noqa: A002 - the w
 
 RECORDS = [
     record("", "run-1.csv", "no samples", "remedy", id="an empty file"),
-    record(HEADER + "\n", "run-1.csv", "no rows", "remedy", id="a header alone"),
+    record(HEADER + "\n", "run-1.csv", "no row of numbers", "remedy", id="a header alone"),
     record(bytes(range(256)) * 8, "run-1.csv", "remedy", id="bytes that are no text"),
     record(rows(r7="0.30,301,1,abc"), "run-1.csv", "line 8", "outlet", "abc", id="a word among the numbers"),
     record(rows(r7="0.30,301,1"), "run-1.csv", "line 8", "4", "3", "ragged: drop", id="a row with a cell too few"),
@@ -116,7 +116,7 @@ DATASETS = [
     dataset("file: run-2.csv", "recipe: {}", "case run-2 does not fit the source", "file", id="a recipe without a generator"),
     dataset("{files: {references: gauge}}", "{}", "field source", "files: {}", id="neither files nor a generator"),
     dataset("{files: {references: gauge}}", "{generator: warp, options: {}}", "case run-1", "file", id="files of a generator"),
-    dataset("references: gauge", "separator: '|'", "source.files.separator", "|", id="a separator that is not known"),
+    dataset("references: gauge", "separator: '!'", "source.files.separator", "!", id="a separator that is not known"),
     dataset("references: gauge", "units: {vlave: V}", "vlave", "one of inlet, outlet, valve", id="a unit for no channel"),
     dataset("  - {name: valve", "\t- {name: valve", "line 5", "a tab", "indent by spaces", id="a tab in the indentation"),
     dataset("name: rig", "name: rig\nname: rig2", "line 2", "stands twice", id="a key that stands twice"),

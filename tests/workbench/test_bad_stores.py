@@ -194,7 +194,8 @@ def test_a_disk_that_takes_no_more_loses_nothing(
         assert run_cli(["run", "first", "--no-tracking"]) == 2
     told = capsys.readouterr().err
     assert full
-    assert file in told
+    # The checkpoint of a fit has the name of its step; where it cannot be written, the fit's own file is the next.
+    assert {"fit-open-loop.json": "fit.json"}.get(file, file) in told
     assert os.strerror(number) in told
     assert "remedy" in told
     assert "Traceback" not in told

@@ -31,14 +31,14 @@ BAD_PIPELINES = {
 EXTENDING = "kind: assembly\nextends: base.yaml\nname: grown\n"
 GOOD_EXTENDING = {
     "nothing but a name": EXTENDING,
-    "what is taken away": f"{EXTENDING}stress: null\nknown: null\nlimits: {{BP: null, AR: {{low: 0}}}}",
-    "another start": f"{EXTENDING}begin: ../runs/base/bundle\ntogether: {{targets: {{BP: 0.1}}}}",
+    "what is taken away": f"{EXTENDING}monte_carlo: null\nfixed: null\nlimits: {{BP: null, AR: {{low: 0}}}}",
+    "another start": f"{EXTENDING}warm_start: ../runs/base/bundle\ntogether: {{targets: {{BP: 0.1}}}}",
 }
 BAD_EXTENDING = {
     "a misspelt field": f"{EXTENDING}sed: 1",
     "a word for the seed": f"{EXTENDING}seed: one",
     "a misspelt limit": f"{EXTENDING}limits: {{BP: {{lw: 0}}}}",
-    "a known member in part": f"{EXTENDING}known: [{{mapping: BP -> X, low: 0}}]",
+    "a known member in part": f"{EXTENDING}fixed: [{{mapping: BP -> X, low: 0}}]",
     "no name": EXTENDING.replace("name: grown\n", ""),
     "a name taken away": EXTENDING.replace("grown", "null"),
     "nothing that it extends": EXTENDING.replace("extends: base.yaml\n", ""),

@@ -219,7 +219,7 @@ def test_a_fixed_regularisation_leaves_a_ensemble_without_evidence():
 @pytest.mark.parametrize("fields", [{}, {"choose_by": "evidence"}], ids=["nothing to choose by", "by the evidence"])
 def test_a_ensemble_needs_traces_that_elect_it(fields):
     selection = [tank(2)] if fields else []
-    with pytest.raises(ConfigError, match="nobody can elect an ensemble"):
+    with pytest.raises(ConfigError, match="nothing can choose the members of an ensemble"):
         fit_narx([tank(1)], TANK, SMALL, Training(ensemble=2, **fields), selection=selection)
 
 

@@ -50,7 +50,7 @@ def test_members_and_rounds_go_on_where_they_were_cut_off(
     stored = {step.name for step in planned if step.stored}
     assert {"together", "choosing", "scoring", "assembly"} < stored
     assert sum(name.startswith("fit-") for name in stored) == 4
-    assert {step.basis for step in planned if step.name == "stress"} == {"as last time"}
+    assert {step.basis for step in planned if step.name == "monte_carlo"} == {"as last time"}
 
     # Whatever came of a step can be had by its name.
     assert run_cli(["export", "tanks", "--fit", "upper -> lower 0", "--out", "lower"]) == 0

@@ -44,7 +44,7 @@ def write_data(folder: Path, without: str) -> None:
         pytest.param(
             "checkpoints: 2}\n", "checkpoints: 2}\n  also: [plain]\n", ["tanks", "plain"], ["tanks"], id="of a round"
         ),
-        pytest.param("stress:", f"{GROW}stress:", ["tanks", "pool"], ["tanks", "pool"], id="a pool"),
+        pytest.param("monte_carlo:", f"{GROW}monte_carlo:", ["tanks", "pool"], ["tanks", "pool"], id="a pool"),
     ],
 )
 def test_a_bundle_names_what_it_was_trained_and_chosen_on(

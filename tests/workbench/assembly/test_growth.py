@@ -124,7 +124,7 @@ def test_a_pool_without_sequences_that_train_nothing_is_refused(pooled: Path) ->
 @pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [
-        ("data: pool", "data: tanks", "the pool to grow by is used otherwise: tanks is under training"),
+        ("data: pool", "data: tanks", "the pool of active_learning is used otherwise: tanks is under training"),
         ("training: tanks", "training: [tanks, pool]", "pool is under training"),
         ("data: tanks\n", "data: pool\n", "pool is under data"),
         ("outputs: [lower], within", "outputs: [level], within", "active_learning, outputs names level"),
@@ -149,7 +149,7 @@ def test_what_cannot_be_grown_is_refused(workspace: Path, old: str, new: str, co
 def test_growth_goes_on_from_training_end_to_end(workspace: Path) -> None:
     before, _, behind = LEAN.partition("together:")
     with pytest.raises(ConfigError, match="growth without training end to end"):
-        run(workspace, before + behind[behind.index("grow:") :])
+        run(workspace, before + behind[behind.index("active_learning:") :])
 
 
 def test_the_rounds_of_growth_are_the_last_one_before_but_for_what_they_name():

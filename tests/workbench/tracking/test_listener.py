@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid.names import tracking_key
 from sysid.reporting.results import Results
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits.config import read_pipeline
@@ -231,7 +232,7 @@ def test_a_failing_store_costs_no_fit(
 
 
 def test_names_that_a_store_refuses_are_changed() -> None:
-    assert tracked.key("VAL 1 (µ=0.3)/a") == "VAL 1 ___0.3__a"
+    assert tracking_key("VAL 1 (µ=0.3)/a") == "VAL 1 ___0.3__a"
 
 
 def load_onnx(workspace: Path, uri: str):
