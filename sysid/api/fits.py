@@ -127,7 +127,10 @@ class Fit(FitResult):
             pairs = zip(
                 self.uncertainty.names, self.uncertainty.values, self.uncertainty.standard_deviations, strict=True
             )
-            lines += [f"  {name:<16} {value:>12.6g} ± {spread:.3g}" for name, value, spread in pairs]
+            lines += [
+                f"  {name:<16} {value:>12.6g} ± " + ("- (not determined)" if np.isnan(spread) else f"{spread:.3g}")
+                for name, value, spread in pairs
+            ]
         lines += [f"Note: {note}" for note in self.notes]
         return "\n".join([*lines, str(self._compared)])
 

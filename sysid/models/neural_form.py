@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.errors import TraceError
 from sysid.kernels import neural_state_space as kernel
@@ -256,9 +255,13 @@ class NeuralForm(AbstractForm):
         for _ in range(CORRECTIONS):
             J = self._linearised(seen.inputs, x)[seen.known]
             away = self._away(seen, x)[seen.known]
-            H = J.T @ J / noise**2 + np.eye(n)
-            g = J.T @ away / noise**2 + (x - expected)
-            trial = x - linalg.solve(H + damping * np.diag(np.diag(H)), g, assume_a="pos")
+            if not np.isfinite(J).all():
+                break
+            # By orthogonal factors: squared, the precision of a state that is seen well leaves no digit to the others.
+            spread = np.sqrt(damping * ((J**2).sum(axis=0) / noise**2 + 1.0))
+            rows = np.concatenate([J / noise, np.eye(n), np.diag(spread)])
+            misses = np.concatenate([away / noise, x - expected, np.zeros(n)])
+            trial = x - np.linalg.lstsq(rows, misses, rcond=None)[0]
             misfit = self._misfit(seen, trial, expected, noise)
             if misfit < best:
                 done = best - misfit < 1e-9 * best

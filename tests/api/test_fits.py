@@ -131,3 +131,12 @@ def test_several_outputs_are_saved_as_one_file(system: sysid.SystemFit, tmp_path
     bundle = system.save(tmp_path / "bundle", formats=("onnx",))
     assert [output["name"] for output in bundle.outputs] == ["y", "z"]
     assert {file.name for file in bundle.files} == {"step.onnx", "sequence.onnx"}
+
+
+def test_a_parameter_that_the_data_leave_open_has_no_spread_in_the_summary() -> None:
+    still = sysid.data((U, np.full(len(U), 0.36)), sample_time=0.1)
+    found = sysid.fit(still, "u -> y", sysid.ARX(na=2, nb=1, nk=0, intercept=False))
+    assert isinstance(found, sysid.Fit)
+    assert found.uncertainty is not None
+    assert np.isnan(found.uncertainty.standard_deviations).any()
+    assert "± nan" not in found.summary()

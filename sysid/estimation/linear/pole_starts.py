@@ -77,12 +77,8 @@ def long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> Lo
     for record in records:
         n, m = record.inputs.shape
         y, level = record.target, record.target[0]
-        past = [np.concatenate([np.full(lag, level), y[: n - lag]]) for lag in range(1, n_lags + 1)]
-        drive = [
-            np.concatenate([np.full(lag, record.past[j]), record.inputs[: n - lag, j]])
-            for j in range(m)
-            for lag in range(n_lags + more)
-        ]
+        past = [_delayed(y, lag, level) for lag in range(1, n_lags + 1)]
+        drive = [_delayed(record.inputs[:, j], lag, record.past[j]) for j in range(m) for lag in range(n_lags + more)]
         root = record.root_weights * _known(record, n_lags + more)
         tables.append(np.column_stack([*past, *drive, np.ones(n)]) * root[:, np.newaxis])
         targets.append(y * root)
@@ -92,6 +88,11 @@ def long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> Lo
     m, width = records[0].inputs.shape[1], n_lags + more
     b = tuple(solution[n_lags + width * j : n_lags + width * (j + 1)] for j in range(m))
     return LongArx(a=solution[:n_lags], b=b)
+
+
+def _delayed(signal: NDArray[np.float64], lag: int, before: float) -> NDArray[np.float64]:
+    """The signal so many samples later, which may be more than it has."""
+    return np.concatenate([np.full(min(lag, len(signal)), before), signal[: max(len(signal) - lag, 0)]])
 
 
 def _known(record: TimeRecord, n_lags: int) -> NDArray[np.bool_]:

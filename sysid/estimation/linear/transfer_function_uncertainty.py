@@ -40,7 +40,10 @@ def _uncertainty(model: TransferFunctionModel, provider: SeparableProvider, solu
     linear = provider.design(solution.columns, solution.constants)
     J = np.concatenate([linear, provider.tangents(solution)], axis=1)
     variance = float(solution.residual @ solution.residual) / max(provider.n_samples - J.shape[1], 1)
-    scale = np.maximum(np.linalg.norm(J, axis=0), np.finfo(np.float64).tiny)
+    if not np.isfinite(J).all():  # a free run beyond all numbers says nothing about its parameters
+        J = np.zeros_like(J)
+    norms = np.linalg.norm(J, axis=0)
+    scale = np.where(norms > 0.0, norms, 1.0)
     R = linalg.qr(J / scale, mode="r")[0][: J.shape[1]]
     _, sizes, Vt = linalg.svd(R)
     sizes = np.concatenate([sizes, np.zeros(J.shape[1] - len(sizes))])

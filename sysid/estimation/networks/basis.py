@@ -72,7 +72,7 @@ class RegressorBasis:
         centre = regressors.mean(axis=0)
         away = regressors - centre
         matrix = _unit_peaks(matrix, away)
-        if len(levels) > 1:
+        if len(levels) > 1 and len(regressors) > 1:  # a single row has no directions
             _, rotation = linalg.eigh(np.cov((away @ matrix.T)[:, levels].T))
             matrix[levels] = rotation.T @ matrix[levels]
             matrix = _unit_peaks(matrix, away)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from sysid.errors import TraceError
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints
 from sysid.estimation.least_squares.evidence import Prior
@@ -123,6 +124,24 @@ class Candidate:
         return self.solution.at.loss
 
 
+def check_samples(provider: AbstractProvider) -> None:
+    """Refuse records of which nothing is left to fit.
+
+    Args:
+        provider: Their residuals.
+
+    Raises:
+        TraceError: If no sample counts.
+    """
+    if provider.n_samples == 0:
+        raise TraceError(
+            "no sample is left to fit",
+            expected="a sample that is not masked, nor looks back on one that is",
+            got="none in the estimation traces",
+            remedy="use fewer or shorter lags, mask less, or give a longer record",
+        )
+
+
 def run(multistart: Multistart) -> list[Candidate]:
     """Multistart the starts; an interruption from the keyboard ends the multistart, and what there is comes back.
 
@@ -133,7 +152,11 @@ def run(multistart: Multistart) -> list[Candidate]:
 
     Returns:
         Every start at every rung that it reached.
+
+    Raises:
+        TraceError: If no sample counts.
     """
+    check_samples(multistart.provider)
     training = multistart.training
     rungs = _rungs(training)
     numbers = list(range(training.starts))
@@ -292,7 +315,9 @@ def first_prior(
     """
     # The noise is taken to be as large as the start's error: a prior weighed against residuals of size 1 would hold
     # an open-loop fit, whose residuals are a thousand times smaller, at its start.
-    beta = 0.5 * provider.n_samples / max(provider.loss(theta), np.finfo(np.float64).tiny)
+    # None is known better than the rounding of scaled numbers, also where a start leaves no error at all.
+    rounding = 0.5 * provider.n_samples * np.finfo(np.float64).eps ** 2
+    beta = 0.5 * provider.n_samples / max(provider.loss(theta), rounding)
     # A precision given from outside is relative to that of the residuals, and stays.
     given = training.regularisation
     return layout.prior(centre, alpha=INITIAL_ALPHA if given is None else given * beta, beta=beta)

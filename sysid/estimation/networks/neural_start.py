@@ -161,8 +161,13 @@ def _realised(provider: NeuralProvider, order: int) -> NDArray[np.float64]:
 def _regression(
     signals: list[tuple[NDArray[np.float64], NDArray[np.float64]]], n_inputs: int, order: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Coefficients of the past outputs, of the inputs (lags in columns), and the constant."""
-    order = min([order, *(len(y) // 4 for _, y in signals)])
+    """Coefficients of the past outputs, of the inputs (lags in columns), and the constant.
+
+    A record that is too short for its lags has no row; the longest one says how many there may be.
+    """
+    longest = max(len(y) for _, y in signals)
+    order = min(order, max(longest // 4, 1), longest - 1)
+    signals = [(u, y) for u, y in signals if len(y) > order]
     lags = Lags(inputs=(tuple(range(order + 1)),) * n_inputs, output=tuple(range(1, order + 1)))
     rows = np.concatenate([lagged(u, y, lags, len(y) - order) for u, y in signals])
     target = np.concatenate([y[order:] for _, y in signals])
@@ -181,10 +186,10 @@ def _realise(
     n_inputs = len(inputs)
     responses = np.zeros((2 * HORIZON + 1, n_inputs))
     companion = np.eye(len(past), k=-1)
-    companion[0] = past
-    radius = float(np.abs(linalg.eigvals(companion)).max())
+    companion[:1] = past
+    radius = float(np.abs(linalg.eigvals(companion)).max()) if len(past) else 0.0
     # An unstable regression is slowed down to the edge; what is wanted is the shape of its first samples.
-    shrink = min(1.0, LARGEST_POLE / radius)
+    shrink = LARGEST_POLE / max(radius, LARGEST_POLE)
     past = past * shrink ** np.arange(1, len(past) + 1)
     for t in range(len(responses)):
         fresh = inputs[:, t] if t < inputs.shape[1] else np.zeros(n_inputs)

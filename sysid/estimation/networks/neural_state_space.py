@@ -69,6 +69,7 @@ def fit_neural_state_space(
     experiments = experiments_of(traces, mapping, start, rest)
     template = _template(traces[0], mapping, network, experiments, rest)
     provider = NeuralProvider(template=template.recursion, experiments=experiments)
+    starts.check_samples(provider)
     multistart = starts.Multistart(
         training=training,
         layout=NeuralLayout(sizes=template.recursion.sizes, base=linear_start(provider)),

@@ -206,3 +206,10 @@ def test_as_many_zeros_as_poles_are_a_structure(domain: Domain) -> None:
     assert abs(z[0] - 0.8) < 1e-8
     run = found.simulate(u[1:, None])
     assert np.isfinite(run).all()
+
+
+def test_a_record_that_is_shorter_than_the_lags_of_a_start_counts_beside_a_long_one() -> None:
+    u = steps(200, 3)
+    long, short = (trace_of(u[:n, None], lfilter([0.0, 0.2], [1.0, -0.8], u[:n]), name=f"{n}") for n in (200, 8))
+    found = model_of(tf([short, long], TransferFunction(poles=(1,), zeros=(0,), delays=(1,))))
+    np.testing.assert_allclose(found.numerator(0), [0.2], atol=1e-6)

@@ -101,3 +101,9 @@ def test_correlation_time_of_a_first_order_process():
 @pytest.mark.parametrize("residual", [np.zeros(10), np.full(10, np.nan)], ids=["exact", "not a number"])
 def test_correlation_time_of_what_has_none(residual):
     assert correlation_time(residual) == 1.0
+
+
+def test_a_single_row_has_a_basis_without_directions() -> None:
+    lags = Lags(inputs=((0, 1), (0, 1)), output=(1, 2))
+    basis = RegressorBasis.levels_and_rates(lags, np.ones((1, lags.n_regressors)))
+    assert np.isfinite(basis.matrix).all()

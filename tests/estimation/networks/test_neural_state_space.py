@@ -1,9 +1,11 @@
 """Neural state spaces find systems whose truth is known, and say how."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks.neural_provider import NeuralProvider
@@ -160,3 +162,34 @@ def test_one_measured_sample_is_a_system_that_has_stood_there_in_the_fit_as_in_t
     for one in records:
         found = evaluate_case(fit.model, one, Role.ESTIMATION, start, 1)
         assert found.free_run.nrmse_fit > 99.0
+
+
+def test_a_record_of_two_samples_does_not_spoil_the_start_that_a_long_one_gives() -> None:
+    long = linear(1)
+    short = a_trace("short", long.columns(["u"])[:2, 0], long["y"][:2])
+    start = Start(kind=StartKind.ESTIMATED)
+    fit = fit_neural_state_space(
+        [short, long], MAPPING, NeuralStateSpace(states=2, neurons=0), Training(max_iterations=20), start=start
+    )
+    assert rmse(fit, long) < 1e-6
+
+
+@pytest.mark.parametrize("n", [2, 60])
+def test_an_output_that_never_moves_has_a_fit(n: int) -> None:
+    still = a_trace("still", np.random.default_rng(0).standard_normal(n), np.zeros(n))
+    fit = fit_neural_state_space([still], MAPPING, NeuralStateSpace(states=1, neurons=1), Training(max_iterations=5))
+    np.testing.assert_allclose(fit.model.simulate(still.columns(["u"])), 0.0, atol=1e-9)
+
+
+def test_a_state_that_an_output_of_little_range_says_much_of_is_found_without_a_warning() -> None:
+    rng = np.random.default_rng(5)
+    u, y = rng.integers(-3, 4, 17) * 1e-7, rng.integers(-1, 2, 17) * 1e-6
+    fit = fit_neural_state_space([a_trace("tiny", u, y)], MAPPING, NeuralStateSpace(states=2, neurons=2), Training())
+    assert np.isfinite(fit.model.simulate(u[:, None])).all()
+
+
+def test_records_that_are_masked_altogether_are_refused() -> None:
+    trace = a_trace("masked", np.arange(20.0), np.arange(20.0))
+    masked = replace(trace, usable=np.zeros(20, dtype=np.bool_))
+    with pytest.raises(TraceError, match="no sample is left"):
+        fit_neural_state_space([masked], MAPPING, NeuralStateSpace(states=1, neurons=0))
