@@ -10,6 +10,27 @@ import difflib
 from collections.abc import Sequence
 
 
+def shortened(value: object, limit: int = 80) -> str:
+    """A value that came from outside, as an error shows it: never more than a line, whatever it is.
+
+    Args:
+        value: Anything.
+        limit: Characters.
+
+    Returns:
+        Its ``repr``, cut where it is longer; the type of what has none that can be written.
+
+    Example:
+        >>> shortened("a" * 200, limit=12), shortened(10**5000)
+        ("'aaaaaaaa...", 'a int that is too large to show')
+    """
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError, MemoryError):  # 5,000 digits, a thousand brackets
+        return f"a {type(value).__name__} that is too large to show"
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
 class SysidError(Exception):
     """Root of all errors raised on purpose.
 

@@ -17,11 +17,20 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from sysid.errors import ConfigError
+from sysid.bounded_text import MOST_LEVELS, read_bounded
+from sysid.errors import ConfigError, shortened
 
 Model = TypeVar("Model", bound=BaseModel)
 Loc = tuple[str | int, ...]
 """Where something stands in plain data: keys and indices."""
+
+
+MOST_BYTES = 4 * 2**20
+"""Of a file: some fifty thousand lines."""
+MOST_DIGITS = 40
+"""Of a whole number."""
+MOST_VALUES = 1_000_000
+"""In a file, an alias counting for all that it stands for."""
 
 
 class _Loader(yaml.SafeLoader):
@@ -42,11 +51,17 @@ class _Loader(yaml.SafeLoader):
 
     def construct_core_int(self, node: yaml.ScalarNode) -> int:
         text = self.construct_scalar(node)
+        if len(text) > MOST_DIGITS:
+            raise _refused(f"a whole number of {len(text):,} digits, {MOST_DIGITS} at most", node)
         return int(text, 0) if text[:2] in {"0o", "0x"} else int(text)
 
     def construct_core_float(self, node: yaml.ScalarNode) -> float:
         text = self.construct_scalar(node).lower()
         return float(text.replace(".inf", "inf").replace(".nan", "nan"))
+
+
+def _refused(problem: str, node: yaml.Node) -> yaml.YAMLError:
+    return yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
 
 
 # An empty table of its own: YAML 1.1's notions of numbers and truth values are not inherited.
@@ -88,14 +103,14 @@ def read_yaml(path: Path) -> dict[str, Any]:
         ConfigError: If the file cannot be read, is not YAML, repeats a key, or is not a mapping.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_bounded(path, most=MOST_BYTES).decode("utf-8-sig")
+    except (OSError, ValueError) as error:
         raise ConfigError(
             "the file cannot be read",
             where=path,
-            expected="a readable YAML file in UTF-8",
+            expected=f"a readable YAML file in UTF-8, of at most {MOST_BYTES // 2**20} MB",
             got=error,
-            remedy="check the path, the permissions and the encoding",
+            remedy="check the path, the permissions, the size and the encoding",
         ) from error
     return parse_yaml(text, where=path)
 
@@ -118,7 +133,7 @@ def parse_yaml(text: str, *, where: object) -> dict[str, Any]:
         {'sample_time': 0.001, 'answer': 'no'}
     """
     try:
-        data = yaml.load(text, Loader=_Loader)  # noqa: S506 - _Loader is a SafeLoader
+        data = _plain_data(text)
     except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         place = f"{where}, line {mark.line + 1}, column {mark.column + 1}" if mark else where
@@ -139,6 +154,40 @@ def parse_yaml(text: str, *, where: object) -> dict[str, Any]:
             remedy="start from an example: sysid init DIR writes a data set and a pipeline with comments",
         )
     return data
+
+
+def _plain_data(text: str) -> Any:
+    """What a text says, once it is known to stay within bounds."""
+    loader = _Loader(text)
+    try:
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _extent(node, level=0, known={})
+        return loader.construct_document(node)
+    finally:
+        loader.dispose()
+
+
+def _extent(node: yaml.Node, *, level: int, known: dict[int, int | None]) -> int:
+    """How many values a node stands for, with its aliases written out; refused where they are too many or too deep."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if level > MOST_LEVELS:
+        raise _refused(f"lists lie more than {MOST_LEVELS} deep in each other", node)
+    if id(node) in known:
+        values = known[id(node)]
+        if values is None:
+            raise _refused("a list that contains itself", node)
+        return values
+    known[id(node)] = None
+    # Keys too: one that is a list is refused later, whatever it holds.
+    parts = [part for entry in node.value for part in (entry if isinstance(entry, tuple) else (entry,))]
+    count = 1 + sum(_extent(part, level=level + 1, known=known) for part in parts)
+    if count > MOST_VALUES:
+        raise _refused(f"more than {MOST_VALUES:,} values, with the aliases written out", node)
+    known[id(node)] = count
+    return count
 
 
 def yaml_text(data: Mapping[str, Any]) -> str:
@@ -246,7 +295,11 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
             what, expected, got, remedy = cause.what, cause.expected, cause.got, cause.remedy
     else:
         wanted = first["msg"].removeprefix("Input should be ").split(", unable to parse")[0]
-        what, expected, got = f"{path_text(origins.of(loc)[1])} cannot be used as it is", wanted, _short(first["input"])
+        what, expected, got = (
+            f"{path_text(origins.of(loc)[1])} cannot be used as it is",
+            wanted,
+            shortened(first["input"]),
+        )
     if others:
         remedy += f" (also at fault: {', '.join(sorted({_beside(loc, item['loc'], origins) for item in others}))})"
     return ConfigError(what, where=origins.place(loc), expected=expected, got=got, remedy=remedy)
@@ -313,11 +366,6 @@ def path_text(loc: Sequence[str | int]) -> str:
     """
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc)
     return text.removeprefix(".") or "(top level)"
-
-
-def _short(value: object, limit: int = 80) -> str:
-    text = repr(value)
-    return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
 def _fields_at(model: type[BaseModel], loc: Sequence[str | int]) -> list[str]:

@@ -155,3 +155,33 @@ def test_an_error_names_the_file_of_each_part_at_fault(origins: Origins, tmp_pat
     assert caught.value.what == "steps[1].delays cannot be used as it is"
     assert caught.value.where == f"{tmp_path / 'base.yaml'}, line 5, field steps[1].delays"
     assert str(caught.value.remedy).endswith(f"(also at fault: steps[0].neurons in {tmp_path / 'own.yaml'})")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        pytest.param("a: " + "9" * 5000, "line 1.*whole number of 5,000 digits", id="an integer of 5,000 digits"),
+        pytest.param("a: 0x" + "f" * 5000, "whole number of 5,002 digits", id="the same in hexadecimal"),
+        pytest.param("a: " + "[" * 100 + "]" * 100, "64 deep", id="lists in lists"),
+        pytest.param("a:\n" + "\n".join(" " * n + "a:" for n in range(1, 100)), "64 deep", id="mappings in mappings"),
+        pytest.param("[" * 100_000, "not valid YAML", id="brackets"),
+        pytest.param("a: &a [*a]", "contains itself", id="a list that contains itself"),
+        pytest.param(
+            "a0: &a0 [1, 1]\n" + "\n".join(f"a{n + 1}: &a{n + 1} [*a{n}, *a{n}]" for n in range(30)),
+            "1,000,000 values",
+            id="aliases of aliases",
+        ),
+    ],
+)
+def test_bounds_come_before_memory(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=f"(?s){message}") as caught:
+        parse_yaml(text, where="x.yaml")
+    assert caught.value.remedy
+
+
+def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "large.yaml"
+    with path.open("wb") as file:
+        file.truncate(2**30)
+    with pytest.raises(ConfigError, match="larger than 4 MB"):
+        read_yaml(path)

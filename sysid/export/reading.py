@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
@@ -12,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from sysid.errors import BundleError, SysidError
+from sysid.bounded_text import parse_json, read_bounded
+from sysid.errors import BundleError, SysidError, shortened
 from sysid.export.bundle import Bundle, bundle_files
 from sysid.export.manifest import MANIFEST, SCHEMA_VERSION, manifest_digest
 from sysid.models import AbstractModel, Cascade, cascade_from_dict, model_from_dict
@@ -80,7 +80,7 @@ class _AbstractContent(ABC):
 class _Folder(_AbstractContent):
     def read(self, name: str) -> bytes | None:
         path = self.path / name
-        return path.read_bytes() if path.is_file() else None
+        return read_bounded(path, most=LARGEST) if path.is_file() else None
 
     def names(self) -> list[str]:
         return sorted(path.relative_to(self.path).as_posix() for path in self.path.rglob("*") if path.is_file())
@@ -110,7 +110,7 @@ def _read_manifest(content: _AbstractContent) -> dict[str, Any]:
     where = content.place(MANIFEST)
     try:
         data = content.read(MANIFEST)
-        manifest: Any = None if data is None else json.loads(data.decode("utf-8"))
+        manifest: Any = None if data is None else parse_json(data)
     except (OSError, ValueError, RecursionError) as error:
         raise BundleError(
             f"{MANIFEST} cannot be read", where=where, expected="JSON in UTF-8", got=str(error), remedy=_AGAIN
@@ -128,7 +128,7 @@ def _read_manifest(content: _AbstractContent) -> dict[str, Any]:
             f"{MANIFEST} does not describe a bundle",
             where=where,
             expected="a JSON object with schema_version",
-            got=f"schema_version {version!r}",
+            got=f"schema_version {shortened(version)}",
             remedy="give the folder that holds the bundle",
         )
     if version > SCHEMA_VERSION:
@@ -157,7 +157,7 @@ def _model(manifest: dict[str, Any], content: _AbstractContent) -> AbstractModel
             return cascade_from_dict(stored)
         model = model_from_dict(stored)
         model.recursion  # noqa: B018 - it checks that parameters and structure belong together
-    except (SysidError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except (SysidError, KeyError, TypeError, ValueError, AttributeError, ArithmeticError, IndexError) as error:
         raise BundleError(
             f"the model in {MANIFEST} cannot be built",
             where=content.place(MANIFEST),

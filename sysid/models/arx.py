@@ -9,9 +9,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractModel, AbstractStructure
-from sysid.models.lags import Lagged, Lags
+from sysid.models.lags import MOST, Lagged, Lags, per_input, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
@@ -48,13 +48,13 @@ class ARX(AbstractStructure):
     per_input = ("nb", "nk")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nb", _each(self.nb))
-        object.__setattr__(self, "nk", _each(self.nk))
-        if self.na < 0 or min(self.nb, default=0) < 0 or min(self.nk, default=0) < 0 or len(self.nb) != len(self.nk):
+        object.__setattr__(self, "nb", per_input(self.nb))
+        object.__setattr__(self, "nk", per_input(self.nk))
+        if not all(map(whole, (self.na, *self.nb, *self.nk))) or len(self.nb) != len(self.nk):
             raise ConfigError(
                 "not the orders of an ARX model",
-                expected="na from 0 on, and one nb and one nk from 0 on for each input",
-                got=f"na = {self.na}, nb = {list(self.nb)}, nk = {list(self.nk)}",
+                expected=f"na from 0 on, and one nb and one nk from 0 on for each input, whole numbers up to {MOST:,}",
+                got=f"na = {shortened(self.na)}, nb = {shortened(list(self.nb))}, nk = {shortened(list(self.nk))}",
                 remedy="write for example na: 2, nb: [2, 2], nk: [1, 1]",
             )
 
@@ -79,11 +79,6 @@ class ARX(AbstractStructure):
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
         return {"kind": self.kind, "na": self.na, "nb": list(self.nb), "nk": list(self.nk), "intercept": self.intercept}
-
-
-def _each(given: Any) -> tuple[int, ...]:
-    """One order for each input; with a single input it may be written as a number."""
-    return (given,) if isinstance(given, int) else tuple(given)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

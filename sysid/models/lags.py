@@ -5,13 +5,48 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 
 LagSpec = int | str | Iterable[int]
+MOST = 10_000
+"""Orders, lags and dead times end here, in samples: a slip of the pen is refused before it takes memory."""
+
+
+def whole(value: object) -> bool:
+    """Whether a value can be an order: a whole number from 0 to :data:`MOST`, and no truth value.
+
+    Args:
+        value: Anything that stands in a file.
+
+    Returns:
+        Whether it is.
+
+    Example:
+        >>> whole(3), whole(True), whole(2.5), whole(10**9)
+        (True, False, False, False)
+    """
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and bool(0 <= value <= MOST)
+
+
+def per_input(given: object) -> tuple[Any, ...]:
+    """One order for each input; with a single input it may be written as a number.
+
+    Args:
+        given: A number, or a collection of numbers.
+
+    Returns:
+        The numbers; what is neither stands alone, to be refused by name.
+
+    Example:
+        >>> per_input(2), per_input([2, 3])
+        ((2,), (2, 3))
+    """
+    return tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
 
 
 def parse_lags(spec: LagSpec, *, first: int, where: str) -> tuple[int, ...]:
@@ -36,22 +71,22 @@ def parse_lags(spec: LagSpec, *, first: int, where: str) -> tuple[int, ...]:
     try:
         if isinstance(spec, str):
             low, _, high = spec.partition(":")
-            lags = tuple(range(int(low), int(high or low) + 1))
+            ends = int(low), int(high or low)
+            lags = tuple(range(ends[0], ends[1] + 1)) if whole(ends[0]) and whole(ends[1]) else ()
         elif isinstance(spec, int):
-            lags = tuple(range(1, spec + 1))
+            lags = tuple(range(1, spec + 1)) if whole(spec) else ()
         else:
-            entries = list(spec)
-            lags = tuple(int(lag) for lag in entries)
-            if list(lags) != entries:
-                raise ValueError
+            entries = tuple(spec)
+            lags = tuple(int(lag) for lag in entries) if all(whole(lag) for lag in entries) else ()
     except (TypeError, ValueError):
         lags = ()
     if not lags or min(lags) < first or any(b <= a for a, b in pairwise(lags)):
         raise ConfigError(
             "not a set of lags",
             where=where,
-            expected=f"a number n for 1 to n, a range such as {first}:4, or increasing lags from {first} on",
-            got=repr(spec),
+            expected=f"a number n for 1 to n, a range such as {first}:4, or increasing lags from {first} on; "
+            f"none above {MOST:,}",
+            got=shortened(spec),
             remedy="list each lag once, smallest first",
         )
     return lags

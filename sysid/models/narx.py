@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractModel, AbstractStructure
-from sysid.models.lags import Lagged, Lags, LagSpec, parse_lags
+from sysid.models.lags import MOST, Lagged, Lags, LagSpec, parse_lags, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
@@ -71,12 +71,12 @@ class NARX(AbstractStructure):
         object.__setattr__(self, "neurons", neurons)
         object.__setattr__(self, "feedthrough", feedthrough)
         object.__setattr__(self, "gated", gated)
-        if not isinstance(neurons, int) or neurons < 0 or (neurons == 0 and not feedthrough):
+        if not whole(neurons) or (neurons == 0 and not feedthrough):
             raise ConfigError(
                 "not a number of neurons",
                 where="neurons",
-                expected="a whole number from 1 on, or 0 with feedthrough",
-                got=repr(neurons),
+                expected=f"a whole number from 1 to {MOST:,}, or 0 with feedthrough",
+                got=shortened(neurons),
                 remedy="write for example neurons: 20",
             )
         if gated and not (feedthrough and neurons):
@@ -151,11 +151,11 @@ class NARX(AbstractStructure):
 
 
 def _per_input(spec: LagSpec | Iterable[LagSpec]) -> tuple[tuple[int, ...], ...]:
-    if isinstance(spec, (int, str)):
+    if isinstance(spec, str) or not isinstance(spec, Iterable):
         return (parse_lags(spec, first=0, where="input_delays"),)
     entries = list(spec)
     if entries and all(isinstance(entry, int) for entry in entries):
-        return (parse_lags([int(entry) for entry in entries if isinstance(entry, int)], first=0, where="input_delays"),)
+        return (parse_lags(cast("list[int]", entries), first=0, where="input_delays"),)
     return tuple(parse_lags(entry, first=0, where=f"input_delays, input {i + 1}") for i, entry in enumerate(entries))
 
 

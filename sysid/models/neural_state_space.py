@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.narx import CLAMP
 from sysid.models.neural_form import NeuralForm, Sizes
@@ -18,6 +19,8 @@ from sysid.models.scaling import Scaling
 
 ACTIVATIONS = ("tanh", "cubic")
 OUTPUTS = ("plain", "absolute")
+MOST_UNITS = 1_000
+"""States or neurons: their product is a matrix."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,12 +54,12 @@ class NeuralStateSpace(AbstractStructure):
     def __post_init__(self) -> None:
         for name, least in (("states", 1), ("neurons", 0), ("output_neurons", 0)):
             value = getattr(self, name)
-            if not isinstance(value, int) or value < least:
+            if not whole(value) or not least <= value <= MOST_UNITS:
                 raise ConfigError(
                     f"not a number of {name.replace('_', ' ')}",
                     where=name,
-                    expected=f"a whole number from {least} on",
-                    got=repr(value),
+                    expected=f"a whole number from {least} to {MOST_UNITS:,}",
+                    got=shortened(value),
                     remedy="write for example {kind: NSS, states: 2, neurons: 10}",
                 )
         for name, choices in (("activation", ACTIVATIONS), ("output", OUTPUTS)):
@@ -65,7 +68,7 @@ class NeuralStateSpace(AbstractStructure):
                     f"unknown {name}",
                     where=name,
                     expected=" or ".join(choices),
-                    got=repr(getattr(self, name)),
+                    got=shortened(getattr(self, name)),
                     remedy=f"write for example {name}: {choices[0]}",
                 )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from typing import Any
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.cascade import Cascade
@@ -33,7 +33,7 @@ def _check_kind(kind: object) -> str:
         raise ConfigError(
             "unknown kind of model",
             expected=f"one of {', '.join(_KINDS)}",
-            got=repr(kind),
+            got=shortened(kind),
             remedy="correct the kind, or use the version of the workbench that wrote it",
         )
     return kind

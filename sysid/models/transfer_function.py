@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.models import orthonormal_basis as ladders
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.lags import MOST, per_input, whole
 from sysid.models.mapping import Mapping
 from sysid.models.orthonormal_basis import Domain, Rung
 from sysid.models.ranges import IntRange
@@ -22,6 +23,9 @@ from sysid.models.realisation import Realisation, realise
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
 from sysid.models.to_control import Matrices, delayed, in_powers_of_z, transfer_function
+
+MOST_POLES = 100
+"""For each input; beyond some ten the coefficients lose all meaning in double precision."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,18 +59,20 @@ class TransferFunction(AbstractStructure):
     per_input = ("poles", "zeros", "delays")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "poles", tuple(self.poles))
-        object.__setattr__(self, "zeros", tuple(self.zeros))
-        object.__setattr__(self, "delays", None if self.delays is None else tuple(self.delays))
+        object.__setattr__(self, "poles", per_input(self.poles))
+        object.__setattr__(self, "zeros", per_input(self.zeros))
+        object.__setattr__(self, "delays", None if self.delays is None else per_input(self.delays))
         object.__setattr__(self, "domain", _domain(self.domain))
         delays = self.delays or (0,) * len(self.poles)
         same = len(self.poles) == len(self.zeros) == len(delays)
-        orders = all(0 <= z <= p and p > 0 for p, z in zip(self.poles, self.zeros, strict=False))
-        if not same or not self.poles or not orders or min(delays) < 0:
+        numbers = all(map(whole, (*self.poles, *self.zeros, *delays)))
+        if not numbers or not same or not self.poles or not all(map(_proper, self.poles, self.zeros)):
             raise ConfigError(
                 "not the orders of a transfer function",
-                expected="for each input no more zeros than poles, at least one pole, and a dead time from 0 on",
-                got=f"poles {list(self.poles)}, zeros {list(self.zeros)}, delays {self.delays}",
+                expected=f"for each input 1 to {MOST_POLES} poles, no more zeros than poles, and a dead time from 0 to "
+                f"{MOST:,}",
+                got=f"poles {shortened(list(self.poles))}, zeros {shortened(list(self.zeros))}, "
+                f"delays {shortened(self.delays)}",
                 remedy="write for example poles: [2, 2], zeros: [1, 1], delays: [1, 1]",
             )
 
@@ -89,6 +95,10 @@ class TransferFunction(AbstractStructure):
         }
 
 
+def _proper(poles: int, zeros: int) -> bool:
+    return zeros <= poles and 0 < poles <= MOST_POLES
+
+
 def _domain(value: object) -> Domain:
     try:
         return Domain(value)
@@ -96,7 +106,7 @@ def _domain(value: object) -> Domain:
         raise ConfigError(
             "unknown domain",
             expected="discrete or continuous",
-            got=repr(value),
+            got=shortened(value),
             remedy="choose one of the two",
         ) from None
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
+from sysid.bounded_text import read_json
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import ESTIMATORS
@@ -155,10 +155,10 @@ def _responses(folder: Path, fit: FitRecord) -> list[Part]:
 def _read_fit(path: Path) -> FitResult | None:
     """The stored fit; ``None`` if the run stored none."""
     try:
-        return FitResult.from_dict(json.loads(path.read_text(encoding="utf-8")))
+        return FitResult.from_dict(read_json(path))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise ConfigError(
             "the stored fit cannot be read",
             where=path,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping as Dict
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Annotated, Any, Final, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
 
 from sysid.atomic import replacing
-from sysid.errors import ConfigError
+from sysid.bounded_text import read_json
+from sysid.errors import ConfigError, shortened
 
 SCHEMA_VERSION: Final = 2
 """Of ``results.json``; version 1 is read too."""
@@ -85,7 +85,7 @@ def read_document(path: Path, *, remedy: str = AGAIN) -> dict[str, Any]:
         ConfigError: If there is no such file, or it is damaged.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ConfigError(
             "the folder holds no results",
@@ -132,7 +132,7 @@ def parse_record(
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"]) or "the whole file"
-        raise damaged(where, f"{field}: {first['msg']}", f"{first['input']!r:.80}", what=what, remedy=remedy) from error
+        raise damaged(where, f"{field}: {first['msg']}", shortened(first["input"]), what=what, remedy=remedy) from error
 
 
 def refuse_newer(

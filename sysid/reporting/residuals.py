@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
+from sysid.bounded_text import read_json
 from sysid.errors import ConfigError
 from sysid.reporting.records import Number
 
@@ -68,10 +69,10 @@ def read_residuals(folder: Path) -> dict[str, GroupRecord]:
     """
     path = Path(folder) / RESIDUALS_FILE
     try:
-        return _Residuals.model_validate_json(path.read_bytes()).groups
+        return _Residuals.model_validate(read_json(path)).groups
     except FileNotFoundError:
         return {}
-    except (OSError, ValidationError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ConfigError(
             "the stored residuals cannot be read",
             where=path,

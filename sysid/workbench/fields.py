@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from pydantic import BaseModel, Field, PlainSerializer, PlainValidator, WithJsonSchema, create_model
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.estimation import JointTraining, Training, TransferFunctionTraining
 from sysid.estimation.estimators import ESTIMATORS, Estimator, estimator_of
 from sysid.export.exporters import EXPORTERS
@@ -49,14 +49,14 @@ def _structure(value: object) -> AbstractStructure:
         raise FieldError(
             "not a structure",
             expected=f"fields with a kind: one of {kinds}",
-            got=repr(value),
+            got=shortened(value),
             remedy="write for example {kind: NARX, input_delays: 4, output_delays: 4, neurons: 20}",
         )
     kind = value["kind"]
-    if kind not in STRUCTURES:
-        near = difflib.get_close_matches(str(kind), STRUCTURES, n=1)
+    if not isinstance(kind, str) or kind not in STRUCTURES:
+        near = difflib.get_close_matches(shortened(kind).strip("'"), STRUCTURES, n=1)
         remedy = f"did you mean {near[0]}?" if near else "choose one of these kinds"
-        raise FieldError("unknown kind of structure", expected=f"one of {kinds}", got=repr(kind), remedy=remedy)
+        raise FieldError("unknown kind of structure", expected=f"one of {kinds}", got=shortened(kind), remedy=remedy)
     parameters = inspect.signature(STRUCTURES[kind]).parameters
     for name in value:
         if name != "kind" and name not in parameters:
@@ -79,11 +79,11 @@ def _structure(value: object) -> AbstractStructure:
         return structure_from_dict(value)
     except ConfigError as error:
         raise as_field_error(error) from error
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, ArithmeticError) as error:
         raise FieldError(
             f"a field of the structure {kind} has the wrong type",
             expected="numbers or lists of numbers",
-            got=repr(dict(value)),
+            got=shortened(dict(value)),
             remedy=f"correct it ({error})",
         ) from error
 
@@ -123,7 +123,7 @@ def _start(value: object) -> Start:
     raise FieldError(
         "not a way to start a free run",
         expected="estimated, rest, first-sample, or {measured: 50} for 50 measured samples",
-        got=repr(value),
+        got=shortened(value),
         remedy="choose one of the four, or leave start out: it is then estimated",
     )
 
@@ -201,11 +201,11 @@ def _format(value: object) -> str:
     """The name of an exporter."""
     if isinstance(value, str) and value in EXPORTERS:
         return value
-    near = difflib.get_close_matches(str(value), EXPORTERS, n=1)
+    near = difflib.get_close_matches(shortened(value).strip("'"), EXPORTERS, n=1)
     raise FieldError(
         "unknown export format",
         expected=f"one of {', '.join(EXPORTERS)}",
-        got=repr(value),
+        got=shortened(value),
         remedy=f"did you mean {near[0]}?" if near else "choose one of these formats",
     )
 
@@ -279,7 +279,7 @@ def options_config(structure: AbstractStructure, value: object) -> Any:
         value = given_options(value)
     if not isinstance(value, Dict):
         raise FieldError(
-            "not options of a training", expected="options by name", got=repr(value), remedy="write {name: value}"
+            "not options of a training", expected="options by name", got=shortened(value), remedy="write {name: value}"
         )
     row = estimator_of(structure)
     if row.training is None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
+from sysid.bounded_text import read_json
 from sysid.errors import ConfigError
 
 T = TypeVar("T")
@@ -30,6 +30,6 @@ def read_figures(path: Path, kind: TypeAdapter[T], *, what: str, expected: str, 
         ConfigError: If there is no such file, or it is damaged.
     """
     try:
-        return kind.validate_python(json.loads(path.read_text(encoding="utf-8")))
+        return kind.validate_python(read_json(path))
     except (OSError, ValueError, RecursionError, ValidationError) as error:
         raise ConfigError(what, where=path, expected=expected, got=f"{error}".splitlines()[0], remedy=remedy) from error

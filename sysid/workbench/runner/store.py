@@ -25,6 +25,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
+from sysid import bounded_text
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, UserError
 
@@ -79,7 +80,7 @@ def strict(value: Any) -> Any:
 
 def read_json(path: Path) -> Any:
     """The JSON values of a file."""
-    return json.loads(path.read_text(encoding="utf-8"))
+    return bounded_text.read_json(path)
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
