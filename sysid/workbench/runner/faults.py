@@ -12,6 +12,7 @@ from sysid.errors import SysidError, UserError
 class _Refusal:
     what: str
     remedy: str
+    got: str | None = None
 
 
 _AGAIN = "the same command goes on from what is stored"
@@ -41,6 +42,31 @@ _REFUSALS = {
 
 _TRACKING = {"mlflow", "sqlalchemy", "alembic"}
 """Packages whose errors are about the tracking store; known by name, since nothing here may import them."""
+_STORE = "mlflow.db in this folder, or what MLFLOW_TRACKING_URI names"
+_TRACKED_LATER = "results are in runs/, and sysid run tracks them again"
+_DATABASE = {
+    "disk is full": _Refusal(
+        what="the disk is full: the tracking store takes no more",
+        got="no space left on the disk of the store",
+        remedy=f"free some space; {_TRACKED_LATER}",
+    ),
+    "disk i/o error": _Refusal(
+        what="the tracking store's disk is full, or reports a fault",
+        got="an error of the disk",
+        remedy=f"free some space, or check the disk; {_TRACKED_LATER}",
+    ),
+    "readonly database": _Refusal(
+        what="the tracking store may not be written to",
+        got="a store that is for reading alone",
+        remedy=f"change the permissions of mlflow.db and of its folder; {_TRACKED_LATER}",
+    ),
+    "database is locked": _Refusal(
+        what="the tracking store is held by another process",
+        got="a store that is locked",
+        remedy=f"wait until the other process is done, or stop it; {_TRACKED_LATER}",
+    ),
+}
+"""What a database says where its disk or another process stands in the way: its own words, and ours."""
 
 
 def refusal(error: BaseException) -> SysidError | None:
@@ -65,10 +91,13 @@ def refusal(error: BaseException) -> SysidError | None:
             got=str(error) or None,
             remedy=f"use fewer starts or workers, a smaller structure, or another machine; {_AGAIN}",
         )
-    if type(error).__module__.split(".")[0] in _TRACKING:
+    if type(error).__module__.split(".")[0] in {*_TRACKING, "sqlite3"}:
+        said = str(error).lower()
+        if (known := next((known for words, known in _DATABASE.items() if words in said), None)) is not None:
+            return UserError(known.what, where=_STORE, got=known.got, remedy=known.remedy)
         return UserError(
             "the tracking store cannot be used",
-            where="mlflow.db in this folder, or what MLFLOW_TRACKING_URI names",
+            where=_STORE,
             expected="a store that MLflow made",
             got=str(error).splitlines()[0] if str(error) else type(error).__name__,
             remedy="correct MLFLOW_TRACKING_URI, or move mlflow.db away: results are in runs/, and sysid run tracks "

@@ -16,6 +16,8 @@ from sysid.workbench.tracking import fit_values as tracked
 PARAM_LIMIT = 6000
 """Characters that MLflow takes in a parameter (``mlflow.utils.validation.MAX_PARAM_VAL_LENGTH``)."""
 
+_HALF_LOGGED = {"RUNNING", "KILLED", "FAILED"}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Entities:
@@ -31,7 +33,9 @@ class Entities:
 
 
 def known_run(client: Any, experiment: str, ready: FitReady, *, key_tag: str) -> str | None:
-    """The run that tracks this very fit already; what a killed process left half logged is closed.
+    """The run that tracks this very fit already; what a killed process left half logged is removed.
+
+    A fit has one run. What is removed lies in the trash of MLflow until it is emptied there.
 
     Args:
         client: A client of the tracking store.
@@ -44,8 +48,8 @@ def known_run(client: Any, experiment: str, ready: FitReady, *, key_tag: str) ->
     """
     found = client.search_runs([experiment], filter_string=f"tags.`{key_tag}` = '{ready.key}'")
     for run in found:
-        if run.info.status == "RUNNING":
-            client.set_terminated(run.info.run_id, status="KILLED")
+        if run.info.status in _HALF_LOGGED:
+            client.delete_run(run.info.run_id)
     return next((str(run.info.run_id) for run in found if run.info.status == "FINISHED"), None)
 
 

@@ -28,6 +28,7 @@ from sysid.workbench.runner.events import (
     RunStarted,
     SweepReady,
 )
+from sysid.workbench.runner.faults import refusal
 from sysid.workbench.tracking import fit_run as tracked_fit
 from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_store as tracking
@@ -41,6 +42,14 @@ KEY_TAG = "sysid.key"
 
 SEQUENCE_FILE = "sequence.onnx"
 """The exported file that runs a whole record, which is what a caller of a tracked model wants."""
+
+
+def _in_words(error: Exception) -> str:
+    """What went wrong in one line: in the house's words where it is known, such as a full disk."""
+    known = refusal(error)
+    if known is None:
+        return f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+    return f"{known.what}: {known.got}; {known.remedy}"
 
 
 @dataclass(kw_only=True, eq=False)
@@ -84,7 +93,7 @@ class Tracker:
             with tracking.no_deprecations():
                 self._log(event)
         except Exception as error:  # noqa: BLE001 - a store can fail in any way, and no fit may be lost by it
-            text = f"{type(event).__name__}: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+            text = f"{type(event).__name__}: {_in_words(error)}"
             self.failures.append(text)
             self.warn(f"not tracked in MLflow ({text})")
 

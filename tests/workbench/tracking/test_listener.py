@@ -193,16 +193,18 @@ def test_what_is_tracked_already_is_not_tracked_twice(tracked_once) -> None:
     assert latest_experiment(store_uri(workspace)) == experiment.experiment_id
 
 
-def test_a_run_left_open_by_a_kill_is_closed_and_logged_again(tracked_once) -> None:
+@pytest.mark.parametrize("status", ["RUNNING", "KILLED", "FAILED"])
+def test_what_a_kill_left_half_logged_makes_way_for_one_whole_run(tracked_once, status: str) -> None:
     workspace, client, _ = tracked_once
     run = runs_of(client)["ARX"]
-    client.update_run(run.info.run_id, status="RUNNING")
+    client.update_run(run.info.run_id, status=status)
     track(workspace)
     experiment = client.get_experiment_by_name("inlet+valve -> outlet")
     twins = client.search_runs(
         [experiment.experiment_id], filter_string=f"tags.`{KEY_TAG}` = '{run.data.tags[KEY_TAG]}'"
     )
-    assert sorted(twin.info.status for twin in twins) == ["FINISHED", "KILLED"]
+    assert [twin.info.status for twin in twins] == ["FINISHED"]
+    assert twins[0].info.run_id != run.info.run_id
 
 
 def test_a_deleted_experiment_comes_back(tracked_once) -> None:
