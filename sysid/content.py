@@ -6,6 +6,7 @@ All three hold the same layout, ``<kind>/<name>/...``. The workspace comes first
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -46,3 +47,38 @@ def unique_folders(candidates: Iterable[Path]) -> tuple[Path, ...]:
         if candidate.is_dir():
             found.setdefault(candidate.resolve())
     return tuple(found)
+
+
+def nearest_name(wanted: str, groups: Iterable[Iterable[str]]) -> str | None:
+    """What was probably meant; a name of one's own goes before a built-in one that is nearer.
+
+    Args:
+        wanted: What was asked for.
+        groups: Names, in the order of the folders that they stand in.
+
+    Returns:
+        A name; ``None`` if none is near.
+
+    Example:
+        >>> nearest_name("tanks", [["tank"], ["tanks-2"]])
+        'tank'
+    """
+    found = (difflib.get_close_matches(wanted, list(names), n=1) for names in groups)
+    return next((near[0] for near in found if near), None)
+
+
+def nearest_file(path: Path, suffixes: Iterable[str]) -> Path | None:
+    """The file beside a path that was probably meant: of the kind that was asked for, by its name without the ending.
+
+    Args:
+        path: What was asked for, and is not there.
+        suffixes: Endings of the kind, in lower case.
+
+    Returns:
+        The file; ``None`` if none is near.
+    """
+    kind = set(suffixes)
+    there = sorted(path.parent.iterdir()) if path.parent.is_dir() else []
+    stems = {file.stem: file for file in there if file.suffix.lower() in kind and file.is_file()}
+    near = nearest_name(path.stem, [stems])
+    return None if near is None else stems[near]

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sysid.content import content_folders, unique_folders
+from sysid.content import content_folders, nearest_name, unique_folders
 from sysid.errors import ConfigError, SysidError
 from sysid.ingest.assemble import Wanted, assemble, round_channels
 from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
@@ -54,14 +54,15 @@ def find_dataset(name_or_path: str | Path, *, search: Sequence[Path] | None = No
             got=", ".join(sorted(file.name for file in path.iterdir())[:8]) or "an empty folder",
             remedy="name one of the files in it: sysid ingest FILE proposes a description",
         )
-    known = sorted({file.parent.name for folder in folders for file in folder.glob(f"*/{DESCRIPTION_FILE}")})
-    near = difflib.get_close_matches(str(name_or_path), known, n=1)
+    groups = [sorted(file.parent.name for file in folder.glob(f"*/{DESCRIPTION_FILE}")) for folder in folders]
+    known = list(dict.fromkeys(name for names in groups for name in names))  # one's own first
+    near = nearest_name(str(name_or_path), groups)
     raise ConfigError(
         f"there is no data set {name_or_path}",
         where=", ".join(str(folder) for folder in folders) or "no folder of data sets was found",
         expected=f"one of {', '.join(known) or '(none)'}, or the path of a {DESCRIPTION_FILE}",
         got=name_or_path,
-        remedy=f"did you mean {near[0]}?" if near else "correct the name or the path",
+        remedy=f"did you mean {near}?" if near else "correct the name or the path",
     )
 
 

@@ -6,6 +6,7 @@ complete but could not be tracked), 130 stopped by the user.
 
 from __future__ import annotations
 
+import signal
 import sys
 import warnings
 from pathlib import Path
@@ -28,7 +29,13 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the command ``sysid``."""
-    sys.exit(run_cli(sys.argv[1:]))
+    try:
+        code = run_cli(sys.argv[1:])
+    except KeyboardInterrupt:  # the second one, while the first was being told
+        code = 130
+    # A further Ctrl-C meets an interpreter that is already leaving, and would end it with a trace.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.exit(code)
 
 
 def run_cli(arguments: list[str]) -> int:

@@ -127,6 +127,16 @@ def test_an_unknown_data_set_names_the_known_ones(ramp_dataset: Path) -> None:
         find_dataset("ramp-s", search=[ramp_dataset.parent.parent])
 
 
+def test_ones_own_data_sets_are_named_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    own = tmp_path / "datasets" / "zz-mine" / "dataset.yaml"
+    own.parent.mkdir(parents=True)
+    own.write_text("name: zz-mine")
+    with pytest.raises(ConfigError) as caught:
+        find_dataset("quite-another")
+    assert str(caught.value.expected).startswith("one of zz-mine, ")
+
+
 def test_every_built_in_data_set_is_described_without_mistake() -> None:
     from sysid.ingest import read_description
 

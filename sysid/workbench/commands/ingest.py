@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
+from sysid.content import nearest_file
 from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
 from sysid.ingest.assemble import stamps_in_seconds
@@ -22,6 +22,9 @@ from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.schemas import schema_line
+
+_PATHS = {".yaml", ".yml", *(suffix for reader in READERS for suffix in reader.suffixes)}
+"""Endings of what can be shown: a word that ends so is a path."""
 
 
 def ingest_command(source: str, *, propose: Path | None, given: Mapping[str, Any] | None = None) -> None:
@@ -63,23 +66,18 @@ def ingest_command(source: str, *, propose: Path | None, given: Mapping[str, Any
 
 def _is_name(path: Path) -> bool:
     """Whether a word can be the name of a data set: nothing in it says that it is a path."""
-    return len(path.parts) == 1 and path.suffix.lower() not in {
-        ".yaml",
-        ".yml",
-        *(suffix for reader in READERS for suffix in reader.suffixes),
-    }
+    return len(path.parts) == 1 and path.suffix.lower() not in _PATHS
 
 
 def _no_such(path: Path) -> ConfigError:
     folder = path.parent
-    there = sorted(file.name for file in folder.iterdir() if file.is_file()) if folder.is_dir() else []
-    near = difflib.get_close_matches(path.name, there, n=1)
+    near = nearest_file(path, _PATHS)
     return ConfigError(
         "there is no such file",
         where=path,
         expected="a file with traces, the name of a data set, or its dataset.yaml",
         got="nothing at this path" if folder.is_dir() else f"no folder {folder} either",
-        remedy=f"did you mean {folder / near[0]}?" if near else "check the path",
+        remedy=f"did you mean {near}?" if near else "check the path",
     )
 
 

@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from sysid.content import content_folders
+from sysid.content import content_folders, nearest_file, nearest_name
 from sysid.errors import ConfigError
 from sysid.estimation.estimators import Options, estimator_of
 from sysid.estimation.estimators import check as check_request
@@ -245,21 +245,25 @@ def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
     if given.suffix in {".yaml", ".yml"} or len(given.parts) > 1:
         if given.is_file():
             return given
+        beside = nearest_file(given, {".yaml", ".yml"})
         raise ConfigError(
-            "there is no such pipeline file", expected="a YAML file", got=name_or_path, remedy="check the path"
+            "there is no such pipeline file",
+            expected="a YAML file",
+            got=name_or_path,
+            remedy=f"did you mean {beside}?" if beside else "check the path",
         )
-    known: dict[str, Path] = {}
-    for folder in content_folders("pipelines", workspace=workspace):
-        for file in sorted(folder.glob("*.yaml")):
-            known.setdefault(file.stem, file)
+    groups = [sorted(folder.glob("*.yaml")) for folder in content_folders("pipelines", workspace=workspace)]
+    known: dict[str, Path] = {}  # one's own first
+    for file in (file for group in groups for file in group):
+        known.setdefault(file.stem, file)
     if name_or_path in known:
         return known[name_or_path]
-    near = difflib.get_close_matches(name_or_path, known, n=1)
+    near = nearest_name(name_or_path, [[file.stem for file in group] for group in groups])
     raise ConfigError(
         f"there is no pipeline named {name_or_path}",
-        expected=f"one of {', '.join(sorted(known))}, or the path of a YAML file" if known else "the path of a YAML",
+        expected=f"one of {', '.join(known)}, or the path of a YAML file" if known else "the path of a YAML",
         got=name_or_path,
-        remedy=f"did you mean {near[0]}?" if near else "make a workspace with one: sysid init DIR",
+        remedy=f"did you mean {near}?" if near else "make a workspace with one: sysid init DIR",
     )
 
 

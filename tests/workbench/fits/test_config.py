@@ -182,3 +182,17 @@ def test_an_unknown_pipeline_is_named(workspace: Path, asked: str, remedy: str) 
     with pytest.raises(ConfigError, match="there is no") as caught:
         find_pipeline(asked)
     assert remedy in str(caught.value)
+
+
+def test_ones_own_pipelines_are_named_first(workspace: Path) -> None:
+    (workspace / "pipelines" / "zz-mine.yaml").write_text("name: zz-mine\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        find_pipeline("quite-another")
+    names = str(caught.value.expected).removeprefix("one of ").split(", ")
+    assert names[:2] == ["first", "zz-mine"]
+    assert "service-brake" in names[2:]
+
+
+def test_the_file_that_was_meant_is_named(workspace: Path) -> None:
+    with pytest.raises(ConfigError, match=r"did you mean pipelines/first.yaml"):
+        find_pipeline("pipelines/frist.yaml")
