@@ -11,7 +11,7 @@ import enum
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -240,10 +240,6 @@ class Trace:
         if missing:
             raise ChannelError(missing, self.channel_names, where=f"trace {self.name}")
         return np.ascontiguousarray(self.values[:, [self.index(name) for name in names]])
-
-    def with_provenance(self, *sentences: str) -> Trace:
-        """The same trace with sentences added to its provenance."""
-        return replace(self, provenance=(*self.provenance, *sentences))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

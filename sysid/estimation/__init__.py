@@ -2,6 +2,7 @@
 
 from sysid.estimation.attempts import Attempt
 from sysid.estimation.linear.arx import fit_arx
+from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
 from sysid.estimation.linear.instrumental import fit_iv4
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
@@ -27,6 +28,7 @@ __all__ = [
     "Loop",
     "OperatingPoint",
     "Posterior",
+    "Spectrum",
     "StabilityOptions",
     "Status",
     "Training",
@@ -37,6 +39,7 @@ __all__ = [
     "fit_iv4",
     "fit_narx",
     "fit_neural_state_space",
+    "fit_spectra",
     "fit_transfer_function",
     "fit_vector_narx",
     "with_upstream_outputs",

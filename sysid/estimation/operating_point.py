@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from sysid.models import ARX, Mapping
-from sysid.traces import Trace
+from sysid.models import ARX
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,25 +28,6 @@ class OperatingPoint:
 
     inputs: tuple[float, ...]
     output: float
-
-    @classmethod
-    def mean_of(cls, traces: Sequence[Trace], mapping: Mapping) -> OperatingPoint:
-        """The mean over all usable samples of some traces, as MATLAB's ``detrend`` takes it of one.
-
-        Args:
-            traces: The traces.
-            mapping: Which channels go in, which comes out.
-
-        Returns:
-            The point.
-
-        Raises:
-            ChannelError: If a trace lacks a channel of the mapping.
-        """
-        names = (*mapping.inputs, mapping.output)
-        samples = np.concatenate([trace.columns(names)[trace.usable_samples] for trace in traces])
-        *inputs, output = samples.mean(axis=0).tolist()
-        return cls(inputs=tuple(inputs), output=output)
 
     def intercept(self, orders: ARX, coefficients: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
         """The constant that turns a model of deviations into the same model of the values themselves.

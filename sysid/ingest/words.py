@@ -103,20 +103,6 @@ def quoted(text: str) -> str:
     return "'" + text.replace("'", "''") + "'"
 
 
-def words_of(cells: Sequence[str]) -> Words:
-    """A column of texts.
-
-    Args:
-        cells: One text a row; an empty one is none.
-
-    Returns:
-        The column.
-    """
-    collector = WordCollector()
-    collector.add(cells)
-    return collector.finish()
-
-
 class WordCollector:
     """A column of texts that is read block by block."""
 

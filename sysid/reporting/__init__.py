@@ -9,15 +9,15 @@ if TYPE_CHECKING:
     from sysid.reporting.benchmarks.page import publish_benchmarks as publish_benchmarks
     from sysid.reporting.comparing.against import compare_runs as compare_runs
     from sysid.reporting.comparing.against_page import write_comparison as write_comparison
-    from sysid.reporting.comparing.published import PublishedFigure as PublishedFigure
-    from sysid.reporting.comparing.published import PublishedTable as PublishedTable
-    from sysid.reporting.comparing.published import published_names as published_names
-    from sysid.reporting.comparing.published import read_published as read_published
     from sysid.reporting.figures.fit_figures import case_figure as case_figure
     from sysid.reporting.kinds import read_run as read_run
     from sysid.reporting.kinds import results_json_schema as results_json_schema
     from sysid.reporting.pdf import write_pdf as write_pdf
     from sysid.reporting.publication import publish_run as publish_run
+    from sysid.reporting.published.tables import PublishedFigure as PublishedFigure
+    from sysid.reporting.published.tables import PublishedTable as PublishedTable
+    from sysid.reporting.published.tables import published_names as published_names
+    from sysid.reporting.published.tables import read_published as read_published
     from sysid.reporting.report import write_report as write_report
     from sysid.reporting.results import Results as Results
     from sysid.reporting.results import parse_results as parse_results
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 # Loaded when first asked for: matplotlib takes longer to import than `sysid --help` may take to answer.
 _HOME = {
     "CaseSignals": "signals",
-    "PublishedFigure": "comparing.published",
-    "PublishedTable": "comparing.published",
+    "PublishedFigure": "published.tables",
+    "PublishedTable": "published.tables",
     "Results": "results",
     "case_figure": "figures.fit_figures",
     "compare_runs": "comparing.against",
     "parse_results": "results",
     "publish_benchmarks": "benchmarks.page",
     "publish_run": "publication",
-    "published_names": "comparing.published",
-    "read_published": "comparing.published",
+    "published_names": "published.tables",
+    "read_published": "published.tables",
     "read_results": "results",
     "read_run": "kinds",
     "read_signals": "signals",

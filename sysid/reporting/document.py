@@ -10,13 +10,13 @@ import numpy as np
 
 from sysid.names import output_side
 from sysid.reporting.amplitude import amplitude_section
-from sysid.reporting.comparing.published import PublishedTable
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.judging.document import judgement_sections
 from sysid.reporting.numbers import number
 from sysid.reporting.overview import overview_section
 from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
+from sysid.reporting.published.tables import PublishedTable
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.runtime_table import exported_run_times
 from sysid.reporting.signals import CaseSignals, read_signals

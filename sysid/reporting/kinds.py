@@ -15,16 +15,17 @@ from pydantic.json_schema import models_json_schema
 
 from sysid.reporting.assembly.document import assembly_document
 from sysid.reporting.assembly.results import AssemblyResults
-from sysid.reporting.comparing.published import PublishedTable, read_published
-from sysid.reporting.comparing.published_comparison import with_published
 from sysid.reporting.document import build_document
 from sysid.reporting.judging.document import judgement_document
 from sysid.reporting.judging.results import JudgementResults
 from sysid.reporting.judging.version_1 import ReadyResults, ready_document
 from sysid.reporting.parts import Document
+from sysid.reporting.published.comparison import with_published
+from sysid.reporting.published.tables import PublishedTable, read_published
 from sysid.reporting.records import RESULTS_FILE, RunResults, parse_record, read_document
 from sysid.reporting.results import Results, parse_results
-from sysid.reporting.scores import Score, assembly_scores, fit_scores, judgement_scores
+from sysid.reporting.run_scores import assembly_scores, fit_scores, judgement_scores
+from sysid.reporting.scores import Score
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,7 @@ from sysid.reporting.records import (
     read_document,
     write_record,
 )
-from sysid.reporting.sweep.record import SweepSummary
+from sysid.reporting.sweep_record import SweepSummary
 from sysid.traces import Role
 
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from sysid.atomic import replacing
 from sysid.reporting.kinds import results_json_schema
-from sysid.reporting.sweep.record import SweepRecord
+from sysid.reporting.sweep_record import SweepRecord
 
 BEGIN: Final = "<!-- keys: made by python -m sysid.reporting.schema_page docs/results.md -->"
 END: Final = "<!-- end of the keys -->"

@@ -21,8 +21,8 @@ from sysid.rail.dynamics.brake import AbstractBrake, ReferenceBrake, no_brake
 from sysid.rail.dynamics.drive import Limits, Schedule, drive
 from sysid.rail.dynamics.motion import MovingTrain
 from sysid.rail.dynamics.surrogate import Stage, SurrogateBrake, ValveSurrogateBrake
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import heavy_haul
-from sysid.rail.track.track import TrackProfile
 
 DURATION, REPEATS = 600.0, 5
 CONSIST = Consist(pairs=50)

@@ -261,7 +261,7 @@ def tracking(base: Path) -> None:
     from sqlalchemy import event
     from sqlalchemy.engine import Engine
 
-    from sysid.reporting.sweep.record import read_sweep
+    from sysid.reporting.sweep_record import read_sweep
     from sysid.workbench.runner.events import SweepReady
     from sysid.workbench.tracking.listener import Tracker
     from sysid.workbench.tracking.mlflow_store import connect

@@ -12,10 +12,10 @@ import sysid
 from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
 from sysid.rail.dynamics.coupler import Coupler
+from sysid.rail.dynamics.track import TrackProfile, read_track
 from sysid.rail.dynamics.train import Train, heavy_haul, read_train
 from sysid.rail.dynamics.vehicle import Davis, NotchCurves, Rigging, Shoe, Vehicle, diesel_electric, modified_davis
 from sysid.rail.judging.scenario_catalogue import standard_scenarios
-from sysid.rail.track.track import TrackProfile, read_track
 
 # --- vehicles
 

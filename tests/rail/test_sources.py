@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from sysid.rail.constants import MPH
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.end_of_train.brake_computer import ComputerSettings
 from sysid.rail.track.card import CardCode, read_card
 from sysid.rail.track.terrain import correlation, equivalent_grade_change, uniform
-from sysid.rail.track.track import TrackProfile
 from sysid.rail.transit.deceleration import COAST, COAST_RATE, CRUISE, FULL_SERVICE, JERK, OPEN_LOOP, RATE, JerkProfile
 from sysid.rail.transit.transit import braking, commanded_pressure
 

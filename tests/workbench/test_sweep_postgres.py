@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from sysid.reporting.sweep.record import SweepRecord, Trial, TrialCase, write_sweep
+from sysid.reporting.sweep_record import SweepRecord, Trial, TrialCase, write_sweep
 from sysid.workbench.runner.events import SweepReady
 from sysid.workbench.sweep.sampler import publish
 from sysid.workbench.tracking.listener import Tracker

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import ConfigError
-from sysid.estimation.least_squares.damping import MarquardtDamping
+from sysid.estimation.least_squares.damping import damping_of
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, State
 from sysid.estimation.least_squares.provider import AbstractProvider
@@ -43,16 +43,12 @@ class Checkpoint:
         Returns:
             The checkpoint.
         """
-        damping, prior = state.damping, state.prior
+        prior = state.prior
         return cls(
             fields={
                 "theta": state.theta.tolist(),
                 "iteration": state.iteration,
-                "damping": {
-                    "factor": damping.factor,
-                    "growth": damping.growth,
-                    "scale": None if damping.scale is None else damping.scale.tolist(),
-                },
+                "damping": state.damping.to_dict(),
                 "alphas": prior.alphas.tolist(),
                 "beta": prior.beta,
                 "evidence": None if state.evidence is None else asdict(state.evidence),
@@ -84,12 +80,11 @@ class Checkpoint:
                 got=f"{len(theta)} parameters",
                 remedy="go on with the structure that was put aside",
             )
-        damping, evidence = dict(kept["damping"]), kept["evidence"]
-        scale = None if damping["scale"] is None else np.array(damping["scale"], dtype=np.float64)
+        evidence = kept["evidence"]
         return State(
             theta=theta,
             at=provider.linearise(theta),
-            damping=MarquardtDamping(factor=float(damping["factor"]), growth=float(damping["growth"]), scale=scale),
+            damping=damping_of(kept["damping"]),
             iteration=int(kept["iteration"]),
             prior=Prior(centre=prior.centre, groups=prior.groups, alphas=alphas, beta=float(kept["beta"])),
             evidence=None if evidence is None else Evidence(**evidence),

@@ -60,7 +60,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 from threadpoolctl import threadpool_limits
 
-from sysid.estimation.least_squares.damping import MarquardtDamping
+from sysid.estimation.least_squares.damping import DAMPINGS, DEFAULT
+from sysid.estimation.least_squares.damping.base import AbstractDamping
 from sysid.estimation.least_squares.evidence import Prior, update
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.least_squares.termination import MAX_DAMPING, Termination
@@ -97,7 +98,7 @@ class State:
     theta: NDArray[np.float64]
     at: Linearisation
     # updated every iteration
-    damping: MarquardtDamping
+    damping: AbstractDamping
     iteration: int = 0
     # updated with the evidence
     prior: Prior
@@ -160,7 +161,7 @@ class LevenbergMarquardt:
     """
 
     termination: Termination = field(default_factory=Termination)
-    damping: MarquardtDamping = field(default_factory=MarquardtDamping)
+    damping: AbstractDamping = field(default_factory=DAMPINGS[DEFAULT])
     evidence_after: int | None = 20
     on_iteration: Callable[[Iteration], None] = _ignore
     on_state: Callable[[State], None] = lambda _: None
@@ -263,7 +264,7 @@ class LevenbergMarquardt:
         return state
 
 
-def _solve(H: NDArray[np.float64], damping: MarquardtDamping, g: NDArray[np.float64]) -> NDArray[np.float64]:
+def _solve(H: NDArray[np.float64], damping: AbstractDamping, g: NDArray[np.float64]) -> NDArray[np.float64]:
     """The damped step; scaled by its diagonal first, so that the factorisation does not see the units."""
     scale = damping.scale if damping.scale is not None else np.ones(len(g))
     root = 1.0 / np.sqrt(np.maximum(np.diag(H), np.finfo(np.float64).tiny))

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.estimation.attempts import Attempt
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
+from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks.basis import RebasedProvider
 from sysid.estimation.networks.joint_provider import CascadeProvider
 from sysid.estimation.networks.member_layout import JointLayout
 from sysid.estimation.networks.multistart import INITIAL_ALPHA
-from sysid.estimation.networks.training import FitProgress
+from sysid.estimation.networks.training import FitProgress, check_choice
 from sysid.estimation.result import Evidence, Status
 from sysid.models import Cascade, cascade_from_dict
 from sysid.traces import Trace
@@ -49,6 +50,7 @@ class JointTraining:
             less: where sensitivities explode, the few rows that do would forbid every step (``leverage.py``).
         robust_scale: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
             its logarithm (Cauchy loss): a few traces on which the free run is lost do not rule it (``robust_loss.py``).
+        damping: How far a step may go, as in :class:`~sysid.estimation.Training`.
         workers: Records that are worked on at the same time.
     """
 
@@ -63,9 +65,11 @@ class JointTraining:
     moves: float = float("inf")
     leverage: float = float("inf")
     robust_scale: float = float("inf")
+    damping: str = "marquardt"
     workers: int = 2
 
     def __post_init__(self) -> None:
+        check_choice("damping", self.damping, tuple(DAMPINGS))
         for name in ("max_iterations", "patience", "checkpoints", "starts", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
@@ -307,7 +311,7 @@ class Joint:
             tolerance=training.tolerance,
             patience=training.patience,
         )
-        return LevenbergMarquardt(termination=limits, on_iteration=report)
+        return LevenbergMarquardt(termination=limits, damping=DAMPINGS[training.damping](), on_iteration=report)
 
     def _candidate(
         self, start: tuple[int, int | None], theta: NDArray[np.float64], solution: Solution | None

@@ -22,6 +22,7 @@ from threadpoolctl import threadpool_limits
 from sysid.errors import TraceError
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints
+from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.provider import AbstractProvider
@@ -285,6 +286,7 @@ def _pretraining(
         termination=Termination(
             max_iterations=training.pretraining_iterations, tolerance=training.tolerance, patience=training.patience
         ),
+        damping=DAMPINGS[training.damping](),
         on_iteration=report,
         should_stop=multistart.stop.is_set,
     )
@@ -360,11 +362,13 @@ def _engine(multistart: Multistart, number: int, iterations: int, seconds: float
     limits = Termination(
         max_iterations=iterations, max_time_s=seconds, tolerance=training.tolerance, patience=training.patience
     )
-    if training.regularisation is not None:
-        return LevenbergMarquardt(
-            termination=limits, on_iteration=report, should_stop=multistart.stop.is_set, evidence_after=None
-        )
-    return LevenbergMarquardt(termination=limits, on_iteration=report, should_stop=multistart.stop.is_set)
+    engine = LevenbergMarquardt(
+        termination=limits,
+        damping=DAMPINGS[training.damping](),
+        on_iteration=report,
+        should_stop=multistart.stop.is_set,
+    )
+    return engine if training.regularisation is None else replace(engine, evidence_after=None)
 
 
 def score(multistart: Multistart, model: Network) -> float:

@@ -2,17 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sysid.errors import ConfigError
+from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.result import Loop
 
 CHOICES = {
     "choose_by": ("selection", "evidence"),
+    "damping": tuple(DAMPINGS),
     "basis": ("levels and rates", "plain"),
 }
 """Options that are words, and what they may be; the first is a good example."""
+
+
+def check_choice(name: str, value: object, choices: Sequence[str]) -> None:
+    """Refuse a word that is none of some.
+
+    Args:
+        name: Of the option.
+        value: What it is.
+        choices: What it may be; the first is a good example.
+
+    Raises:
+        ConfigError: If it is none of them.
+    """
+    if value not in choices:
+        raise ConfigError(
+            f"unknown value of {name}",
+            where=name,
+            expected=" or ".join(choices),
+            got=repr(value),
+            remedy=f"write for example {name}: {choices[0]}",
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +62,8 @@ class Training:
             copies that differ in level alone tell the network which to follow, and how far a sensor may be off.
         regularisation: ``None`` lets the evidence weigh the weights' sizes against the residuals, group by group. A
             number is that weight, the same for all and never changed: 0 is plain Levenberg-Marquardt (``trainlm``).
+        damping: How far a step may go: ``marquardt`` by the curvature of each parameter, ``levenberg`` the same for
+            all, as ``trainlm`` and ``trainbr``.
         pretraining: Samples on which a random start is trained one step ahead before the free run
             (``pretraining.py``): cheap iterations that find what switches where. 0 for none.
         pretraining_iterations: Iterations of the pretraining.
@@ -63,6 +88,7 @@ class Training:
     basis: str = "levels and rates"
     offsets: tuple[Mapping[str, float], ...] = ()
     regularisation: float | None = None
+    damping: str = "marquardt"
     pretraining: int = 0
     pretraining_iterations: int = 300
     stride: int = 1
@@ -74,14 +100,7 @@ class Training:
         object.__setattr__(self, "offsets", tuple(dict(offset) for offset in self.offsets))
         object.__setattr__(self, "input_subsets", tuple(tuple(names) for names in self.input_subsets))
         for name, choices in CHOICES.items():
-            if getattr(self, name) not in choices:
-                raise ConfigError(
-                    f"unknown value of {name}",
-                    where=name,
-                    expected=" or ".join(choices),
-                    got=repr(getattr(self, name)),
-                    remedy=f"write for example {name}: {choices[0]}",
-                )
+            check_choice(name, getattr(self, name), choices)
         for name in (
             "max_iterations",
             "patience",

@@ -15,9 +15,6 @@ MOST_BYTES = 2**30
 MOST_TIMES = 32
 """How many times its size on disk a file may hold beyond that; a recording is seldom packed closer."""
 
-MOST_TEXT = 2**31
-"""Bytes of a text format, which takes several times its size as objects."""
-
 
 def allowed(path: Path) -> int:
     """Bytes of numbers that a file may claim to hold.

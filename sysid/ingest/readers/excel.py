@@ -25,7 +25,6 @@ from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.table import RawColumn, RawTable, RecordChoice, array_column, distinct, recognise_time
 
 _ZIP, _OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-_BIFF = (b"\x09\x00", b"\x09\x02", b"\x09\x04", b"\x09\x08")
 _MOST_CELLS = 40_000_000
 _FIRST = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/")
 

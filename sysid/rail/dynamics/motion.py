@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, StabilityError
 from sysid.rail.constants import GRAVITY
 from sysid.rail.dynamics import kernel
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
-from sysid.rail.track.track import TrackProfile
 
 CURVE_RESISTANCE = 6.85
 """Curve resistance in N per kg times radius in m: 0.8 lb per short ton and degree of curve, as the American Railway

@@ -16,8 +16,8 @@ from sysid.errors import StabilityError
 from sysid.rail.constants import GRAVITY
 from sysid.rail.dynamics.coupler import Coupler
 from sysid.rail.dynamics.motion import CURVE_RESISTANCE, TURN_SPEED
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
-from sysid.rail.track.track import TrackProfile
 
 
 def _sign(speed: float, width: float) -> float:

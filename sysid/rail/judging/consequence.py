@@ -25,10 +25,10 @@ from sysid.models import AbstractModel, Cascade
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.brake import ReferenceBrake
 from sysid.rail.dynamics.drive import Run
-from sysid.rail.dynamics.port import Part, brake_of
 from sysid.rail.dynamics.train import Train, read_train
 from sysid.rail.judging.consequence_figures import consequence_document
 from sysid.rail.judging.judge import MakeBrake, difference, error_rung
+from sysid.rail.judging.port import Part, brake_of
 from sysid.rail.judging.scenario_catalogue import all_scenarios
 from sysid.rail.judging.scenarios import Consequence, Scenario
 

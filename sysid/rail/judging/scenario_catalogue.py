@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from sysid.airbrake.command import EMERGENCY, Command
 from sysid.rail.constants import KMH
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
 from sysid.rail.judging.scenarios import Scenario
 from sysid.rail.traces.cycles import HabitSettings, NotchAndBrakeDriver, rolling_line
-from sysid.rail.track.track import TrackProfile
 
 FULL_SERVICE, HALF_SERVICE, RUNNING = 64.2, 77.0, 90.0
 """Handle positions in psi gauge: the dissertation's full service, half of its reduction, released."""

@@ -14,9 +14,9 @@ from sysid.errors import ConfigError
 from sysid.rail.dynamics.brake import AbstractBrake
 from sysid.rail.dynamics.drive import AbstractDriver, Limits, Run, Schedule, drive
 from sysid.rail.dynamics.motion import MovingTrain, Peak
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
 from sysid.rail.end_of_train.tail_unit import TwoEndedBrake
-from sysid.rail.track.track import TrackProfile
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,9 +18,9 @@ from sysid.rail.constants import KMH
 from sysid.rail.dynamics.brake import ReferenceBrake
 from sysid.rail.dynamics.drive import AbstractDriver, Controls, Limits, Observation, Run, drive
 from sysid.rail.dynamics.motion import MovingTrain
+from sysid.rail.dynamics.track import STRAIGHT, TrackProfile
 from sysid.rail.dynamics.train import Train
 from sysid.rail.track.card import CardCode, CardRow, TrackCard
-from sysid.rail.track.track import STRAIGHT, TrackProfile
 from sysid.rail.transit.ato import AtoSettings, CardDriver
 
 

@@ -1,1 +1,1 @@
-"""The line: profile, terrain features, the driver's track card."""
+"""The line ahead: terrain features, the driver's track card."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, ReaderError
 from sysid.rail.constants import KMH
-from sysid.rail.track.track import STRAIGHT, TrackProfile
+from sysid.rail.dynamics.track import STRAIGHT, TrackProfile
 
 HEADER = ("section", "distance_km", "code", "value")
 """Columns of the file."""

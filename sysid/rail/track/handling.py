@@ -8,10 +8,10 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.rail.constants import GRAVITY, KMH
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
 from sysid.rail.track.features import Feature, Severity
 from sysid.rail.track.terrain import Shape, effective_grade, quasi_static_forces
-from sysid.rail.track.track import TrackProfile
 
 SPEED_GAINS = {Severity.LOW: 8.0 * KMH, Severity.MEDIUM: 5.0 * KMH, Severity.HIGH: 3.0 * KMH, Severity.NONE: np.inf}
 """Largest gain of speed in m/s over a crest (the source: predetermined, falling with severity; values ours)."""

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.rail.constants import GRAVITY
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
-from sysid.rail.track.track import TrackProfile
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,9 +12,9 @@ import numpy as np
 
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.drive import AbstractDriver, Controls, Observation
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
 from sysid.rail.track.card import CardReader, TrackCard
-from sysid.rail.track.track import TrackProfile
 from sysid.rail.transit.notch import (
     CALM,
     POSITION_CLOSENESS,

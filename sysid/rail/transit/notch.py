@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.rail.constants import GRAVITY, KMH
 from sysid.rail.dynamics.motion import CURVE_RESISTANCE
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
 from sysid.rail.dynamics.vehicle import NotchCurves
-from sysid.rail.track.track import TrackProfile
 
 
 def predicted_speed(speed: float, notch: float, grade: float, curve: float, horizon: float) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from sysid.reporting.assembly.results import CandidateRecord, MemberRecord
 from sysid.reporting.assembly.tables import Value, mse_value
-from sysid.reporting.comparing.published import PublishedTable
+from sysid.reporting.published.tables import PublishedTable
 from sysid.reporting.tables import Table, plain_table
 
 

@@ -15,7 +15,7 @@ from sysid.reporting.assembly.results import (
     PositionErrors,
     SequenceErrors,
 )
-from sysid.reporting.comparing.published import PublishedTable
+from sysid.reporting.published.tables import PublishedTable
 from sysid.reporting.tables import Table, plain_table
 
 Value = int | float | str | None

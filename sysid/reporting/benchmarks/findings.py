@@ -10,8 +10,8 @@ from typing import Any, Final
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from sysid.atomic import replacing
-from sysid.reporting.comparing.figures_file import read_figures
 from sysid.reporting.numbers import number
+from sysid.reporting.published.figures_file import read_figures
 from sysid.reporting.records import Number
 from sysid.reporting.scores import Score
 

@@ -1,1 +1,1 @@
-"""Beside others: published figures, and one run against another."""
+"""One run against another."""

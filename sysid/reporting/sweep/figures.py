@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
-from sysid.reporting.sweep.record import SweepRecord, Trial
 from sysid.reporting.sweep.tables import PublishedRank
+from sysid.reporting.sweep_record import SweepRecord, Trial
 
 COLOURS = "cividis"
 """A map that is even in lightness, and the same to those who see red and green alike."""

@@ -8,11 +8,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from sysid.reporting.comparing.published import PublishedTable
 from sysid.reporting.numbers import quantity, seconds, times
 from sysid.reporting.parts import Part, Section, picture
+from sysid.reporting.published.tables import PublishedTable
 from sysid.reporting.sweep.figures import heat_maps, over_trials_figure, parallel_figure, pareto_figure
-from sysid.reporting.sweep.record import FIGURES, TRACES, SweepRecord, has_sweep, read_sweep
 from sysid.reporting.sweep.tables import (
     PublishedRank,
     beside_table,
@@ -21,6 +20,7 @@ from sysid.reporting.sweep.tables import (
     mean_not_fitted,
     published_ranks,
 )
+from sysid.reporting.sweep_record import FIGURES, TRACES, SweepRecord, has_sweep, read_sweep
 
 
 def sweep_sections(folder: Path, published: PublishedTable | None) -> list[Section]:

@@ -7,9 +7,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sysid.reporting.comparing.published import PublishedTable
 from sysid.reporting.numbers import seconds
-from sysid.reporting.sweep.record import SweepRecord, Trial
+from sysid.reporting.published.tables import PublishedTable
+from sysid.reporting.sweep_record import SweepRecord, Trial
 from sysid.reporting.tables import Cell, Table, figure_cell
 
 SHOWN = 5

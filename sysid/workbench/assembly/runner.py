@@ -10,7 +10,7 @@ from sysid.errors import ConfigError
 from sysid.models import Cascade, cascade_from_dict
 from sysid.reporting.assembly.document import headline
 from sysid.reporting.assembly.results import AssemblyResults
-from sysid.reporting.comparing.published import read_published
+from sysid.reporting.published.tables import read_published
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.data import AssemblyData

@@ -6,7 +6,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import estimator_of
 from sysid.models import Mapping
-from sysid.reporting.sweep.record import read_sweep
+from sysid.reporting.sweep_record import read_sweep
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.member_config import MemberConfig
 from sysid.workbench.sweep.store import TRIALS, TrialStore

@@ -12,7 +12,7 @@ import numpy as np
 
 from sysid.estimation import CascadeFit, FitResult, Posterior, Status
 from sysid.reporting.records import SCHEMA_VERSION
-from sysid.reporting.sweep.record import SweepRecord
+from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import Role
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
 from sysid.workbench.fits.config import PipelineConfig

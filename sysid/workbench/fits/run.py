@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import seedless
-from sysid.reporting.comparing.published import read_published
+from sysid.reporting.published.tables import read_published
 from sysid.reporting.results import Results, parse_results
-from sysid.reporting.sweep.record import has_sweep, read_sweep
+from sysid.reporting.sweep_record import has_sweep, read_sweep
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, PipelineConfig, read_pipeline
 from sysid.workbench.fits.data import Data, load_data, unmade_data

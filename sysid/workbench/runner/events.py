@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.estimation import FitResult
-from sysid.reporting.sweep.record import SweepRecord
+from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import TraceSet
 from sysid.validation import Evaluation
 

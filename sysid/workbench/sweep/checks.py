@@ -12,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
 from sysid.estimation.estimators import with_stability
 from sysid.estimation.networks.choosing import VETTED
-from sysid.reporting.sweep.record import Trial
+from sysid.reporting.sweep_record import Trial
 from sysid.traces import Role
 from sysid.workbench.fits.run import GivenFit
 from sysid.workbench.runner.store import digest, strict

@@ -9,7 +9,7 @@ from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_v
 from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import Start, StartKind
-from sysid.reporting.sweep.record import FIGURES
+from sysid.reporting.sweep_record import FIGURES
 from sysid.workbench.fields import MappingField, StartField, as_field_error
 from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig, ReportConfig
 from sysid.workbench.old_words import STRICT, TRAINING, with_new_words

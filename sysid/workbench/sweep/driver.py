@@ -18,7 +18,7 @@ from sysid.code_digest import code_digest
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
 from sysid.models import structure_from_dict
-from sysid.reporting.sweep.record import FIGURES, Trial
+from sysid.reporting.sweep_record import FIGURES, Trial
 from sysid.workbench.runner.events import StepProgress, Watcher
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.config import SweepConfig

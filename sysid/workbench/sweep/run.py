@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from sysid.errors import ConfigError
 from sysid.reporting.results import Results
-from sysid.reporting.sweep.record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
+from sysid.reporting.sweep_record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data

@@ -22,7 +22,7 @@ from optuna.distributions import BaseDistribution, CategoricalDistribution, Floa
 from optuna.trial import TrialState, create_trial
 
 from sysid.errors import ConfigError
-from sysid.reporting.sweep.record import FIGURES, SweepRecord, Trial
+from sysid.reporting.sweep_record import FIGURES, SweepRecord, Trial
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.search_space import Point, Space
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.table import Table
 
-from sysid.reporting.sweep.record import SweepRecord, Trial
+from sysid.reporting.sweep_record import SweepRecord, Trial
 
 SHOWN = 5
 """Trials in the table."""

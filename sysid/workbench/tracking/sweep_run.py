@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.names import csv_cell, distinct, shortened, tracking_key, tracking_text
-from sysid.reporting.sweep.record import SWEEP_FILE, SweepRecord, Trial
+from sysid.reporting.sweep_record import SWEEP_FILE, SweepRecord, Trial
 from sysid.workbench.runner.events import SweepReady
 from sysid.workbench.runner.store import digest
 from sysid.workbench.tracking.fit_run import Entities

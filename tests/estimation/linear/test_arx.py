@@ -132,7 +132,7 @@ def test_hair_dryer_has_the_coefficients_of_the_textbook() -> None:
         ONE,
         ARX(na=2, nb=(2,), nk=(3,), intercept=False),
         start=Start(kind=StartKind.MEASURED, n_measured=4),
-        operating_point=OperatingPoint.mean_of([trace], ONE),
+        operating_point=OperatingPoint(inputs=(float(values[:, 0].mean()),), output=float(values[:, 1].mean())),
     )
     assert [f"{-a:.5f}" for a in fit.model.a] == ["-1.27374", "0.39355"]
     assert [f"{b:.5f}" for b in fit.model.b[0]] == ["0.06662", "0.04448"]

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from sysid.estimation import Evidence, Loop, Posterior, Training, fit_narx
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.least_squares.damping import MarquardtDamping
+from sysid.estimation.least_squares.damping.marquardt import MarquardtDamping
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import State
 from sysid.estimation.networks.posterior import Noise, calibrate, laplace

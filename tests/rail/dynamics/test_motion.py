@@ -11,9 +11,9 @@ from sysid.errors import ConfigError, StabilityError
 from sysid.rail.dynamics.coupler import Coupler
 from sysid.rail.dynamics.motion import CURVE_RESISTANCE, MovingTrain
 from sysid.rail.dynamics.reference import PlainTrain
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train, heavy_haul, locomotive, wagon
 from sysid.rail.dynamics.vehicle import Davis, NotchCurves, Rigging, Shoe, Vehicle
-from sysid.rail.track.track import TrackProfile
 
 FREE = Davis(a=0.0, b=0.0, c=0.0)
 LEVEL = TrackProfile.level()

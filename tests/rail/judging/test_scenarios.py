@@ -13,13 +13,13 @@ from sysid.errors import ConfigError
 from sysid.rail.dynamics.brake import RecordedBrake, ReferenceBrake, no_brake
 from sysid.rail.dynamics.drive import Limits, Schedule, drive
 from sysid.rail.dynamics.motion import MovingTrain
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train, heavy_haul
 from sysid.rail.dynamics.vehicle import Davis, Rigging, Shoe, Vehicle
 from sysid.rail.end_of_train.tail_unit import TwoEndedBrake
 from sysid.rail.judging.judge import ErringBrake, Rung, compare, cylinder_mse, error_rung, tolerable_mse
 from sysid.rail.judging.scenario_catalogue import standard_scenarios
 from sysid.rail.judging.scenarios import Consequence, Scenario, consequence
-from sysid.rail.track.track import TrackProfile
 from sysid.units import PSI_IN_PA
 
 SHORT = Consist(pairs=5)

@@ -13,9 +13,9 @@ from sysid.rail.constants import KMH
 from sysid.rail.dynamics.brake import no_brake
 from sysid.rail.dynamics.drive import AbstractDriver, Limits, Run, drive
 from sysid.rail.dynamics.motion import MovingTrain
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import heavy_haul, read_train
 from sysid.rail.track.card import CardCode, CardReader, TrackCard, read_card, write_card
-from sysid.rail.track.track import TrackProfile
 from sysid.rail.transit.ato import AtoSettings, CardDriver, FullNotchDriver, target_speed
 from sysid.rail.transit.notch import Calm, Closeness, Predictor, choose, predicted_speed, true_acceleration
 

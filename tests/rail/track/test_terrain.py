@@ -5,6 +5,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.rail.dynamics.motion import MovingTrain
+from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train, heavy_haul, locomotive, wagon
 from sysid.rail.dynamics.vehicle import Davis, Vehicle
 from sysid.rail.track import terrain
@@ -23,7 +24,6 @@ from sysid.rail.track.terrain import (
     stringlining_risk,
     uniform,
 )
-from sysid.rail.track.track import TrackProfile
 
 L, Y = 1000.0, 0.012
 TRIANGLE = TrackProfile.from_steps("triangle", grade=[(-5.0 * L, Y), (0.0, -Y)])

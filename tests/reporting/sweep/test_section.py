@@ -12,10 +12,9 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from sysid.errors import ConfigError
-from sysid.reporting.comparing.published import read_published
 from sysid.reporting.numbers import quantity, times
+from sysid.reporting.published.tables import read_published
 from sysid.reporting.sweep.figures import heat_maps, over_trials_figure, parallel_figure, pareto_figure
-from sysid.reporting.sweep.record import SWEEP_FILE, SweepRecord, Trial, TrialCase, read_sweep, write_sweep
 from sysid.reporting.sweep.section import sweep_figures, sweep_points, sweep_sections
 from sysid.reporting.sweep.tables import (
     beside_table,
@@ -24,6 +23,7 @@ from sysid.reporting.sweep.tables import (
     mean_not_fitted,
     published_ranks,
 )
+from sysid.reporting.sweep_record import SWEEP_FILE, SweepRecord, Trial, TrialCase, read_sweep, write_sweep
 
 
 def trial(number: int, delays: int, neurons: int, **change: Any) -> Trial:

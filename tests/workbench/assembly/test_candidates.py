@@ -13,8 +13,8 @@ from sysid.ingest import load_dataset
 from sysid.reporting.assembly.member_tables import member_tables
 from sysid.reporting.assembly.results import MemberRecord
 from sysid.reporting.assembly.tables import stage_table
-from sysid.reporting.comparing.published import read_published
-from sysid.reporting.sweep.record import SweepRecord
+from sysid.reporting.published.tables import read_published
+from sysid.reporting.sweep_record import SweepRecord
 from sysid.workbench.commands.run import run_request
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest

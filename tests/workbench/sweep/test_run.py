@@ -10,7 +10,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.reporting.results import read_results
-from sysid.reporting.sweep.record import read_sweep
+from sysid.reporting.sweep_record import read_sweep
 from sysid.workbench.cli import run_cli
 from sysid.workbench.runner.events import Event, StepProgress, Warned
 from sysid.workbench.sweep.config import SweepConfig

@@ -9,7 +9,7 @@ import optuna
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.reporting.sweep.record import SweepRecord, Trial
+from sysid.reporting.sweep_record import SweepRecord, Trial
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.sampler import publish, strategy
 from sysid.workbench.sweep.search_space import Point

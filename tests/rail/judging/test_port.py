@@ -7,9 +7,9 @@ from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
 from sysid.models import ARX, ARXModel, Cascade, Limit, Mapping
 from sysid.rail.dynamics.cascade_brake import CascadeBrake
-from sysid.rail.dynamics.port import Part, brake_of, ordered, placed
 from sysid.rail.dynamics.surrogate import SurrogateBrake, ValveSurrogateBrake
 from sysid.rail.end_of_train.tail_unit import TwoEndedBrake
+from sysid.rail.judging.port import Part, brake_of, ordered, placed
 from sysid.units import PSI_IN_PA
 
 TRAIN = Consist(pairs=4)

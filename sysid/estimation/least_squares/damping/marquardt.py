@@ -1,18 +1,21 @@
-"""Damping: how far a Levenberg-Marquardt step may go."""
+"""Damping by the curvature of each parameter, steered by how well the last step was foretold."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.least_squares.damping.base import AbstractDamping
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MarquardtDamping:
+class MarquardtDamping(AbstractDamping):
     """Damping proportional to the curvature of each parameter, steered by the gain ratio.
 
-    The damped matrix is ``H + factor * diag(scale)``. Scaling by the diagonal of ``H`` (Marquardt 1963), kept
+    Scaling by the diagonal of ``H`` (Marquardt 1963), kept
     at its running maximum (Moré 1978, "The Levenberg-Marquardt algorithm: implementation and theory", eq. 6.3),
     makes the step independent of the units of the parameters; damping by a multiple of the identity stalls on
     networks whose weights matter very differently. The factor follows Nielsen 1999 ("Damping parameter in
@@ -20,15 +23,16 @@ class MarquardtDamping:
 
     Args:
         factor: Damping factor.
-        growth: By what it grows at the next rejection.
-        scale: Shape ``(n_parameters,)``; zeros before the first step.
+        growth: By what it is multiplied at the next rejection.
+        scale: Shape ``(n_parameters,)``; ``None`` before the first step.
     """
+
+    kind: ClassVar[str] = "marquardt"
 
     factor: float = 1e-3
     growth: float = 2.0
-    scale: NDArray[np.float64] | None = None
 
-    def scaled_by(self, diagonal: NDArray[np.float64]) -> MarquardtDamping:
+    def scaled_by(self, diagonal: NDArray[np.float64]) -> Self:
         """The damping with its scale raised to this diagonal.
 
         Args:
@@ -42,7 +46,7 @@ class MarquardtDamping:
         scale = diagonal if self.scale is None else np.maximum(diagonal, 0.5 * self.scale)
         return replace(self, scale=scale)
 
-    def accepted(self, gain: float) -> MarquardtDamping:
+    def accepted(self, gain: float) -> Self:
         """The damping after a step that was taken.
 
         Args:
@@ -53,6 +57,6 @@ class MarquardtDamping:
         """
         return replace(self, factor=max(self.factor * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-12), growth=2.0)
 
-    def rejected(self) -> MarquardtDamping:
+    def rejected(self) -> Self:
         """The damping after a step that was not taken."""
         return replace(self, factor=self.factor * self.growth, growth=2.0 * self.growth)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sysid.reporting.comparing.published import PublishedTable
+from sysid.reporting.published.tables import PublishedTable
 from sysid.reporting.results import CaseRecord, FitRecord, PublishedRecord, Results
 
 KINDS = ("free_run", "one_step", "run_time")
