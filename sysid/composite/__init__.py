@@ -2,12 +2,12 @@
 
 Declare the members and how they are wired (:class:`Composite`), say how they are trained (:class:`TrainingPlan`), and
 call :func:`train`; or call its stages one by one: :func:`fit_member`, :func:`choose_together`, :func:`retrain`,
-:func:`train_round`, :func:`grow`. :func:`run_monte_carlo` puts the whole to a Monte Carlo test.
+:func:`train_round`, :func:`learn_actively`. :func:`run_monte_carlo` puts the whole to a Monte Carlo test.
 
 Nothing here knows a run folder, a screen or a tracker: a :class:`Keeper` is given from outside.
 """
 
-from sysid.composite.active_learning import Growth, Look, grow, sequence_errors
+from sysid.composite.active_learning import ActiveLearned, Assessment, learn_actively, sequence_errors
 from sysid.composite.candidates import Candidate, Candidates, fit_candidates
 from sysid.composite.composite import Composite, FixedMember, Member, Standing
 from sysid.composite.fixed_members import fixed_model, with_fixed
@@ -24,18 +24,18 @@ from sysid.composite.training import Retrained, TrainedComposite, TrainingData, 
 from sysid.composite.warm_start import started_from
 
 __all__ = [
+    "ActiveLearned",
     "ActiveLearning",
+    "Assessment",
     "Candidate",
     "Candidates",
     "Choice",
     "Composite",
     "FixedMember",
-    "Growth",
     "Holding",
     "JointRound",
     "Keeper",
     "LimitCheck",
-    "Look",
     "MakeAll",
     "Member",
     "MonteCarlo",
@@ -56,8 +56,8 @@ __all__ = [
     "fit_candidates",
     "fit_member",
     "fixed_model",
-    "grow",
     "holding",
+    "learn_actively",
     "model_of",
     "one_step_of",
     "own_traces",

@@ -21,12 +21,12 @@ from sysid.composite.plan import ActiveLearning
 from sysid.models import Cascade
 from sysid.traces import Trace
 
-GROWN = "grown"
-"""How the stages of growth are called in the report, with the number of the round."""
+LEARNED = "active learning"
+"""How its stages are called in the report, with the number of the round."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Look:
+class Assessment:
     """How the whole does on sequences that train nothing.
 
     Args:
@@ -40,7 +40,7 @@ class Look:
     rare: float
 
     @classmethod
-    def at(cls, errors: NDArray[np.float64], limit: float) -> Look:
+    def at(cls, errors: NDArray[np.float64], limit: float) -> Assessment:
         """What some errors come to.
 
         Args:
@@ -48,7 +48,7 @@ class Look:
             limit: That an error should stay under.
 
         Returns:
-            The look.
+            The assessment.
         """
         return cls(
             within=float(np.mean(errors < limit)),
@@ -56,7 +56,7 @@ class Look:
             rare=float(np.quantile(errors, 0.99)),
         )
 
-    def better_than(self, other: Look) -> bool:
+    def better_than(self, other: Assessment) -> bool:
         """Whether more sequences are within the limit, or as many and the rare ones nearer to it."""
         return (self.within, -self.rare) > (other.within, -other.rare)
 
@@ -72,7 +72,7 @@ class Round:
         traces: Traces that the whole was trained on in it.
         samples: Samples of these.
         seconds: That its training took.
-        look: The whole after it, on the sequences that train nothing.
+        assessment: The whole after it, on the sequences that train nothing.
         score: Of the whole after it, on the traces that choose between the stages.
     """
 
@@ -82,12 +82,12 @@ class Round:
     traces: int
     samples: int
     seconds: float
-    look: Look
+    assessment: Assessment
     score: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Growth:
+class ActiveLearned:
     """What came of it.
 
     Args:
@@ -95,7 +95,7 @@ class Growth:
         rounds: All that were done, the state before them first.
         held_out: How many sequences said what a round has brought.
         unit: Of the outputs that were looked at; empty where they differ.
-        ended: Why no further round was begun.
+        ended: Why there was no further round.
     """
 
     asked: ActiveLearning
@@ -122,7 +122,7 @@ class Growth:
     @property
     def sentence(self) -> str:
         """For the report."""
-        first, last, outputs = self.rounds[0].look, self.rounds[-1].look, ", ".join(self.asked.outputs)
+        first, last, outputs = self.rounds[0].assessment, self.rounds[-1].assessment, ", ".join(self.asked.outputs)
         return (
             f"Grown over {len(self.rounds) - 1} rounds by {self.added} sequences, {self.where}; {self.ended}. On "
             f"{self.held_out} sequences of the pool that train nothing the share with an error of {outputs} under "
@@ -161,7 +161,7 @@ def sequence_errors(whole: Cascade, sequences: Sequence[Trace], outputs: Sequenc
     return np.where(np.isnan(errors), np.inf, errors)
 
 
-def grow(
+def learn_actively(
     asked: ActiveLearning,
     whole: Cascade,
     train: Train,
@@ -172,7 +172,7 @@ def grow(
     held_out: Sequence[Trace],
     score: Callable[[Cascade], float],
     report: Callable[[Round], Any] = lambda _: None,
-) -> Growth:
+) -> ActiveLearned:
     """Grow the training data of a whole, round by round.
 
     Args:
@@ -202,7 +202,7 @@ def grow(
                 traces=len(traces),
                 samples=sum(map(len, traces)),
                 seconds=seconds,
-                look=Look.at(sequence_errors(whole, held_out, asked.outputs), asked.within),
+                assessment=Assessment.at(sequence_errors(whole, held_out, asked.outputs), asked.within),
                 score=score(whole),
             )
         )
@@ -218,10 +218,10 @@ def grow(
         # Behind the others, not between them: where instances take the traces in turn, each keeps its own.
         traces += added
         whole, seconds = train(whole, tuple(traces), number)
-        done(f"{GROWN}, round {number}", added, seconds)
+        done(f"{LEARNED}, round {number}", added, seconds)
     units = {held_out[0].channel(name).unit for name in asked.outputs}
     unit = units.pop() if len(units) == 1 else ""
-    return Growth(asked=asked, rounds=tuple(rounds), held_out=len(held_out), unit=unit, ended=ended)
+    return ActiveLearned(asked=asked, rounds=tuple(rounds), held_out=len(held_out), unit=unit, ended=ended)
 
 
 def _picked(asked: ActiveLearning, whole: Cascade, left: Sequence[Trace], count: int) -> list[Trace]:
@@ -233,11 +233,11 @@ def _picked(asked: ActiveLearning, whole: Cascade, left: Sequence[Trace], count:
 
 
 def _ended(asked: ActiveLearning, rounds: Sequence[Round], *, pool_left: bool) -> str | None:
-    """Why no further round is begun; ``None`` if one is."""
+    """Why there is no further round; ``None`` if one is."""
     best = 0
     for done in rounds[1:]:
-        best = done.number if done.look.better_than(rounds[best].look) else best
-    if rounds[best].look.within >= asked.until:
+        best = done.number if done.assessment.better_than(rounds[best].assessment) else best
+    if rounds[best].assessment.within >= asked.until:
         return f"it ended with {100.0 * asked.until:g} % under the limit, as aimed at"
     if (idle := len(rounds) - 1 - best) >= asked.patience:
         return f"it ended after {idle} rounds that brought no improvement"

@@ -119,14 +119,14 @@ class RoundPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class ActiveLearning:
-    """Training data that grow by what the whole is worst at, round by round.
+    """Active learning: training data that grow by what the whole is worst at, round by round.
 
     Args:
         outputs: Outputs that are looked at; the one with the largest error counts.
         within: Root mean square error in their unit that a sequence should stay under.
         additions: How many sequences each round adds, for as many rounds as there are at most.
-        until: Share of the sequences within the limit at which no further round is begun.
-        patience: Rounds without an improvement after which no further one is begun.
+        until: Share of the sequences within the limit at which there is no further round.
+        patience: Rounds without an improvement after which there is no further one.
         pick: Which sequences are added: those with the largest errors (``worst``), or those that come next in the pool
             (``next``), to see beside it whether looking for the worst pays.
         rounds: Rounds of training end to end that each round goes through, with all that has been added.

@@ -166,7 +166,7 @@ class TrainedRound:
     """A round that was trained.
 
     Args:
-        name: What it is called: ``2``, or ``2.1 of growth``.
+        name: What it is called: ``2``, or ``2.1 of active learning``.
         trained: Outputs of the members that it trained, each in its first instance.
         shared: Whether it trained them in all of their instances.
         measured: Outputs that were as measured.

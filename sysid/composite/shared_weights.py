@@ -1,7 +1,7 @@
 """Weight sharing over instances: one set of weights, trained end to end on traces of every instance in turn.
 
-Each place of a line has the same valve behind another pressure. Trained in one place only, its members would learn
-that place; trained in each for itself, there would be as many valves as places. Here the members run in their first
+Every instance of a valve sees another pressure. Trained in one only, its members would learn
+that one; trained in each for itself, there would be as many valves as instances. Here the members run in their first
 instance's names, trace after trace, each as one instance sees it: what comes from elsewhere is as measured there, or as
 the whole puts it out. That is not trained and does not answer: where it reads the members in turn, it reads them as
 they stood.

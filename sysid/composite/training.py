@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 
-from sysid.composite.active_learning import GROWN, Growth, Make, Round, grow
+from sysid.composite.active_learning import LEARNED, ActiveLearned, Make, Round, learn_actively
 from sysid.composite.candidates import Candidates, Given, fit_candidates
 from sysid.composite.composite import Composite
 from sysid.composite.fixed_members import with_fixed
@@ -151,7 +151,7 @@ class TrainedComposite:
         candidates: The members' candidates; ``None`` where the whole was begun from another one.
         retrained: Members that were trained again.
         rounds: The rounds of training end to end, those of active learning among them.
-        growth: What active learning brought; ``None`` without it.
+        active_learning: What active learning brought; ``None`` without it.
         limits: What is declared of limits, beside all that was fitted.
     """
 
@@ -160,7 +160,7 @@ class TrainedComposite:
     candidates: Candidates | None = None
     retrained: tuple[Retrained, ...] = ()
     rounds: tuple[TrainedRound, ...] = ()
-    growth: Growth | None = None
+    active_learning: ActiveLearned | None = None
     limits: LimitCheck
 
     @property
@@ -180,8 +180,8 @@ class TrainedComposite:
         unstable = [one for one in self.rounds if one.fit.status is Status.UNSTABLE]
         said = [one.fit.status.value if alone else f"Round {one.name}: {one.fit.status.value}" for one in unstable]
         choice = [] if self.candidates is None or self.candidates.choice is None else [self.candidates.sentence]
-        growth = [] if self.growth is None else [self.growth.sentence]
-        return [*choice, *(one.sentence for one in self.retrained), *said, *growth]
+        learned = [] if self.active_learning is None else [self.active_learning.sentence]
+        return [*choice, *(one.sentence for one in self.retrained), *said, *learned]
 
 
 def train(
@@ -237,7 +237,7 @@ def train(
         candidates=training.candidates[0] if training.candidates else None,
         retrained=tuple(training.retrained),
         rounds=tuple(training.rounds),
-        growth=training.growth[0] if training.growth else None,
+        active_learning=training.active_learning[0] if training.active_learning else None,
         limits=check_limits(composite, [*seen.estimation, *chain.from_iterable(one for one, _ in seen.also.values())]),
     )
 
@@ -254,7 +254,7 @@ class _Training:
     candidates: list[Candidates] = field(default_factory=list)
     retrained: list[Retrained] = field(default_factory=list)
     rounds: list[TrainedRound] = field(default_factory=list)
-    growth: list[Growth] = field(default_factory=list)
+    active_learning: list[ActiveLearned] = field(default_factory=list)
 
     def run(self, begin: Cascade | None, given: Given | None) -> None:
         """Go through all stages."""
@@ -338,27 +338,28 @@ class _Training:
                     replace(one, traces=None),  # what was added is never cut off
                     now,
                     traces,
-                    name=f"grown-{number}{suffix.replace('.', '-')}",
-                    title=f"Growing, round {number}{suffix}, on {len(traces)} traces",
-                    called=f"{number}{suffix} of growth",
+                    name=f"active-learning-{number}{suffix.replace('.', '-')}",
+                    title=f"Active learning, round {number}{suffix}, on {len(traces)} traces",
+                    called=f"{number}{suffix} of active learning",
                     # By the others alone, a round that has learnt what the pool has of rare things is not taken.
                     chosen_by=held_out,
                 )
                 took += seconds
-            self.stages[f"{GROWN}, round {number}"] = now
+            self.stages[f"{LEARNED}, round {number}"] = now
             return now, took
 
-        grown = grow(
+        learned = learn_actively(
             asked, whole, learn, begins=list(self.stages)[-1], estimation=self._estimation(last)[: last.traces],
             pool=pool, held_out=held_out, report=self._looked,
             score=lambda one: whole_score(one, self.data.choosing, self.plan.outputs),
         )  # fmt: skip
-        self.growth.append(grown)
+        self.active_learning.append(learned)
 
     def _looked(self, done: Round) -> None:
         """Tell what the sequences that train nothing say after a round of active learning."""
-        title = f"Looking at sequences that train nothing, after round {done.number} of growth"
-        detail = f"{100.0 * done.look.within:.3g} % within, 99 % under {done.look.rare:.3g}, {done.samples} samples"
+        title = f"Assessing sequences that train nothing, after round {done.number} of active learning"
+        now = done.assessment
+        detail = f"{100.0 * now.within:.3g} % within, 99 % under {now.rare:.3g}, {done.samples} samples"
         self.keeper.say(title)
         self.keeper.say(title, detail, done=True)
 

@@ -1,4 +1,4 @@
-"""What became of every start of a fit, at every look: how much of a result is the choice, and how much is luck."""
+"""Every start of a fit at every checkpoint: how much of a result is the choice, and how much is luck."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ class FitResult:
         evidence: From Bayesian regularisation, where it was used.
         uncertainty: Of the parameters, where the estimator knows it.
         posterior: Of a network's parameters, where there is one; stored beside the JSON values, as arrays.
-        attempts: Every start at every look, where several were raced.
+        attempts: Every start at every checkpoint, where there were several.
         stability: What a check of the free run over random sequences found, as JSON values; ``None`` where there was
             none (see :mod:`sysid.estimation.stability.free_run`).
         notes: Sentences worth knowing: choices made, stability.

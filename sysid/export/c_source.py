@@ -10,8 +10,8 @@ import numpy as np
 
 import sysid
 from sysid.export.flags import MEANING
+from sysid.export.incremental_form import IncrementalForm
 from sysid.export.layout import SpaceState
-from sysid.export.rates import RateForm
 from sysid.export.space import SpaceCell
 from sysid.export.stage import Level, Side, Stage
 from sysid.export.surrogate import Surrogate
@@ -110,7 +110,7 @@ def _side(surrogate: Surrogate, side: Side) -> dict[str, Any]:
 
 def _lagged(stage: Stage) -> dict[str, Any]:
     cell, layout = stage.lagged
-    form = RateForm.of(cell)
+    form = IncrementalForm.of(cell)
     late = [source > stage.targets[-1] for source in stage.sources]
     used = [
         not later and (bool(line.length) or 0 in own)

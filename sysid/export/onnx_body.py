@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from sysid.export.cell import Cell
+from sysid.export.incremental_form import IncrementalForm
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.onnx_space import space_step, within_bound
 from sysid.export.onnx_step import added
-from sysid.export.rates import RateForm
 from sysid.export.stage import Side, Stage
 
 
@@ -58,7 +58,9 @@ def merges_limits(stage: Stage) -> bool:
     return values.get(False, -np.inf) <= values.get(True, np.inf)
 
 
-def lagged_body(outer: Nodes, stage: Stage, form: RateForm, carried: Sequence[str], scanned: Sequence[str]) -> Body:
+def lagged_body(
+    outer: Nodes, stage: Stage, form: IncrementalForm, carried: Sequence[str], scanned: Sequence[str]
+) -> Body:
     """The body for a model over lagged regressors.
 
     Args:
@@ -111,7 +113,7 @@ def _sizes(cell: Cell, layout: StateLayout) -> dict[str, int]:
     }
 
 
-def _network(nodes: Nodes, cell: Cell, form: RateForm, z: str, *, keeps: bool) -> str:
+def _network(nodes: Nodes, cell: Cell, form: IncrementalForm, z: str, *, keeps: bool) -> str:
     """The network's sums; the remainder, last among the regressors, is added by a weight of one."""
     n = cell.n_outputs
     pad = 0 if form.inputs else 1  # the loop needs a row to run over

@@ -20,6 +20,7 @@ from onnx import helper, numpy_helper
 
 from sysid.export.cell import Cell
 from sysid.export.flags import Flag
+from sysid.export.incremental_form import IncrementalForm, Term
 from sysid.export.layout import DelayLine
 from sysid.export.onnx_blocks import in_blocks
 from sysid.export.onnx_body import Body, clip_range, lagged_body, limit_name, scanned_limits, space_body
@@ -35,7 +36,6 @@ from sysid.export.onnx_step import (
     step_nodes,
     within_a_body,
 )
-from sysid.export.rates import RateForm, Term
 from sysid.export.space import SpaceCell
 from sysid.export.stage import Stage
 from sysid.export.surrogate import Surrogate
@@ -112,7 +112,7 @@ class _Sequence:
 
     def _lagged(self) -> tuple[list[str], str]:
         nodes, (cell, layout) = self.nodes, self.stage.lagged
-        form = RateForm.of(cell, blocks=True)
+        form = IncrementalForm.of(cell, blocks=True)
         scaled = [self._scaled(self.known[source], i, f"u{i}") for i, source in enumerate(self.stage.sources)]
         histories = [self._with_past(name, line) for name, line in zip(scaled, layout.inputs, strict=True)]
         scanned = {"x": self._terms(form.inputs, histories, layout.inputs)}

@@ -11,10 +11,10 @@ from numpy.typing import DTypeLike
 
 from sysid.export.cell import Cell
 from sysid.export.flags import MEANING, Flag
+from sysid.export.incremental_form import IncrementalForm
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.onnx_space import space_step, within_bound
-from sysid.export.rates import RateForm
 from sysid.export.space import SpaceCell
 from sysid.export.stage import Port, Side, Stage
 from sysid.export.surrogate import Surrogate
@@ -167,7 +167,7 @@ class _Draft:
 
 def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str | None) -> _Draft:
     cell, layout = stage.lagged
-    form = RateForm.of(cell)
+    form = IncrementalForm.of(cell)
     scaled = scaled_inputs(nodes, inputs, cell)
     known = nodes.add("Concat", [scaled, state], "inputs_and_state", axis=1)
     terms, order = _terms(nodes, layout, form, known)
@@ -194,7 +194,7 @@ def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str |
     return _Draft(scaled=clipped(nodes, output, stage), following=following, remainder=lost)
 
 
-def _terms(nodes: Nodes, layout: StateLayout, form: RateForm, known: str) -> tuple[str, list[int]]:
+def _terms(nodes: Nodes, layout: StateLayout, form: IncrementalForm, known: str) -> tuple[str, list[int]]:
     """Levels, then rates, of ``[scaled inputs | state]``, and the place of each in the form."""
     terms = (*form.inputs, *form.outputs)
     levels = [i for i, term in enumerate(terms) if term.older is None]

@@ -1,13 +1,13 @@
-"""Line: one system stretched over many places, modelled at a few of them and interpolated to the others.
+"""Interpolation over positions: one system along a line, modelled at a few positions and interpolated to the others.
 
 Along a pipe, a rod or a road a field is smooth between its ends, and what hangs on it is the same everywhere. So the
 field is modelled at a few knots only, by a cascade that runs once; between the knots it is interpolated; and the same
-models stand at every place, all of them run side by side. A place at which nothing was fitted costs no more than one at
-which all was.
+models stand at every position, all of them run side by side. A position at which nothing was fitted costs no more
+than one at which all was.
 
 The field is interpolated by the cubic spline through the knots (not-a-knot ends), which is linear in the values: a
-place is a row of fixed weights. Limits: no faster change along the line than the knots resolve (a front that takes many
-samples from one knot to the next is smeared for that long), and no place beyond the outer knots.
+position is a row of fixed weights. Limits: no faster change along the line than the knots resolve (a front that takes
+many samples from one knot to the next is smeared for that long), and no position beyond the outer knots.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from sysid.traces import Trace
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Line:
-    """A cascade at knots along a line, and another at every place.
+    """A cascade at knots along a line, and another at every position.
 
     Args:
         along: The cascade that writes the field at the knots; it runs once.
         knots: Position of each knot, increasing, by the channel that is the field there.
-        at_place: The cascade that stands at every place. It reads :attr:`channel`, and may read inputs of ``along``.
+        at_place: The cascade that stands at every position. It reads :attr:`channel`, and may read inputs of ``along``.
         channel: Name under which it reads the field.
 
     Raises:
@@ -80,7 +80,7 @@ class Line:
         readable = (self.channel, *self.along.inputs)
         strangers = [name for name in self.at_place.inputs if name not in readable]
         if strangers:
-            raise ChannelError(strangers, readable, where="inputs at a place of the line")
+            raise ChannelError(strangers, readable, where="inputs at a position of the line")
         if not np.isclose(self.along.sample_time, self.at_place.sample_time, rtol=1e-9, atol=0.0):
             raise ConfigError(
                 "the cascades of the line have different sample times",
@@ -95,7 +95,7 @@ class Line:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """What is had at every place: the field, and what the cascade there writes."""
+        """What is had at every position: the field, and what the cascade there writes."""
         return (self.channel, *self.at_place.outputs)
 
     @property
@@ -105,7 +105,7 @@ class Line:
 
     @property
     def n_parameters(self) -> int:
-        """Parameters of both cascades; the same for any number of places."""
+        """Parameters of both cascades; the same for any number of positions."""
         return self.along.n_parameters + self.at_place.n_parameters
 
     @cached_property
@@ -113,10 +113,10 @@ class Line:
         return CubicSpline(list(self.knots.values()), np.eye(len(self.knots)))
 
     def weights(self, positions: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
-        """What each knot says of the field at some places.
+        """What each knot says of the field at some positions.
 
         Args:
-            positions: The places.
+            positions: Where along the line.
 
         Returns:
             Shape ``(n_places, n_knots)``; a row adds up to 1.
@@ -124,37 +124,37 @@ class Line:
         Raises:
             ConfigError: If there is none, or one lies beyond the outer knots.
         """
-        places = np.atleast_1d(np.asarray(positions, dtype=np.float64))
+        at = np.atleast_1d(np.asarray(positions, dtype=np.float64))
         first, *_, last = self.knots.values()
-        beyond = ~((places >= first) & (places <= last))
-        if not len(places) or beyond.any():
+        beyond = ~((at >= first) & (at <= last))
+        if not len(at) or beyond.any():
             raise ConfigError(
-                "no such place on the line",
+                "no such position on the line",
                 where="positions",
-                expected=f"places between {first:g} and {last:g}, where the outer knots are",
-                got=", ".join(f"{place:g}" for place in places[beyond]) or "none",
-                remedy="leave these places out: what is fitted between the knots says nothing of what is beyond them",
+                expected=f"positions between {first:g} and {last:g}, where the outer knots are",
+                got=", ".join(f"{one:g}" for one in at[beyond]) or "none",
+                remedy="leave these out: what is fitted between the knots says nothing of what is beyond them",
             )
-        found: NDArray[np.float64] = self._spline(places)
+        found: NDArray[np.float64] = self._spline(at)
         return found
 
     def simulate(
         self, inputs: NDArray[np.float64], positions: Sequence[float] | NDArray[np.float64], *, workers: int = 2
     ) -> CascadeRun:
-        """Free run of every place, from the inputs of the whole alone.
+        """Free run of every position, from the inputs of the whole alone.
 
         Args:
             inputs: Shape ``(n_samples, n_inputs)``, in the order of :attr:`inputs` and in their units.
-            positions: The places.
+            positions: Where along the line.
             workers: Threads.
 
         Returns:
-            One run whose arrays have a first axis of places; its channels are the inputs of the cascade at a place
-            (the field among them) and its outputs.
+            One run whose arrays have a first axis of positions; its channels are the inputs of the cascade that
+            stands there (the field among them) and its outputs.
 
         Raises:
             TraceError: If the number of inputs is not that of the line.
-            ConfigError: If a place is not on the line.
+            ConfigError: If a position is not on the line.
         """
         weights, along = self.weights(positions), self.along.simulate(inputs)
         fields = weights @ np.stack([along[name] for name in self.knots])
@@ -166,11 +166,11 @@ class Line:
     def simulate_trace(
         self, trace: Trace, positions: Sequence[float] | NDArray[np.float64], *, workers: int = 2
     ) -> CascadeRun:
-        """Free run of every place over a trace's inputs; its other channels are not read.
+        """Free run of every position over a trace's inputs; its other channels are not read.
 
         Args:
             trace: The trace.
-            positions: The places.
+            positions: Where along the line.
             workers: Threads.
 
         Returns:

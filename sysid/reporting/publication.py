@@ -32,14 +32,14 @@ LEFT_OUT: Final = ("fit-", "frequency-response", "residuals")
 BUNDLE: Final = "bundle"
 """The folder of the frozen surrogate, in a run's folder and beside a page."""
 LINE: Final = "line.json"
-"""The file of a frozen line, every place of it, likewise."""
+"""The file of a frozen line, every position of it, likewise."""
 FROZEN: Final = f"""
 The frozen surrogate lies beside this page, in [{BUNDLE}]({BUNDLE}): what it was exported as, with its card, its range
 and how far each file is from the model. `sysid simulate` runs it.
 """
 FROZEN_LINE: Final = f"""
-The frozen line lies beside this page, in [{LINE}]({LINE}): `sysid simulate` with `--places` and this folder runs every
-place of it in one call.
+The frozen line lies beside this page, in [{LINE}]({LINE}): `sysid simulate` with `--positions` and this folder runs
+every position of it in one call.
 """
 
 

@@ -173,7 +173,7 @@ class FitRecord(Record):
     status: str = Field(description="Name of the status, such as CONVERGED.")
     notes: list[str] = Field(default=[], description="Sentences on choices that were made.")
     evidence: EvidenceRecord | None = None
-    attempts: list[AttemptRecord] = Field(default=[], description="Every start at every look.")
+    attempts: list[AttemptRecord] = Field(default=[], description="Every start at every checkpoint.")
     stability: StabilityRecord | None = Field(default=None, description="Of the free run over random sequences.")
     n_parameters: int | None = Field(default=None, description="Fitted parameters; null where not counted.")
     selection_mse: Number = Field(default=math.nan, description="Free-run mse on the traces that chose between fits.")

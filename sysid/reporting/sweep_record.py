@@ -40,7 +40,7 @@ class Trial(Record):
     status: str = Field(description="Name of the fit's status, or FAILED.")
     usable: bool = Field(description="Whether it may be chosen.")
     reason: str = Field(default="", description="Why it failed.")
-    dropped_at: int | None = Field(default=None, description="Look after which it was dropped, from 1 on.")
+    dropped_at: int | None = Field(default=None, description="Rung after which it was dropped, from 1 on.")
     iterations: int = Field(default=0, description="Of all of its training.")
     seconds: Number = Field(default=math.nan, description="Wall time of all of its training.")
     cpu_s: Number = Field(default=math.nan, description="Processor time of all of its training and scoring.")
@@ -153,7 +153,9 @@ class SweepRecord(Record):
     reproduces: str | None = Field(default=None, description="What it repeats, where it does.")
     published: str | None = Field(default=None, description="Reference table to set beside it.")
     warm_start: str = Field(default="none", description="Where networks begin: none, linear, or from smaller ones.")
-    rungs: list[dict[str, Any]] = Field(default=[], description="Looks at which trials were dropped.")
+    rungs: list[dict[str, Any]] = Field(
+        default=[], description="Rungs of successive halving, at which trials were dropped."
+    )
     workers: int = Field(description="Processes that worked on it.")
     wall_s: Number = Field(description="Seconds from the first trial to the last, of all sessions together.")
     winner: int | None = Field(default=None, description="Number of the trial that was chosen.")

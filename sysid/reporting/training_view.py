@@ -56,8 +56,8 @@ def training_parts(results: Results) -> list[Part]:
     for fit in results.fits:
         if len({attempt.start for attempt in fit.attempts}) > 1:
             caption = (
-                f"{fit.name}: every start at every look. Left: how much of the error on unseen traces the error on the "
-                "estimation traces tells. Right: how much of it the evidence tells."
+                f"{fit.name}: every start at every checkpoint. Left: how much of the error on unseen traces the error "
+                "on the estimation traces tells. Right: how much of it the evidence tells."
             )
             name = f"attempts-{identifier(fit.slug)}"
             parts += [picture(attempts_figure(fit), f"Starts of {fit.name}", caption, name), attempts_table(fit)]
@@ -184,7 +184,7 @@ def _mark(attempt: AttemptRecord) -> str:
 
 
 def attempts_figure(fit: FitRecord) -> Figure:
-    """Estimation error and evidence of every start at every look against its error on the traces that choose.
+    """Estimation error and evidence of every start at every checkpoint against its error on the traces that choose.
 
     Args:
         fit: A fit with attempts; without selection traces the evidence stands against the estimation error alone.
@@ -215,7 +215,7 @@ def _scatter(axes: Axes, fit: FitRecord, across: list[float], up: list[float]) -
     shown = np.isfinite(x) & np.isfinite(y)
     chosen = np.array([attempt.chosen for attempt in fit.attempts])
     kinds = (
-        (~chosen, MARKERS[0], PALETTE[0], 4.0, "a start at a look"),
+        (~chosen, MARKERS[0], PALETTE[0], 4.0, "a start at a checkpoint"),
         (chosen, MARKERS[3], PALETTE[1], 8.0, "chosen"),
     )
     for mask, marker, colour, size, label in kinds:

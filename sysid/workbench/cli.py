@@ -252,17 +252,25 @@ def simulate(
     initial: Annotated[
         float | None, typer.Option(help="Output before the first sample; its declared level by default.")
     ] = None,
-    places: Annotated[
+    positions: Annotated[
         str | None,
-        typer.Option(help="Places of a line, as 1:50; BUNDLE is then the folder of its run, or of its published page."),
+        typer.Option(
+            help="Positions along a line, as 1:50; BUNDLE is then the folder of its run, or of its published page."
+        ),
     ] = None,
+    old_positions: Annotated[str | None, typer.Option("--places", hidden=True)] = None,
 ) -> None:
     """Run an exported model or cascade on a file of inputs or a command, fed with nothing but its own past."""
-    if places is not None:
+    if old_positions is not None:
+        from sysid.workbench.old_words import tell_old_word
+
+        tell_old_word("--places", "--positions")
+        positions = positions or old_positions
+    if positions is not None:
         from sysid.workbench.commands.simulate_line import simulate_line_command
 
         simulate_line_command(
-            bundle, command, places, out, time_unit=time_unit, unit=unit, plot=plot, inputs=inputs, initial=initial
+            bundle, command, positions, out, time_unit=time_unit, unit=unit, plot=plot, inputs=inputs, initial=initial
         )
         return
     from sysid.workbench.commands.simulate import simulate_command

@@ -17,7 +17,7 @@ from sysid.estimation.estimators import ESTIMATORS, Estimator, estimator_of
 from sysid.export.exporters import EXPORTERS
 from sysid.models import AbstractStructure, Mapping, Start, StartKind, structure_from_dict
 from sysid.models.lags import LagSpec, parse_lags
-from sysid.workbench.old_words import JOINT_TRAINING, STRICT, TRAINING, Words, with_new_words
+from sysid.workbench.old_words import JOINT_TRAINING, STRICT, TRAINING, TRAINING_VALUES, Words, with_new_words
 from sysid.yaml_files import FieldError
 
 STRUCTURES: dict[str, type[AbstractStructure]] = {kind: row.structure for kind, row in ESTIMATORS.items()}
@@ -239,7 +239,7 @@ if TYPE_CHECKING:
 else:
 
     class _TrainingWords(Words):
-        OLD = TRAINING
+        OLD, OLD_VALUES = TRAINING, TRAINING_VALUES
 
     class _JointWords(Words):
         OLD = JOINT_TRAINING

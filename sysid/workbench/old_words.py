@@ -24,6 +24,9 @@ TRAINING = {
 }
 """Options of a network's training."""
 
+TRAINING_VALUES = {"basis": {"levels and rates": "incremental"}}
+"""Values of a network's training that are words."""
+
 JOINT_TRAINING = {"looks": "checkpoints", "soft_margin": "robust_scale"}
 """Options of training several models as one."""
 
@@ -50,10 +53,13 @@ class Words(BaseModel):
     OLD: ClassVar[Mapping[str, str]] = {}
     """New name of each old one."""
 
+    OLD_VALUES: ClassVar[Mapping[str, Mapping[str, str]]] = {}
+    """New value of each old one, by the new name of the field."""
+
     @model_validator(mode="before")
     @classmethod
     def _read_old_words(cls, data: Any) -> Any:
-        return with_new_words(data, cls.OLD)
+        return with_new_values(with_new_words(data, cls.OLD), cls.OLD_VALUES)
 
 
 def with_new_words(data: Any, old: Mapping[str, str]) -> Any:
@@ -85,6 +91,42 @@ def with_new_words(data: Any, old: Mapping[str, str]) -> Any:
         )
     for word in old:
         if word in data:
-            text = f"{word} is called {old[word]} now; the next release no longer reads the old word"
-            warnings.warn(text, OldWordWarning, stacklevel=2)
+            tell_old_word(word, old[word])
     return {old.get(key, key) if isinstance(key, str) else key: value for key, value in data.items()}
+
+
+def with_new_values(data: Any, old: Mapping[str, Mapping[str, str]]) -> Any:
+    """The same fields with their new values; each old one is told once, as a warning.
+
+    Args:
+        data: Fields by name; what is no mapping is given back as it is.
+        old: New value of each old one, by field.
+
+    Returns:
+        A mapping with new values alone.
+
+    Example:
+        >>> with_new_values({"basis": "plain"}, {"basis": {"flat": "plain"}})
+        {'basis': 'plain'}
+    """
+    if not isinstance(data, Mapping):
+        return data
+    renamed: dict[str, str] = {}
+    for field, values in old.items():
+        value = data.get(field)
+        if isinstance(value, str) and value in values:
+            tell_old_word(value, values[value])
+            renamed[field] = values[value]
+    return {**data, **renamed} if renamed else data
+
+
+def tell_old_word(old: str, new: str) -> None:
+    """A warning about a word of the release before.
+
+    Args:
+        old: The word.
+        new: What it is called now.
+    """
+    warnings.warn(
+        f"{old} is called {new} now; the next release no longer reads the old word", OldWordWarning, stacklevel=3
+    )

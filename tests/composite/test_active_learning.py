@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid.composite.active_learning import Growth, Look, grow, sequence_errors
+from sysid.composite.active_learning import ActiveLearned, Assessment, learn_actively, sequence_errors
 from sysid.composite.members import assembled
 from sysid.composite.plan import ActiveLearning
 from sysid.models import Cascade
@@ -25,7 +25,8 @@ def truth(whole: Cascade, seed: int) -> Trace:
 
 
 class Trained:
-    """A growth whose whole is right after some rounds and wrong after the others, and what its training was given."""
+    """Active learning whose whole is right after some rounds and wrong after others,
+    and what its training was given."""
 
     def __init__(self, asked: ActiveLearning = ASKED, *, right_after: tuple[int, ...] = (), pool: int = 20) -> None:
         right = assembled(pipe(), models())
@@ -38,7 +39,7 @@ class Trained:
             self.gave.append(replace(right if number in right_after else self.wrong))
             return self.gave[-1], 2.5
 
-        self.found: Growth = grow(
+        self.found: ActiveLearned = learn_actively(
             asked, self.wrong, train, begins="trained end to end", estimation=sequences[:2], pool=self.pool,
             held_out=sequences[4:8], score=lambda one: float(self.gave.index(one)), report=self.told.append,
         )  # fmt: skip
@@ -68,7 +69,11 @@ def test_the_control_adds_what_comes_next_in_the_pool():
 def test_each_round_goes_on_from_the_one_before_and_is_a_stage_of_its_own():
     one = Trained()
     assert [now is before for (now, _, _), before in zip(one.calls, one.gave, strict=False)] == [True, True]
-    assert [each.stage for each in one.found.rounds] == ["trained end to end", "grown, round 1", "grown, round 2"]
+    assert [each.stage for each in one.found.rounds] == [
+        "trained end to end",
+        "active learning, round 1",
+        "active learning, round 2",
+    ]
     assert [each.number for each in one.found.rounds] == [0, 1, 2]
     assert [(each.seconds, each.score) for each in one.found.rounds] == [(0.0, 0.0), (2.5, 1.0), (2.5, 2.0)]
 
@@ -83,7 +88,7 @@ def test_each_round_goes_on_from_the_one_before_and_is_a_stage_of_its_own():
         pytest.param({"additions": (1, 2), "patience": 9}, (), 20, 2, "last round", id="a number for each"),
     ],
 )
-def test_growth_ends_when(asked: dict, right_after: tuple[int, ...], pool: int, rounds: int, why: str) -> None:
+def test_it_ends_when(asked: dict, right_after: tuple[int, ...], pool: int, rounds: int, why: str) -> None:
     one = Trained(replace(ASKED, **asked), right_after=right_after, pool=pool)
     assert len(one.calls) == len(one.found.rounds) - 1 == rounds
     assert why in one.found.ended
@@ -103,7 +108,7 @@ def test_a_callable_makes_the_sequences_that_each_round_adds_from():
         return [replace(each, name=f"{each.name} of {number}") for each in whole.pool[:5]]
 
     whole = Trained()
-    found = grow(
+    found = learn_actively(
         replace(ASKED, additions=(2, 2), patience=9), whole.wrong, lambda now, *_: (now, 0.0), begins="before",
         estimation=[], pool=make, held_out=whole.pool[5:8], score=lambda _: 1.0,
     )  # fmt: skip
@@ -121,8 +126,10 @@ def test_of_an_error_per_sequence_the_largest_output_counts():
 
 
 def test_more_sequences_within_the_limit_are_better_and_else_smaller_rare_errors():
-    few, many = Look(within=0.5, median=0.0, rare=0.0), Look(within=0.6, median=1.0, rare=9.0)
+    few, many = Assessment(within=0.5, median=0.0, rare=0.0), Assessment(within=0.6, median=1.0, rare=9.0)
     assert many.better_than(few)
     assert not few.better_than(many)
-    assert Look(within=0.6, median=1.0, rare=8.0).better_than(many)
-    assert Look.at(np.array([0.0, 1.0, 2.0, 3.0]), limit=1.5) == Look(within=0.5, median=1.5, rare=pytest.approx(2.97))
+    assert Assessment(within=0.6, median=1.0, rare=8.0).better_than(many)
+    assert Assessment.at(np.array([0.0, 1.0, 2.0, 3.0]), limit=1.5) == Assessment(
+        within=0.5, median=1.5, rare=pytest.approx(2.97)
+    )

@@ -77,17 +77,17 @@ def test_every_stage_goes_on_from_the_one_before_and_the_best_is_chosen():
     found = train(tanks(), PLAN, data(), keeper=shelf)
     assert list(found.stages) == [
         "each alone, one step ahead", "each alone", "chosen together", "retrained", "trained end to end",
-        "grown, round 1",
+        "active learning, round 1",
     ]  # fmt: skip
     assert shelf.made == [
         "pump+lower -> upper 0", "pump+lower -> upper 0 one step", "pump+lower -> upper 1",
         "pump+lower -> upper 1 one step", "upper -> lower 0", "upper -> lower 0 one step",
-        "upper -> lower retrained 0", "together", "grown-1",
+        "upper -> lower retrained 0", "together", "active-learning-1",
     ]  # fmt: skip
-    assert [one.name for one in found.rounds] == ["1", "1 of growth"]
+    assert [one.name for one in found.rounds] == ["1", "1 of active learning"]
     assert [one.traces for one in found.rounds] == [2, 3]
-    assert found.growth is not None
-    assert found.growth.rounds[1].added[0] in {"tank 10", "tank 11"}
+    assert found.active_learning is not None
+    assert found.active_learning.rounds[1].added[0] in {"tank 10", "tank 11"}
     assert found.selection[found.chosen] == min(found.selection.values())
     assert found.model is found.stages[found.chosen]
     choosing = [tank_trace(2), tank_trace(5)]
@@ -101,7 +101,7 @@ def test_every_stage_goes_on_from_the_one_before_and_the_best_is_chosen():
     assert shelf.made == []
     assert again.model.to_dict() == found.model.to_dict()
     train(tanks(), replace(PLAN, rounds=(replace(ROUND, targets={"lower": 0.1}),)), data(), keeper=shelf)
-    assert shelf.made == ["together", "grown-1"], "what comes before a changed round is found again"
+    assert shelf.made == ["together", "active-learning-1"], "what comes before a changed round is found again"
 
 
 def test_a_whole_goes_on_from_a_trained_one():

@@ -13,7 +13,7 @@ from sysid.errors import ConfigError
 from sysid.export import EXPORTERS
 from sysid.export.cell import Cell
 from sysid.export.compiler import CompilerError, build_library
-from sysid.export.rates import RateForm
+from sysid.export.incremental_form import IncrementalForm
 from sysid.models import NARX
 
 STRICT = ["-O2", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror"]
@@ -191,7 +191,7 @@ def test_parameters_are_written_to_the_last_bit(sources):
     text = (folder / f"{surrogate.identifier}.c").read_text()
     written = {float(number) for number in re.findall(r"R\(([^)]+)\)", text) if number[0] in "-0123456789"}
     cell = Cell.of(surrogate.stages[0].model)
-    form = RateForm.of(cell)
+    form = IncrementalForm.of(cell)
     numbers = (form.hidden_weights, form.linear, cell.hidden_bias, cell.readout, cell.constant)
     assert {float(number) for part in numbers for number in part.ravel()} <= written
 

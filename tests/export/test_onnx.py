@@ -94,7 +94,7 @@ def test_float32_holds_a_slow_model(*, name, rows, opened, inputs, tmp_path):
 
 
 def test_float32_as_the_model_stands_would_not(inputs):
-    """Why files are written in levels and rates: the same recursion with its weights rounded."""
+    """Why files are written in incremental (delta) form: the same recursion with its weights rounded."""
     model = slow()
     u = inputs(8000, 2).astype(np.float32).astype(np.float64)
     rounded = replace(model, coefficients=model.coefficients.astype(np.float32).astype(np.float64))

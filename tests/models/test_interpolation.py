@@ -1,4 +1,4 @@
-"""Lines: a field modelled at knots, interpolated between them, and the same cascade at every place."""
+"""Lines: a field modelled at knots, interpolated between them, and the same cascade at every position."""
 
 from __future__ import annotations
 
@@ -42,34 +42,34 @@ def handle(n: int = 200) -> np.ndarray:
 
 def test_at_a_knot_the_line_is_what_its_cascades_are():
     run, alone = line().simulate(handle(), list(KNOTS.values())), along().simulate(handle())
-    for place, name in enumerate(KNOTS):
-        assert_allclose(run["BP"][place], alone[name], atol=1e-10)
-        assert_allclose(run["BC"][place], valve().simulate(alone[name][:, None])["BC"], atol=1e-9)
+    for position, name in enumerate(KNOTS):
+        assert_allclose(run["BP"][position], alone[name], atol=1e-10)
+        assert_allclose(run["BC"][position], valve().simulate(alone[name][:, None])["BC"], atol=1e-9)
 
 
 def test_between_knots_the_field_is_the_cubic_spline_through_them():
-    places, alone = [3.0, 17.5, 49.0], along().simulate(handle())
+    positions, alone = [3.0, 17.5, 49.0], along().simulate(handle())
     spline = CubicSpline(list(KNOTS.values()), np.stack([alone[name] for name in KNOTS]))
-    run = line().simulate(handle(), places)
-    assert_allclose(run["BP"], spline(places), atol=1e-10)
+    run = line().simulate(handle(), positions)
+    assert_allclose(run["BP"], spline(positions), atol=1e-10)
     assert_allclose(run["BC"][1], valve().simulate(spline(17.5)[:, None])["BC"], atol=1e-9)
 
 
 def test_a_straight_field_is_kept_straight_and_rows_of_weights_add_up_to_one():
-    places = np.linspace(1.0, 50.0, 99)
-    weights = line().weights(places)
+    positions = np.linspace(1.0, 50.0, 99)
+    weights = line().weights(positions)
     assert_allclose(weights.sum(axis=1), 1.0, atol=1e-12)
-    assert_allclose(weights @ np.array(list(KNOTS.values())), places, atol=1e-12)
+    assert_allclose(weights @ np.array(list(KNOTS.values())), positions, atol=1e-12)
 
 
-def test_many_places_run_in_lockstep_as_few_do_alone():
-    places = np.linspace(1.0, 50.0, 40)
-    many = line().simulate(handle(), places, workers=1)
+def test_many_positions_run_in_lockstep_as_few_do_alone():
+    positions = np.linspace(1.0, 50.0, 40)
+    many = line().simulate(handle(), positions, workers=1)
     for i in (0, 13, 39):
-        assert_allclose(many["BC"][i], line().simulate(handle(), [places[i]])["BC"][0], atol=1e-9)
+        assert_allclose(many["BC"][i], line().simulate(handle(), [positions[i]])["BC"][0], atol=1e-9)
 
 
-def test_what_stands_at_a_place_may_read_an_input_of_the_whole():
+def test_what_stands_at_a_position_may_read_an_input_of_the_whole():
     reads = Line(along=along(), knots=KNOTS, at_place=valve("BP+STP -> AR"), channel="BP")
     alone = along().simulate(handle())
     expected = valve("BP+STP -> AR").simulate(np.column_stack([alone["BP25"], handle()]))
@@ -93,10 +93,10 @@ def test_it_is_stored_and_read_again():
         Line.from_dict(along().to_dict())
 
 
-@pytest.mark.parametrize("places", [[0.0], [51.0], [np.nan], [], [5.0, 60.0]], ids=str)
-def test_no_place_beyond_the_outer_knots(places):
-    with pytest.raises(ConfigError, match="no such place"):
-        line().simulate(handle(), places)
+@pytest.mark.parametrize("positions", [[0.0], [51.0], [np.nan], [], [5.0, 60.0]], ids=str)
+def test_no_position_beyond_the_outer_knots(positions):
+    with pytest.raises(ConfigError, match="no such position"):
+        line().simulate(handle(), positions)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,9 @@ def test_no_place_beyond_the_outer_knots(places):
         pytest.param({"knots": {"BP": 1.0}}, ConfigError, "no line", id="one knot"),
         pytest.param({"knots": {"BP": 2.0, "BP10": 1.0}}, ConfigError, "no line", id="knots out of order"),
         pytest.param({"knots": {"BP": 1.0, "BP11": 2.0}}, ChannelError, "knots", id="a knot that nobody writes"),
-        pytest.param({"channel": "PIPE"}, ChannelError, "inputs at a place", id="a place that reads something else"),
+        pytest.param(
+            {"channel": "PIPE"}, ChannelError, "inputs at a position", id="a position that reads something else"
+        ),
     ],
 )
 def test_a_line_that_cannot_be_is_refused(changes, error, match):

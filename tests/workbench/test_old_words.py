@@ -29,6 +29,11 @@ def test_an_old_word_is_read_and_told(model: type, old: str, new: str, value: ob
     assert getattr(read, new) == value
 
 
+def test_an_old_value_is_read_and_told() -> None:
+    with pytest.warns(OldWordWarning, match="levels and rates is called incremental now"):
+        assert check(TrainingConfig, {"basis": "levels and rates"}, where="text").basis == "incremental"
+
+
 def test_every_part_of_an_assembly_has_its_new_word() -> None:
     with pytest.warns(OldWordWarning):
         assert with_new_words(dict.fromkeys(ASSEMBLY), ASSEMBLY) == dict.fromkeys(ASSEMBLY.values())

@@ -1,4 +1,4 @@
-"""``sysid simulate RUN --command FILE --places 1:50``: every place of a line in one file."""
+"""``sysid simulate RUN --command FILE --positions 1:50``: every position of a line in one file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sysid.units import Reference
 from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.assembly.runner import read_line
 from sysid.workbench.cli import app
-from sysid.workbench.commands.simulate_line import parse_places, simulate_line_command
+from sysid.workbench.commands.simulate_line import parse_positions, simulate_line_command
 from tests.models.test_interpolation import line
 
 HANDLE = Channel(name="STP", unit="psi", reference=Reference.GAUGE)
@@ -37,20 +37,23 @@ def run_folder(tmp_path: Path) -> Path:
     return folder
 
 
-def test_every_place_is_written_and_some_are_drawn(run_folder: Path, tmp_path: Path) -> None:
+def test_every_position_is_written_and_some_are_drawn(run_folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "train.csv"
-    words = ["simulate", str(run_folder), "--command", str(tmp_path / "command.json"), "--places", "1:49:4,50"]
+    words = ["simulate", str(run_folder), "--command", str(tmp_path / "command.json"), "--positions", "1:49:4,50"]
     done = CliRunner().invoke(app, [*words, "--out", str(out)], catch_exceptions=False)
     assert done.exit_code == 0
-    assert "100 samples of BC at 14 places" in done.output.replace("\n", " ")
+    assert "100 samples of BC at 14 positions" in done.output.replace("\n", " ")
     assert (tmp_path / "train.png").stat().st_size > 1000
-    places = [*range(1, 50, 4), 50]
-    channels = (HANDLE, *(Channel(name=f"BC{place}", unit="psi", reference=Reference.GAUGE) for place in places))
+    positions = [*range(1, 50, 4), 50]
+    channels = (
+        HANDLE,
+        *(Channel(name=f"BC{position}", unit="psi", reference=Reference.GAUGE) for position in positions),
+    )
     written = read_trace(out, channels=channels, sample_time=0.1)
     handle = np.repeat([90.0, 80.0, 90.0], [20, 40, 40])
     assert_allclose(written["STP"], handle)
-    expected = line().simulate(handle[:, None], [float(place) for place in places])["BC"]
-    assert_allclose(written.columns([f"BC{place}" for place in places]).T, expected, atol=1e-6)
+    expected = line().simulate(handle[:, None], [float(position) for position in positions])["BC"]
+    assert_allclose(written.columns([f"BC{position}" for position in positions]).T, expected, atol=1e-6)
 
 
 def test_a_command_in_kilopascal_is_converted(run_folder: Path, tmp_path: Path) -> None:
@@ -66,23 +69,23 @@ def test_a_command_in_kilopascal_is_converted(run_folder: Path, tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("text", "places"),
+    ("text", "positions"),
     [
         pytest.param("1:4", [1.0, 2.0, 3.0, 4.0], id="a range"),
         pytest.param("1:10:3", [1.0, 4.0, 7.0, 10.0], id="a range with a step"),
         pytest.param("1, 7.5,50", [1.0, 7.5, 50.0], id="a list"),
-        pytest.param("3:3", [3.0], id="one place"),
+        pytest.param("3:3", [3.0], id="one position"),
         pytest.param("1:2:0.25", [1.0, 1.25, 1.5, 1.75, 2.0], id="between whole numbers"),
     ],
 )
-def test_places_are_read(text, places):
-    assert parse_places(text) == places
+def test_positions_are_read(text, positions):
+    assert parse_positions(text) == positions
 
 
 @pytest.mark.parametrize("text", ["", "1,", "4:1", "1:4:0", "a", "1:2:3:4", "1,1", "1:9999999:0.1", "-1:4", "nan"])
-def test_places_that_cannot_be_meant_are_refused(text):
-    with pytest.raises(ConfigError, match="the places cannot be read"):
-        parse_places(text)
+def test_positions_that_cannot_be_meant_are_refused(text):
+    with pytest.raises(ConfigError, match="the positions cannot be read"):
+        parse_positions(text)
 
 
 def test_a_run_without_a_line_is_refused(tmp_path: Path) -> None:

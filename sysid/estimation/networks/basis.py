@@ -1,4 +1,4 @@
-r"""The basis in which a network is trained: levels and rates instead of neighbouring samples.
+r"""The basis in which a network is trained: the incremental (delta) form in place of neighbouring samples.
 
 Neighbouring samples of a fast-sampled signal are nearly equal, and what drives the next output is often their
 difference, two or three orders of magnitude smaller. In the plain regressors a dependence on a rate takes two large
@@ -58,7 +58,7 @@ class RegressorBasis:
         return cls(matrix=np.eye(lags.n_regressors), centre=np.zeros(lags.n_regressors))
 
     @classmethod
-    def levels_and_rates(cls, lags: Lags, regressors: NDArray[np.float64]) -> RegressorBasis:
+    def incremental(cls, lags: Lags, regressors: NDArray[np.float64]) -> RegressorBasis:
         """Levels and rates, scaled to the training records.
 
         Args:

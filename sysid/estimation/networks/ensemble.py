@@ -50,7 +50,7 @@ from sysid.models import NARXModel
 from sysid.traces import Trace
 
 ELIGIBLE = 40
-"""Candidates that may be voted for, best on the selection traces first."""
+"""Candidates that may be picked, best on the selection traces first."""
 
 WORTH = 0.01
 """Least share by which a pick has to lower the error: neurons that bring less are not worth their run time."""
@@ -117,8 +117,8 @@ def selected(
     """The ensemble of the candidates of a multistart.
 
     Args:
-        multistart: The race; its training says how many picks there are.
-        candidates: Every start at every look.
+        multistart: The multistart; its training says how many picks there are.
+        candidates: Every start at every checkpoint.
         vet: Whether a model's free run is stable; an ensemble must be.
 
     Returns:
@@ -287,7 +287,7 @@ def _first_accepted(
     networks: Mapping[int, NARXModel],
     accept: Callable[[NARXModel], bool],
 ) -> tuple[int | None, set[int]]:
-    """Who is voted for, and the starts that are passed over from now on."""
+    """Who is picked, and the starts that are passed over from now on."""
     barred: set[int] = set()
     for i in ranked:
         if origins[i] in barred:

@@ -1,4 +1,4 @@
-r"""Some starts of a race see only some of the inputs: what an input misleads to, those that lack it do not learn.
+r"""Some starts see only some of the inputs: what an input misleads to, those that lack it do not learn.
 
 An input may explain the estimation record for a reason that holds there alone. The record does not tell which inputs
 these are, and the evidence prunes only what explains nothing. Starts that differ in what they see differ where it
@@ -8,7 +8,7 @@ constructing decision forests", there for trees).
 
 A start that does without an input is a network of the whole structure whose weights for that input are zero and are not
 trained. With :math:`P` from the basis in which it is trained to its plain parameters, and :math:`E` from those to the
-whole structure's, its race trains :math:`\theta' \mapsto E P \theta'`; everything else is as for any start.
+whole structure's, its multistart trains :math:`\theta' \mapsto E P \theta'`; everything else is as for any start.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class View:
     starts: int
 
     def report(self, on_progress: Callable[[FitProgress], None]) -> Callable[[FitProgress], None]:
-        """Whom its race tells: progress counted over the starts of all views.
+        """Whom its multistart tells: progress counted over the starts over all subsets.
 
         Args:
             on_progress: Whom the fit tells.

@@ -41,7 +41,7 @@ class JointTraining:
         tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
         patience: Iterations over which improvement is judged.
         checkpoints: How often the selection traces are looked at on the way; the best state seen is kept.
-        starts: Random starts, for networks that are fitted from nothing; half of them are dropped at each look.
+        starts: Random starts, for networks that are fitted from nothing; half of them are dropped at each checkpoint.
         seed: Seed of the first start; the others count up from it.
         stride: Every so-manieth sample counts in the loss.
         moves: A sample counts as well where a target has moved by more than so many of its errors since the last that
@@ -126,8 +126,8 @@ class CascadeFit:
         seed: Seed of its random start; ``None`` where the fit began with the members as they were.
         evidence: From Bayesian regularisation.
         notes: Sentences worth knowing: which state was chosen among which, and by what.
-        attempts: Every start at every look, and the one that was chosen; its errors are squared, in the errors that
-            count as one.
+        attempts: Every start at every checkpoint, and the one that was chosen; its errors are squared, in the errors
+            that count as one.
     """
 
     model: Cascade
@@ -181,7 +181,7 @@ class CascadeFit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Candidate:
-    """One start as it stood at a look; without a solution, as it was given."""
+    """One start as it stood at a checkpoint; without a solution, as it was given."""
 
     start: int
     seed: int | None
@@ -243,7 +243,7 @@ class Joint:
     on_progress: Callable[[FitProgress], None] = lambda _: None
 
     def fit(self, starts: Sequence[tuple[int | None, NDArray[np.float64]]]) -> CascadeFit:
-        """Train from some starts, dropping half of them at each look.
+        """Train from some starts, dropping half of them at each checkpoint.
 
         Args:
             starts: Seed, or ``None`` for the provider's own cascade, and parameters in the basis.
@@ -256,11 +256,11 @@ class Joint:
         seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
         alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
         interrupted = False
-        for look in range(1, training.checkpoints + 1):
+        for checkpoint in range(1, training.checkpoints + 1):
             reached: list[tuple[int | None, Solution]] = []
             for number, (seed, where) in enumerate(alive):
-                name = f"start {'as given' if seed is None else seed}, look {look}"
-                solution = self._advance(where, look, began, f"{number + 1}/{len(alive)}", name)
+                name = f"start {'as given' if seed is None else seed}, checkpoint {checkpoint}"
+                solution = self._advance(where, checkpoint, began, f"{number + 1}/{len(alive)}", name)
                 if not isinstance(where, Solution) or solution.state is not where.state:
                     seen.append(self._candidate((numbers[seed], seed), solution.theta, solution))
                 reached.append((seed, solution))
@@ -275,19 +275,19 @@ class Joint:
         return self._result(seen, interrupted=interrupted, seconds=time.perf_counter() - began)
 
     def _advance(
-        self, where: Solution | NDArray[np.float64], look: int, began: float, which: str, name: str
+        self, where: Solution | NDArray[np.float64], checkpoint: int, began: float, which: str, name: str
     ) -> Solution:
         provider = RebasedProvider(inner=self.provider, to_plain=self.layout.to_plain)
         keep = checkpoints_of(self.on_progress)
         # The run's own time counts towards its limit by itself; what is left of the whole is without it.
-        engine = self._engine(look, began + keep.spent_s(name), which)
+        engine = self._engine(checkpoint, began + keep.spent_s(name), which)
         if isinstance(where, Solution):
             return keep.resume(name, engine, provider, where.state) if _unfinished(where) else where
         # As for a network alone: the noise is taken to be as large as the start's error.
         beta = 0.5 * provider.n_samples / max(provider.loss(where), np.finfo(np.float64).tiny)
         return keep.minimise(name, engine, provider, where, self.layout.prior(alpha=INITIAL_ALPHA, beta=beta))
 
-    def _engine(self, look: int, began: float, which: str) -> LevenbergMarquardt:
+    def _engine(self, checkpoint: int, began: float, which: str) -> LevenbergMarquardt:
         training = self.training
         start, _, starts = which.partition("/")
 
@@ -306,7 +306,7 @@ class Joint:
             )
 
         limits = Termination(
-            max_iterations=max(1, round(training.max_iterations * look / training.checkpoints)),
+            max_iterations=max(1, round(training.max_iterations * checkpoint / training.checkpoints)),
             max_time_s=max(0.0, training.max_time_s - (time.perf_counter() - began)),
             tolerance=training.tolerance,
             patience=training.patience,
@@ -376,8 +376,8 @@ def _others(seen: Sequence[_Candidate]) -> list[str]:
     for one in seen:
         by_origin.setdefault(one.origin, []).append(f"{one.score:.4g} ({one.iteration})")
     return [
-        f"The other states from {origin}, error on the selection traces (iterations): {', '.join(looks)}."
-        for origin, looks in by_origin.items()
+        f"The other states from {origin}, error on the selection traces (iterations): {', '.join(errors)}."
+        for origin, errors in by_origin.items()
     ]
 
 

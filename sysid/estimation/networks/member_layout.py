@@ -180,7 +180,7 @@ def basis_of(model: Member, layout: MemberLayout, records: Sequence[dict[str, ND
         pairs = zip(part.lags.input_channel, part.lags.input_lag, strict=True)
         rows.append(np.column_stack([z[depth - lag : depth - lag + n, column] for column, lag in pairs]))
     regressors = np.concatenate(rows)
-    return RegressorBasis.levels_and_rates(layout.lags, regressors[:: 1 + len(regressors) // MAX_ROWS])
+    return RegressorBasis.incremental(layout.lags, regressors[:: 1 + len(regressors) // MAX_ROWS])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

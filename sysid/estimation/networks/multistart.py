@@ -1,4 +1,4 @@
-"""Several random starts of one network: raced, halved, and chosen between on traces that train nothing.
+"""Multistart with successive halving: random starts of one network, chosen between on traces that train nothing.
 
 A free-run fit has many local minima. Starts of equal error on the estimation record can differ by orders of magnitude
 on the next one, so that how one chooses matters as much as how one trains. The starts run side by side for a part of
@@ -45,7 +45,7 @@ underdetermined network small."""
 
 
 Network: TypeAlias = NARXModel | NeuralStateSpaceModel
-"""What is raced here."""
+"""What is trained here."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

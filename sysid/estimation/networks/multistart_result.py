@@ -1,4 +1,4 @@
-"""What a race of starts found, as the result of a fit."""
+"""What several starts found, as the result of a fit."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def multistart_status(
     *,
     interrupted: bool,
 ) -> Status:
-    """How a race ended.
+    """How a multistart ended.
 
     Args:
         chosen: The candidate chosen.
         candidates: All of them.
         records: Inputs and history of each record over which the free run must stay within its bounds.
-        interrupted: Whether the race was.
+        interrupted: Whether it was.
 
     Returns:
         The status.
@@ -54,7 +54,7 @@ def multistart_result(
     status: Status,
     seconds: float,
 ) -> FitResult:
-    """What a race found.
+    """What a multistart found.
 
     Args:
         choice: The candidate chosen.

@@ -157,7 +157,7 @@ class _Task(ensemble.Task):
 def _started(
     multistart: starts.Multistart, task: _Task, experiments: Sequence[Experiment]
 ) -> dict[starts.Candidate, _Task]:
-    """Every start at every look with what it minimises; those that do without some inputs race among themselves."""
+    """Every start at every checkpoint with what it minimises; each subset of the inputs is halved by itself."""
     tasks: dict[starts.Candidate, _Task] = {}
     for view in views(multistart.training, task.template.mapping):
         own = replace(
@@ -254,7 +254,7 @@ def _basis(
         u, y = template.recursion.extended(experiment.inputs, experiment.history)
         y[-len(experiment.output) :] = template.scaling.scale_output(experiment.output)
         records.append(lagged(u, y, layout.lags, len(experiment.output)))
-    return RegressorBasis.levels_and_rates(layout.lags, np.concatenate(records))
+    return RegressorBasis.incremental(layout.lags, np.concatenate(records))
 
 
 def _initial_parameters(

@@ -12,7 +12,7 @@ from sysid.estimation.result import Loop
 CHOICES = {
     "choose_by": ("selection", "evidence"),
     "damping": tuple(DAMPINGS),
-    "basis": ("levels and rates", "plain"),
+    "basis": ("incremental", "plain"),
 }
 """Options that are words, and what they may be; the first is a good example."""
 
@@ -49,13 +49,13 @@ class Training:
             repeated exactly; leave it out where that matters.
         tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
         patience: Iterations over which improvement is judged.
-        starts: Random starts; they are raced, and half of them dropped at each of four looks.
+        starts: Random starts; successive halving: half of them dropped at each of four checkpoints.
         seed: Seed of the first start; the others count up from it.
         choose_by: What chooses in the end: ``selection`` (least error on traces that are used for nothing else) or
             ``evidence``.
         workers: Starts that run at the same time.
-        basis: ``levels and rates`` trains on each channel's newest sample and its rates of change, ``plain`` on the
-            lagged samples as they are. The finished model is over lagged samples either way.
+        basis: ``incremental`` (the delta form) trains on each channel's newest sample and its rates of change,
+            ``plain`` on the lagged samples as they are. The finished model is over lagged samples either way.
         offsets: Constant offsets, by channel and in its unit, with each of which the estimation traces are used once
             more; the output among them where it moves with the inputs, as reservoirs that feed each other do. A record
             says little about what its absolute levels do and what their changes do when the two always go together;
@@ -69,8 +69,8 @@ class Training:
         pretraining_iterations: Iterations of the pretraining.
         stride: Every so-manieth sample counts in the loss. Residuals of a free run are correlated over tens of samples:
             a few of them say nearly as much as all, and the price of the normal equations falls with them.
-        ensemble: Picks that unite the candidates of the race into one network whose one-step map is the mean of theirs
-            (``ensemble.py``), selected on the selection traces; 1 for none. Each member adds its neurons.
+        ensemble: Picks that unite candidates of the multistart into one network whose one-step map is the mean of
+            theirs (``ensemble.py``), selected on the selection traces; 1 for none. Each member adds its neurons.
         input_subsets: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs
             and networks that do without each of the sets (``input_subsets.py``), for an ensemble whose members differ
             in what they rely on. All see everything by default.
@@ -85,7 +85,7 @@ class Training:
     seed: int = 0
     choose_by: str = "selection"
     workers: int = 2
-    basis: str = "levels and rates"
+    basis: str = "incremental"
     offsets: tuple[Mapping[str, float], ...] = ()
     regularisation: float | None = None
     damping: str = "marquardt"

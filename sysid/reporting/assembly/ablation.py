@@ -76,9 +76,9 @@ def ablation_table(found: Sequence[AblationRecord]) -> Table:
         for index, part in enumerate(one.comparisons)
     ]
     return plain_table(
-        "The lessons, and whether each held",
+        "Ablation: what each stage is said to bring, and whether it held",
         [
-            ("Lesson", ""), ("Put to the test", ""), ("Before", "mse"), ("After", "mse"), ("Less by", ""),
+            ("Claim", ""), ("Compared", ""), ("Before", "mse"), ("After", "mse"), ("Less by", ""),
             ("Verdict", ""), ("Published", ""),
         ],
         rows,
@@ -96,7 +96,7 @@ def ablation_point(found: Sequence[AblationRecord]) -> tuple[str, str]:
     Returns:
         Keyword and sentence.
     """
-    return "Lessons", " ".join(f"{CLAIMS[one.step].text}: {held(one)}." for one in found)
+    return "Ablation", " ".join(f"{CLAIMS[one.step].text}: {held(one)}." for one in found)
 
 
 def held(one: AblationRecord) -> str:

@@ -117,8 +117,8 @@ def position_chart(found: PositionErrors, output: str) -> Chart:
         lines.append(Line(name="fitted here", x=knots, y=[0.0] * len(knots), how="marks"))
     return Chart(
         title=f"{output} along the line",
-        caption=f"Mean squared error of {output} at every place, from the inputs of the whole alone.",
-        x="place",
+        caption=f"Mean squared error of {output} at every position, from the inputs of the whole alone.",
+        x="position",
         y=f"mean squared error of {output}",
         lines=lines,
     )

@@ -185,12 +185,12 @@ def _position_point(found: InterpolationRecord) -> tuple[str, str]:
         if unseen:
             error, case, position = max(unseen)
             said.append(
-                f"{output} at {one.fitted.count(False)} places that nothing was fitted at is at worst "
-                f"{number(error)} ({case}, place {position:g})"
+                f"{output} at {one.fitted.count(False)} positions that nothing was fitted at is at worst "
+                f"{number(error)} ({case}, position {position:g})"
             )
     slow = max(found.run_time_s, key=lambda case: found.run_time_s[case])
-    said.append(f"all places of {slow} together take {seconds(found.run_time_s[slow])} on two threads")
-    return "Everywhere", f"{'; '.join(said)}."
+    said.append(f"all positions of {slow} together take {seconds(found.run_time_s[slow])} on two threads")
+    return "All positions", f"{'; '.join(said)}."
 
 
 def _sentences(results: AssemblyResults) -> list[str]:

@@ -98,7 +98,7 @@ class MemberRecord(Record):
 class RoundRecord(Record):
     """One round of training the whole end to end."""
 
-    name: str = Field(description="Such as 2, or 2.1 of growth.")
+    name: str = Field(description="Such as 2, or 2.1 of active learning.")
     trained: list[str] = Field(description="Outputs of the members that it trained.")
     all_instances: bool = Field(description="Whether it trained them at all the positions that share their weights.")
     measured: list[str] = Field(description="Outputs that were as measured.")
@@ -308,7 +308,7 @@ class AssemblyResults(RunResults):
                 own = [mse for mse, fitted in zip(errors, one.fitted, strict=True) if not fitted]
                 if own:
                     found[self.whole.stage] |= {
-                        f"{output}/{case}/unseen places/mse": sum(own) / len(own),
-                        f"{output}/{case}/unseen places/worst mse": max(own),
+                        f"{output}/{case}/unseen positions/mse": sum(own) / len(own),
+                        f"{output}/{case}/unseen positions/worst mse": max(own),
                     }
         return found

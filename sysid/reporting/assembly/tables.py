@@ -144,7 +144,8 @@ def active_learning_table(found: ActiveLearningRecord, chosen: str) -> Table:
     return plain_table(
         "How much data bought how much accuracy",
         [
-            ("Round of growth", ""), ("Added", "sequences"), ("Trained on", "traces"), ("Trained on", "samples"),
+            ("Round", "of active learning"), ("Added", "sequences"), ("Trained on", "traces"),
+            ("Trained on", "samples"),
             ("Training", "s"), (f"Under {limit_text(found)}", "% of sequences"), ("Median error", unit),
             ("99 % under", unit), ("Selection", "geometric mean"), *more,
         ],
@@ -240,14 +241,14 @@ def position_table(found: PositionErrors, run_time_s: dict[str, float], output: 
         worst = max(own, default=(None, None))
         rows.append([case, _mean([error for error, _ in own]), *worst, _mean(knots), 1e3 * run_time_s[case]])
     return plain_table(
-        f"{output} at {found.fitted.count(False)} places that nothing was fitted at",
+        f"{output} at {found.fitted.count(False)} positions that nothing was fitted at",
         [
-            ("Case", ""), ("Mean over unseen places", ""), ("Worst unseen place", ""), ("which", "place"),
-            ("Mean over the knots", ""), (f"All {len(found.positions)} places", "ms"),
+            ("Case", ""), ("Mean over unseen positions", ""), ("Worst unseen position", ""), ("which", "position"),
+            ("Mean over the knots", ""), (f"All {len(found.positions)} positions", "ms"),
         ],
         rows,
         note="Mean squared error of the free run from the inputs of the whole alone, in the output's unit squared; "
-        "wall time of one batched run of all places on two threads, after one that is not counted.",
+        "wall time of one batched run of all positions on two threads, after one that is not counted.",
     )  # fmt: skip
 
 

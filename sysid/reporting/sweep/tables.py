@@ -187,7 +187,7 @@ def beside_table(record: SweepRecord) -> Table | None:
 
 
 def cost_table(record: SweepRecord) -> Table:
-    """What the sweep cost: trials, those dropped at each look, wall and processor time.
+    """What the sweep cost: trials, those dropped at each checkpoint, wall and processor time.
 
     Args:
         record: The sweep.
@@ -197,8 +197,8 @@ def cost_table(record: SweepRecord) -> Table:
     """
     trials = record.trials
     rows = [("trials", str(len(trials))), ("points in the ranges", str(record.points))]
-    for look, rung in enumerate(record.rungs, start=1):
-        dropped = sum(trial.dropped_at == look for trial in trials)
+    for number, rung in enumerate(record.rungs, start=1):
+        dropped = sum(trial.dropped_at == number for trial in trials)
         share = f" on {rung['record']:.0%} of the record" if rung["record"] < 1.0 else ""
         rows.append((f"dropped after {rung['iterations']} iterations{share}", str(dropped)))
     unusable = sum(not trial.usable and trial.dropped_at is None for trial in trials)

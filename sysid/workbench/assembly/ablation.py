@@ -58,7 +58,7 @@ class Ablation:
 def ablations_of(
     stages: Mapping[str, Scores], members: Sequence[MemberScores], cases: TraceSet, published: AblationConfig
 ) -> list[Ablation]:
-    """What the stages of a run say of each lesson.
+    """What the stages of a run say of each step.
 
     Args:
         stages: Scores of the whole by stage.
@@ -67,7 +67,7 @@ def ablations_of(
         published: What was published.
 
     Returns:
-        The lessons that were put to the test.
+        The steps that can be told apart.
     """
     counted = [name for name, role in cases.roles.items() if role is not Role.ESTIMATION] or list(cases.roles)
 

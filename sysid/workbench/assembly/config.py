@@ -56,21 +56,21 @@ class AssemblyConfig(Words):
         warm_start: Bundle of a trained whole to go on from, seen from the folder of the YAML: its networks stand where
             the members would be fitted; ``together`` trains them on, and ``active_learning``.
         rest: Levels at rest that are inputs' (``{BP: STP}``: charged to where the handle stands).
-        limits: Limits of outputs; in its other places a member has those of its first, unless they have their own.
+        limits: Limits of outputs; in its other instances a member has those of its first, unless they have their own.
         stability: How the free run of each candidate is checked by itself. It says so in the candidate's status; by
             default it changes no choice, for a member is chosen by the error of the whole.
         one_step: Each candidate fitted one step ahead as well, to see what becomes of it in free run.
         retrain: Members to train again on what the others put out.
         together: Training end to end.
-        active_learning: Growing its data by what the whole is worst at.
-        interpolation: Places between those that are modelled.
+        active_learning: Adding to its data what the whole is worst at.
+        interpolation: Positions between those that are modelled.
         monte_carlo: Random sequences on which the whole has to hold.
         published: Published figures by output.
         published_models: A table of ``reports/published`` with models of single members: where it has one of the same
             mapping and structure as a candidate, its figures stand beside the candidate's.
         published_whole: What that table calls the whole, such as ``STP -> BP -> BC``: all that it has of such wholes
             stands beside the stages.
-        ablation: What was published on the lessons that the stages put to the test.
+        ablation: What was published on what the stages bring.
         seed: Seed of everything random.
         export: What leaves the workbench; ``null`` for nothing.
     """
@@ -120,13 +120,13 @@ class AssemblyConfig(Words):
     @property
     def plan(self) -> TrainingPlan:
         """The stages of its training."""
-        growing = [one.plan(self.seed) for one in self.growing]
+        learning = [one.plan(self.seed) for one in self.learning_rounds]
         return TrainingPlan(
             outputs=self.choose_on or self.outputs,
             one_step=None if self.one_step is None else self.one_step.options(),
             retrain=None if self.retrain is None else self.retrain.options(),
             rounds=tuple(one.plan(self.seed) for one in self.joint),
-            active_learning=None if self.active_learning is None else self.active_learning.options(growing),
+            active_learning=None if self.active_learning is None else self.active_learning.options(learning),
         )
 
     @property
@@ -136,12 +136,12 @@ class AssemblyConfig(Words):
 
     @property
     def joint(self) -> tuple[TogetherConfig, ...]:
-        """The rounds of training end to end, without those of growth."""
+        """The rounds of training end to end, without those of active learning."""
         return self.together.rounds if self.together else ()
 
     @property
-    def growing(self) -> tuple[TogetherConfig, ...]:
-        """The rounds of training end to end that each round of growth goes through."""
+    def learning_rounds(self) -> tuple[TogetherConfig, ...]:
+        """The rounds of training end to end that each round of active learning goes through."""
         return self.joint[-1].followed_by(self.active_learning.train) if self.active_learning and self.joint else ()
 
     @property
@@ -192,12 +192,12 @@ class AssemblyConfig(Words):
             return self
         if self.together is None:
             raise FieldError(
-                "growth without training end to end",
-                expected="together, whose last round is what growth goes on from",
-                got="grow alone",
-                remedy="add together, or leave grow out",
+                "active learning without training end to end",
+                expected="together, whose last round is what it goes on from",
+                got="active_learning alone",
+                remedy="add together, or leave active_learning out",
             )
-        check_rounds(self.growing)
+        check_rounds(self.learning_rounds)
         pool = self.active_learning.data
         if (used := self._data).get(pool):
             raise FieldError(
@@ -229,9 +229,9 @@ class AssemblyConfig(Words):
         if len(set(written)) < len(written):
             raise FieldError(
                 "two members write one channel",
-                expected="each channel written by one member in one place",
+                expected="each channel written by one member in one instance",
                 got=", ".join(sorted(name for name in set(written) if written.count(name) > 1)),
-                remedy="correct the mapping or the places",
+                remedy="correct the mapping or the instances",
             )
         asked = {
             "outputs": self.outputs,
@@ -245,7 +245,7 @@ class AssemblyConfig(Words):
             else (),
         }
         named = {"retrain, members": self.retrain.members if self.retrain else ()}
-        for stage, rounds in (("together", self.joint), ("active_learning, train", self.growing)):
+        for stage, rounds in (("together", self.joint), ("active_learning, train", self.learning_rounds)):
             for field, names in names_in(rounds).items():
                 (named if field == "members" else asked)[f"{stage}, {field}"] = names
         for known, places in ((written, asked), (bases, named)):

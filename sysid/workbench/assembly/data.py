@@ -71,7 +71,7 @@ def _beside(found: TraceSet) -> tuple[list[Trace], list[Trace]]:
 
 
 def _pool(found: TraceSet) -> tuple[list[Trace], list[Trace]]:
-    """A data set to grow by: sequences to add, and sequences that train nothing."""
+    """A data set for active learning: sequences to add, and sequences that train nothing."""
     sources, held_out = found.with_role(Role.ESTIMATION), found.with_role(Role.SELECTION)
     if not sources or not held_out:
         raise _lacks_a_role("the pool lacks a role", found)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sysid.composite.active_learning import Look, sequence_errors
+from sysid.composite.active_learning import Assessment, sequence_errors
 from sysid.composite.keeper import Decision
 from sysid.composite.limits_held import holding
 from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
@@ -35,8 +35,8 @@ ASSEMBLY, LINE = "assembly.json", "line.json"
 
 SCORING = Outlined(name="scoring", title="Scoring every stage")
 WHOLE = Outlined(name="assembly", title="Choosing the stage that does best", called="assembly")
-STRESS = Outlined(name="monte_carlo", title="Running the whole on random sequences")
-PLACES = Outlined(name="interpolation", title="Running every place of the line")
+MONTE_CARLO = Outlined(name="monte_carlo", title="Running the whole on random sequences")
+INTERPOLATION = Outlined(name="interpolation", title="Running every position of the line")
 EXPORT = Outlined(name="export", title="Exporting the assembly")
 MEMBERS = Outlined(name="member-scores", title="Scoring the members alone")
 
@@ -157,19 +157,23 @@ class Evaluating:
             return run_monte_carlo(whole, tuple(sequences), asked.output, asked.within, report, annotator=annotator)
 
         found = self.context.compute(
-            STRESS, make, outcome=lambda one: f"{one.lost} of {one.sequences} diverged, {100 * one.within:.3g} % within"
+            MONTE_CARLO,
+            make,
+            outcome=lambda one: f"{one.lost} of {one.sequences} diverged, {100 * one.within:.3g} % within",
         )
         return found, tuple(sequences[name] for name, _ in found.worst), tuple(sequences)
 
-    def _unseen(self, sequences: Sequence[Trace]) -> dict[str, Look]:
-        """Every stage of growth on the random sequences, which had no say in anything."""
+    def _unseen(self, sequences: Sequence[Trace]) -> dict[str, Assessment]:
+        """Every round of active learning on the random sequences, which had no say in anything."""
         asked, stages = self.context.config.monte_carlo, self.trained.stages
-        rounds = [] if self.trained.growth is None else [one.stage for one in self.trained.growth.rounds]
+        rounds = (
+            [] if self.trained.active_learning is None else [one.stage for one in self.trained.active_learning.rounds]
+        )
         if asked is None or not rounds:
             return {}
         wholes = {stage: stages[stage].upstream_of([asked.output]) for stage in rounds}
         return {
-            stage: Look.at(sequence_errors(whole, sequences, [asked.output]), asked.within)
+            stage: Assessment.at(sequence_errors(whole, sequences, [asked.output]), asked.within)
             for stage, whole in wholes.items()
         }
 
@@ -180,9 +184,9 @@ class Evaluating:
         line, cases = line_of(asked, whole), self.context.load(asked.data)
         write_json(self.context.store.path / LINE, StoredInterpolation.of(asked, line, next(iter(cases))).to_dict())
         return self.context.compute(
-            PLACES,
+            INTERPOLATION,
             lambda _: score_line(asked, line, cases),
-            outcome=lambda scores: f"all places of the longest case in {max(scores.timing.values()):.3g} s",
+            outcome=lambda scores: f"all positions of the longest case in {max(scores.timing.values()):.3g} s",
         )
 
     def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any, data: AssemblyData) -> Bundle | None:

@@ -1,4 +1,4 @@
-"""Interpolation over positions: every place of a line from an assembly that is modelled at a few of them."""
+"""Interpolation over positions: every position of a line from an assembly that is modelled at a few of them."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ WORKERS = 2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class InterpolationScores:
-    """How the line does at places, seen and unseen.
+    """How the line does at positions, seen and unseen.
 
     Args:
-        mse: Mean squared error of the free run by output and case, at each place, in the output's unit squared.
-        places: By output, the places that the data have.
+        mse: Mean squared error of the free run by output and case, at each position, in the output's unit squared.
+        positions: By output, the positions that the data have.
         seen: By output, whether each is a knot.
-        timing: Seconds of a free run of all places together, by case.
+        timing: Seconds of a free run of all positions together, by case.
     """
 
     mse: Mapping[str, Mapping[str, NDArray[np.float64]]]
-    places: Mapping[str, NDArray[np.float64]]
+    positions: Mapping[str, NDArray[np.float64]]
     seen: Mapping[str, NDArray[np.bool_]]
     timing: Mapping[str, float]
 
@@ -45,7 +45,7 @@ class StoredInterpolation:
     Args:
         line: The line.
         inputs: Channels of the inputs of the whole.
-        outputs: Channels that are had at every place.
+        outputs: Channels that are had at every position.
     """
 
     line: Line
@@ -57,17 +57,17 @@ class StoredInterpolation:
         """A line with the channels of a trace.
 
         Args:
-            asked: What is had at every place.
+            asked: What is had at every position.
             line: The line.
-            case: A trace with the inputs of the whole, and the outputs under the names of the first place or at some
-                place.
+            case: A trace with the inputs of the whole, and the outputs under the names of the first instance or at some
+                position.
 
         Returns:
             The line with its channels.
         """
         outputs = []
         for name in asked.outputs:
-            there = name if name in case.channel_names else next(iter(places_of(case, name).values()), None)
+            there = name if name in case.channel_names else next(iter(positions_of(case, name).values()), None)
             unit = Channel(name=name, unit=line.at_place.units[name])
             outputs.append(replace(case.channel(there), name=name, description="") if there else unit)
         return cls(line=line, inputs=tuple(case.channel(name) for name in line.inputs), outputs=tuple(outputs))
@@ -112,7 +112,7 @@ class StoredInterpolation:
 
 
 def line_of(asked: InterpolationConfig, whole: Cascade) -> Line:
-    """The line of an assembly: what the knots need runs along it, what the outputs need stands at every place.
+    """The line of an assembly: what the knots need runs along it, what the outputs need stands at every position.
 
     Args:
         asked: What stands where.
@@ -122,26 +122,26 @@ def line_of(asked: InterpolationConfig, whole: Cascade) -> Line:
         The line.
 
     Raises:
-        ConfigError: If the outputs cannot be had from the channel at a place.
+        ConfigError: If the outputs cannot be had from the channel at a position.
     """
     there = whole.upstream_of(asked.outputs, given=(asked.channel, *whole.inputs))
     unread = [name for name in there.inputs if name != asked.channel and name not in whole.inputs]
     if unread or asked.channel not in there.inputs:
         raise ConfigError(
-            "the outputs cannot be had at a place of the line",
+            "the outputs cannot be had at a position of the line",
             where="interpolation, outputs",
             expected=f"outputs that follow from {asked.channel} and the inputs of the whole",
             got=f"{', '.join(asked.outputs)} from {', '.join(there.inputs)}",
-            remedy="name the channel that the places read, and outputs of members that stand there",
+            remedy="name the channel that the positions read, and outputs of members that stand there",
         )
     return Line(along=whole.upstream_of(asked.knots), knots=asked.knots, at_place=there, channel=asked.channel)
 
 
-def places_of(case: Trace, output: str) -> dict[float, str]:
-    """Places at which a trace has an output.
+def positions_of(case: Trace, output: str) -> dict[float, str]:
+    """Positions at which a trace has an output.
 
     Args:
-        case: The trace; the output at place 17 is the output's name with 17 behind it.
+        case: The trace; the output at position 17 is the output's name with 17 behind it.
         output: The output.
 
     Returns:
@@ -153,45 +153,45 @@ def places_of(case: Trace, output: str) -> dict[float, str]:
 
 
 def score_line(asked: InterpolationConfig, line: Line, cases: TraceSet) -> InterpolationScores:
-    """Score a line at the places of a data set.
+    """Score a line at the positions of a data set.
 
     Args:
         asked: What is judged.
         line: The line.
-        cases: The reference at its places.
+        cases: The reference at its positions.
 
     Returns:
         The scores.
 
     Raises:
-        ConfigError: If the data have an output at no place.
+        ConfigError: If the data have an output at no position.
     """
-    places = {name: places_of(next(iter(cases)), name) for name in asked.scored}
-    for name, found in places.items():
+    positions = {name: positions_of(next(iter(cases)), name) for name in asked.scored}
+    for name, found in positions.items():
         if not found:
             raise ConfigError(
-                "the data have no place of the line",
+                "the data have no position of the line",
                 where=f"data set {cases.name}",
-                expected=f"channels such as {name}17, the output at place 17",
+                expected=f"channels such as {name}17, the output at position 17",
                 got=", ".join(next(iter(cases)).channel_names),
                 remedy="add such channels to the data set, or take the output out of line, judged",
             )
-    everywhere = sorted({position for found in places.values() for position in found})
+    every = sorted({position for found in positions.values() for position in found})
     mse: dict[str, dict[str, NDArray[np.float64]]] = {name: {} for name in asked.scored}
     timing = {}
     for trace in cases:
-        line.simulate_trace(trace, everywhere, workers=WORKERS)  # compiles
+        line.simulate_trace(trace, every, workers=WORKERS)  # compiles
         began = time.perf_counter()
-        run = line.simulate_trace(trace, everywhere, workers=WORKERS)
+        run = line.simulate_trace(trace, every, workers=WORKERS)
         timing[trace.name] = time.perf_counter() - began
-        for name, found in places.items():
-            rows = [everywhere.index(position) for position in found]
+        for name, found in positions.items():
+            rows = [every.index(position) for position in found]
             mse[name][trace.name] = _errors(run[name][rows], trace, list(found.values()))
     knots = list(line.knots.values())
     return InterpolationScores(
         mse=mse,
-        places={name: np.array(list(found)) for name, found in places.items()},
-        seen={name: np.isin(list(found), knots) for name, found in places.items()},
+        positions={name: np.array(list(found)) for name, found in positions.items()},
+        seen={name: np.isin(list(found), knots) for name, found in positions.items()},
         timing=timing,
     )
 

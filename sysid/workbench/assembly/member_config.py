@@ -24,13 +24,13 @@ from sysid.yaml_files import FieldError
 
 
 class StandingConfig(Words):
-    """What stands in one place or in several.
+    """One member, or the same in several instances.
 
     Args:
-        mapping: Inputs and output, such as ``BP+AR -> BC``; in the first place as they are.
-        instances: Suffixes of the channel names, one for each place where it stands: ``["", "10"]`` puts it at
+        mapping: Inputs and output, such as ``BP+AR -> BC``; those of the first instance as they are.
+        instances: Suffixes of the channel names, one for each instance: ``["", "10"]`` puts it at
             ``BP -> AR`` and ``BP10 -> AR10``.
-        shared: Inputs that have the same name in every place.
+        shared: Inputs that have the same name in every instance.
     """
 
     OLD: ClassVar[Mapping[str, str]] = {"places": "instances"}
@@ -59,7 +59,7 @@ class SweepSource(BaseModel):
 
 
 class MemberConfig(StandingConfig):
-    """One member, fitted on traces of all its places.
+    """One member, fitted on traces of all its instances.
 
     Args:
         structure: What is fitted, with its ``kind``.

@@ -8,7 +8,7 @@ from pathlib import Path
 from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name, candidate_title
 from sysid.names import slug, task_slug
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.evaluation import EXPORT, MEMBERS, PLACES, SCORING, STRESS, WHOLE
+from sysid.workbench.assembly.evaluation import EXPORT, INTERPOLATION, MEMBERS, MONTE_CARLO, SCORING, WHOLE
 from sysid.workbench.fits.data import unmade_data
 from sysid.workbench.runner.run import REPORT
 from sysid.workbench.runner.steps import Estimate, Outlined
@@ -22,7 +22,7 @@ def outline(config: AssemblyConfig, beside: Path) -> list[Outlined]:
         beside: Folder of its file.
 
     Returns:
-        The steps in order; rounds that end the growth of the training data may come earlier.
+        The steps in order; active learning may end before its last round.
     """
     return [*_data(config, beside), *_training(config), *_proof(config, beside), REPORT]
 
@@ -51,8 +51,8 @@ def _training(config: AssemblyConfig) -> Iterator[Outlined]:
         for number in range(1, len(plan.active_learning.additions) + 1):
             for part in range(1, parts + 1):
                 suffix = f".{part}" if parts > 1 else ""
-                name = f"grown-{number}{suffix.replace('.', '-')}"
-                yield Outlined(name=name, title=f"Growing, round {number}{suffix} at most")
+                name = f"active-learning-{number}{suffix.replace('.', '-')}"
+                yield Outlined(name=name, title=f"Active learning, round {number}{suffix} at most")
 
 
 def _members(config: AssemblyConfig) -> Iterator[Outlined]:
@@ -80,9 +80,9 @@ def _proof(config: AssemblyConfig, beside: Path) -> Iterator[Outlined]:
     yield SCORING
     yield WHOLE
     if config.monte_carlo is not None:
-        yield from (_loading(config.monte_carlo.data, beside), STRESS)
+        yield from (_loading(config.monte_carlo.data, beside), MONTE_CARLO)
     if config.interpolation is not None:
-        yield from (_loading(config.interpolation.data, beside), PLACES)
+        yield from (_loading(config.interpolation.data, beside), INTERPOLATION)
     if config.export is not None:
         yield EXPORT
     if config.warm_start is None:

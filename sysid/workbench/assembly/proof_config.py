@@ -1,4 +1,4 @@
-"""What a pipeline asks of the finished whole: random sequences, places between others, published figures."""
+"""What a pipeline asks of the finished whole: random sequences, positions between others, published figures."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class MonteCarloConfig(BaseModel):
 
 
 class InterpolationConfig(BaseModel):
-    """Places between those that are modelled: a channel is interpolated to them, and the members stand there too.
+    """Positions between those that are modelled: a channel is interpolated to them, and the members stand there too.
 
     Args:
-        channel: What the members at a place read, by its name in the first place.
-        knots: Position of each place that is modelled, increasing, by the channel's name there.
-        outputs: What is had at every place, by the names in the first place.
-        data: Data set with the reference at instances: the output at place 17 is the output's name with 17 behind it.
+        channel: What the members at a position read, by its name in the first instance.
+        knots: Position of each position that is modelled, increasing, by the channel's name there.
+        outputs: What is had at every position, by the names in the first instance.
+        data: Data set with the reference: the output at position 17 is the output's name with 17 behind it.
         judged: Outputs that are scored there; all by default.
     """
 
@@ -60,7 +60,7 @@ class InterpolationConfig(BaseModel):
         strangers = [name for name in self.judged if name not in self.outputs]
         if strangers:
             raise FieldError(
-                f"judged names {', '.join(strangers)}, which is not had at a place",
+                f"judged names {', '.join(strangers)}, which is not had at a position",
                 expected=f"some of {', '.join(self.outputs)}",
                 got=", ".join(self.judged),
                 remedy="add it to the outputs",
@@ -69,7 +69,7 @@ class InterpolationConfig(BaseModel):
 
     @property
     def scored(self) -> tuple[str, ...]:
-        """Outputs that are scored at places."""
+        """Outputs that are scored at positions."""
         return self.judged or self.outputs
 
 

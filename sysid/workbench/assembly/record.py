@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.composite.active_learning import Growth, Look
+from sysid.composite.active_learning import ActiveLearned, Assessment
 from sysid.composite.limits_held import Holding
 from sysid.composite.monte_carlo import MonteCarlo
 from sysid.composite.round import TrainedRound
@@ -47,8 +47,8 @@ class Outcome:
         timing: Seconds of a free run of the whole by case.
         stressed: What came of the random sequences.
         worst: The sequences that the whole did worst on, whose signals are kept.
-        unseen: By stage of growth, how it does on the random sequences.
-        interpolation: How the places do between those that are modelled, if they were asked for.
+        unseen: By round of active learning, how it does on the random sequences.
+        interpolation: How positions do between those that are modelled, if they were asked for.
         exported: The bundle, if one was asked for.
         holding: Which limits hold the outputs in free run.
         members: The members' candidates by themselves, where there are several or they were fitted one step ahead too.
@@ -62,7 +62,7 @@ class Outcome:
     timing: Mapping[str, float]
     stressed: MonteCarlo | None
     worst: Sequence[Trace] = ()
-    unseen: Mapping[str, Look] = field(default_factory=dict)
+    unseen: Mapping[str, Assessment] = field(default_factory=dict)
     interpolation: InterpolationScores | None = None
     exported: Bundle | None = None
     holding: Sequence[Holding] = ()
@@ -112,7 +112,9 @@ def assembly_results(
         "published_whole": config.published_whole,
         "members": [_member(one) for one in found.members],
         "rounds": [_round(one) for one in trained.rounds],
-        "active_learning": [] if trained.growth is None else [_growth(trained.growth, found.unseen)],
+        "active_learning": []
+        if trained.active_learning is None
+        else [_active_learning(trained.active_learning, found.unseen)],
         "ablation": [asdict(one) for one in found.ablation],
         "monte_carlo": None if found.stressed is None else _stress(found.stressed),
         "limits": [_holding(one) for one in found.holding],
@@ -205,12 +207,12 @@ def _round(one: TrainedRound) -> dict[str, Any]:
     }
 
 
-def _look(one: Look) -> dict[str, Any]:
+def _assessment(one: Assessment) -> dict[str, Any]:
     return {"within": one.within, "median": one.median, "p99": one.rare}
 
 
-def _growth(grown: Growth, unseen: Mapping[str, Look]) -> dict[str, Any]:
-    asked = grown.asked
+def _active_learning(learned: ActiveLearned, unseen: Mapping[str, Assessment]) -> dict[str, Any]:
+    asked = learned.asked
     rounds = [
         {
             "number": one.number,
@@ -219,20 +221,20 @@ def _growth(grown: Growth, unseen: Mapping[str, Look]) -> dict[str, Any]:
             "traces": one.traces,
             "samples": one.samples,
             "train_time_s": one.seconds,
-            "held_out": _look(one.look),
-            "monte_carlo": _look(unseen[one.stage]) if one.stage in unseen else None,
+            "held_out": _assessment(one.assessment),
+            "monte_carlo": _assessment(unseen[one.stage]) if one.stage in unseen else None,
             "selection": one.score,
         }
-        for one in grown.rounds
+        for one in learned.rounds
     ]
     return {
         "outputs": asked.outputs,
-        "unit": grown.unit,
+        "unit": learned.unit,
         "limit": asked.within,
         "aim": asked.until,
         "pick": asked.pick,
-        "held_out": grown.held_out,
-        "ended": grown.ended,
+        "held_out": learned.held_out,
+        "ended": learned.ended,
         "rounds": rounds,
     }
 
@@ -254,7 +256,7 @@ def _line(scores: InterpolationScores) -> dict[str, Any]:
     return {
         "outputs": {
             name: {
-                "positions": scores.places[name].tolist(),
+                "positions": scores.positions[name].tolist(),
                 "fitted": scores.seen[name].tolist(),
                 "mse": {case: errors.tolist() for case, errors in by_case.items()},
             }

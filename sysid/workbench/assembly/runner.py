@@ -93,7 +93,7 @@ def read_assembly(folder: Path) -> Cascade:
 
 
 def read_line(folder: Path) -> StoredInterpolation:
-    """The line that a run left: every place between those that it modelled.
+    """The line that a run left: every position between those that it modelled.
 
     Args:
         folder: Its run folder.

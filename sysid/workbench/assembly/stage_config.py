@@ -1,4 +1,4 @@
-"""What a pipeline asks of each stage of an assembly's training: one step ahead, retraining, growing, end to end."""
+"""What a pipeline asks of the stages of training: one step ahead, retraining, active learning, end to end."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class OneStepConfig(BaseModel):
 
 
 class AblationConfig(BaseModel):
-    """What was published on each of the lessons that the stages of an assembly put to the test; words for the report.
+    """What was published on what each stage of an assembly brings; words for the report.
 
     Args:
         closing: On a network that was fitted one step ahead, in free run.
@@ -126,9 +126,9 @@ class TogetherConfig(Words):
         members: Outputs of the members that are trained; all by default.
         measured: Outputs that are as measured while the others are trained, such as a switch: where the free run
             decides when it flips, the loss has an edge there, and no step of the training sees across it.
-        share_weights: Whether the members keep one set of weights for all places where they stand. They are trained in
-            their first place, on traces of every place in turn; what they read from elsewhere is as measured, or as the
-            whole puts it out.
+        share_weights: Whether the members keep one set of weights for all their instances. They are trained in
+            their first instance, on traces of every one in turn; what they read from elsewhere is as measured, or as
+            the whole puts it out.
         targets: The error of each output that counts as one, in its unit.
         reads: Channels of members that members read from here on, beside those of their mappings, with the lags:
             ``{AR: {ER: 1}}``; more lags of one that a member reads already, or of its own output, as well. Their
@@ -249,23 +249,23 @@ Count = Annotated[int, Field(ge=1)]
 
 
 class ActiveLearningConfig(BaseModel):
-    """Training data that grow by what the whole is worst at, round by round, behind the rounds of ``together``.
+    """Active learning: training data that grow by what the whole is worst at, round by round, after ``together``.
 
     Args:
         data: Data set of the pool: cases with ``role: estimation`` are added from, cases with ``role: selection`` are
             never trained on, say what a round has brought, and choose with the other selection traces, among the states
-            of a round of growth and between the stages. A data set that nothing else uses.
+            of a round of active learning and between the stages. A data set that nothing else uses.
         outputs: Outputs that are looked at; the one with the largest error counts.
         within: Root mean square error in their unit that a sequence should stay under.
         add: Sequences added in each round; or in each one of its own, and there are as many rounds: ``[10, 20, 40]``.
         rounds: At most; 5 by default.
-        until: Share of the sequences within the limit at which no further round is begun.
-        patience: Rounds without an improvement after which no further one is begun.
+        until: Share of the sequences within the limit at which there is no further round.
+        patience: Rounds without an improvement after which there is no further one.
         pick: Which sequences are added: those with the largest errors (``worst``), or those that come next in the pool
             (``next``), to see beside it whether looking for the worst pays.
-        train: Rounds of training end to end that each round of growth goes through, as under ``again``. The first is
-            what the last round of ``together`` was, but for what it names, and each further one what the one before
-            was. All of them have the estimation traces of that last round, and all that has been added.
+        train: Rounds of training end to end that each round of active learning goes through, as under ``again``. The
+            first is what the last round of ``together`` was, but for what it names, and each further one what the one
+            before was. All of them have the estimation traces of that last round, and all that has been added.
     """
 
     model_config = STRICT
@@ -284,7 +284,7 @@ class ActiveLearningConfig(BaseModel):
     def _check(self) -> ActiveLearningConfig:
         if isinstance(self.add, tuple) and self.rounds is not None and self.rounds != len(self.add):
             raise FieldError(
-                f"{self.rounds} rounds of growth, and what to add in {len(self.add)}",
+                f"{self.rounds} rounds of active learning, and what to add in {len(self.add)}",
                 expected="as many numbers under add as there are rounds",
                 got=f"rounds: {self.rounds}, add: {', '.join(map(str, self.add))}",
                 remedy="leave rounds out: add says it",

@@ -1,4 +1,4 @@
-"""``sysid simulate RUN --command FILE --places 1:50``: every place of a line, from the inputs of the whole alone."""
+"""``sysid simulate RUN --command FILE --positions 1:50``: positions along a line, from the inputs of the whole."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from sysid.workbench.commands.simulate import check_picture
 from sysid.workbench.runner.console import console
 
 DRAWN = 5
-"""Places in the picture at most: more lines of one field are not told apart."""
+"""Positions in the picture at most: more lines of one field are not told apart."""
 
 MOST = 10_000
-"""Places in one call: more are not meant."""
+"""Positions in one call: more are not meant."""
 
 
 def simulate_line_command(
     folder: Path,
     command: Path | None,
-    places: str,
+    asked: str,
     out: Path,
     *,
     time_unit: str | None = None,
@@ -37,12 +37,12 @@ def simulate_line_command(
     inputs: Path | None = None,
     initial: float | None = None,
 ) -> None:
-    """Simulate a line and write time, inputs and every output at every place, as ``BC17`` for place 17.
+    """Simulate a line and write time, inputs and every output at every position, as ``BC17`` for position 17.
 
     Args:
         folder: The run folder of an assembly with a line.
         command: A command table.
-        places: ``1:50``, ``1:50:5`` or ``1,10,25.5``.
+        asked: ``1:50``, ``1:50:5`` or ``1,10,25.5``.
         out: The file to write, ``.csv`` or ``.parquet``.
         time_unit: Unit of the command's times, where it does not say.
         unit: Unit of the command's values, likewise.
@@ -57,68 +57,68 @@ def simulate_line_command(
         given = {"no command": command is None, f"inputs {inputs}": inputs, f"--initial {initial}": initial is not None}
         raise ConfigError(
             "that is not how a line is simulated",
-            where="sysid simulate --places",
+            where="sysid simulate --positions",
             expected="--command with a table of a few rows, and neither inputs nor --initial",
             got=", ".join(what for what, yes in given.items() if yes),
             remedy="give the command alone",
         )
     check_picture(plot)
-    stored, positions = read_line(folder), parse_places(places)
+    stored, positions = read_line(folder), parse_positions(asked)
     table = read_command(command, stored.inputs, time_unit=time_unit, unit=unit)
     trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
     write_trace(replace(trace, name=out.stem), out)
     names = ", ".join(channel.name for channel in stored.outputs)
-    console().print(f"{len(trace)} samples of {names} at {len(positions)} places written to {out}", soft_wrap=True)
+    console().print(f"{len(trace)} samples of {names} at {len(positions)} positions written to {out}", soft_wrap=True)
     _draw(stored, trace, positions, plot or out.with_suffix(".png"), title=folder.name)
 
 
 def simulate_line(stored: StoredInterpolation, given: Trace, positions: list[float]) -> Trace:
-    """Every place of a line as one trace.
+    """Every position of a line as one trace.
 
     Args:
         stored: The line.
         given: A trace with the inputs of the whole.
-        positions: The places.
+        positions: Where along the line.
 
     Returns:
-        The inputs, then each output at each place, as ``BC17`` for place 17.
+        The inputs, then each output at each position, as ``BC17`` for position 17.
 
     Raises:
-        ConfigError: If a place is not on the line.
+        ConfigError: If a position is not on the line.
     """
     run = stored.line.simulate_trace(given, positions)
     inputs = [channel.name for channel in stored.inputs]
     channels, columns = list(stored.inputs), [given.columns(inputs)]
     for channel in stored.outputs:
-        channels += [replace(channel, name=_at(channel, place)) for place in positions]
+        channels += [replace(channel, name=_at(channel, position)) for position in positions]
         columns.append(run[channel.name].T)
     return Trace(
         name=given.name,
         sample_time=given.sample_time,
         channels=tuple(channels),
         values=np.column_stack(columns),
-        provenance=(*given.provenance, f"simulated in free run at {len(positions)} places of a line"),
+        provenance=(*given.provenance, f"simulated in free run at {len(positions)} positions of a line"),
     )
 
 
-def _at(channel: Channel, place: float) -> str:
-    return f"{channel.name}{place:g}"
+def _at(channel: Channel, position: float) -> str:
+    return f"{channel.name}{position:g}"
 
 
-def parse_places(text: str) -> list[float]:
-    """Places as they are written.
+def parse_positions(text: str) -> list[float]:
+    """Positions as they are written.
 
     Args:
         text: ``1:50`` for every whole number from 1 to 50, ``1:50:5`` for every fifth, ``1,10,25.5`` for these.
 
     Returns:
-        The places, in the order in which they are named.
+        The positions, in the order in which they are named.
 
     Raises:
         ConfigError: If they cannot be read, are named twice, or are more than anybody means.
 
     Example:
-        >>> parse_places("1:9:4,12.5")
+        >>> parse_positions("1:9:4,12.5")
         [1.0, 5.0, 9.0, 12.5]
     """
     found: list[float] = []
@@ -130,17 +130,17 @@ def parse_places(text: str) -> list[float]:
             raise _cannot(text, part)
         found += [first + step * i for i in range(int((last - first) / step + 1e-9) + 1)]
     if len(set(found)) < len(found):
-        raise _cannot(text, "a place twice")
+        raise _cannot(text, "a position twice")
     return found
 
 
 def _cannot(text: str, got: str) -> ConfigError:
     return ConfigError(
-        "the places cannot be read",
-        where=f"option --places {text}",
-        expected="1:50, 1:50:5 or 1,10,25, each place once",
+        "the positions cannot be read",
+        where=f"option --positions {text}",
+        expected="1:50, 1:50:5 or 1,10,25, each position once",
         got=got or "nothing",
-        remedy="correct the places",
+        remedy="correct the positions",
     )
 
 
@@ -150,7 +150,7 @@ def _draw(stored: StoredInterpolation, trace: Trace, positions: list[float], plo
 
     drawn = [positions[i] for i in np.unique(np.linspace(0, len(positions) - 1, DRAWN).round().astype(int))]
     inputs = tuple(channel.name for channel in stored.inputs)
-    names = [*inputs, *(_at(channel, place) for channel in stored.outputs for place in drawn)]
+    names = [*inputs, *(_at(channel, position) for channel in stored.outputs for position in drawn)]
     shown = replace(
         trace, channels=tuple(trace.channel(name) for name in names), values=trace.columns(names), provenance=()
     )
@@ -160,4 +160,4 @@ def _draw(stored: StoredInterpolation, trace: Trace, positions: list[float], plo
             figure.savefig(draft, format=plot.suffix.lower().removeprefix("."), dpi=150)
     except OSError as error:
         raise ConfigError("the picture cannot be written", where=plot, got=str(error)) from error
-    console().print(f"places {', '.join(f'{place:g}' for place in drawn)} drawn in {plot}", soft_wrap=True)
+    console().print(f"positions {', '.join(f'{position:g}' for position in drawn)} drawn in {plot}", soft_wrap=True)

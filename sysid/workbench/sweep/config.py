@@ -43,7 +43,7 @@ class ChooseConfig(BaseModel):
 
 
 class RungConfig(BaseModel):
-    """A look at all trials that are still in, after which only some go on.
+    """A rung of successive halving: all trials that are still in, after which only some go on.
 
     Args:
         iterations: How far each is trained by then.
@@ -124,7 +124,7 @@ class SweepConfig(BaseModel):
         method: How the points are gone through.
         objectives: Figures of merit whose Pareto front is shown, and sought by ``nsga-ii``.
         choose: What chooses the winner.
-        pruning: Looks at which trials are dropped; none for every trial in full.
+        pruning: Rungs of successive halving, at which trials are dropped; none for every trial in full.
         warm_start: ``none``: each network begins at random. ``linear``: at the open-loop linear fit over its delays,
             which all networks with these delays share. ``smaller``: at the next smaller network with the same delays.
         workers: Processes that train, one thread each.
@@ -213,7 +213,7 @@ class SweepConfig(BaseModel):
         records = [rung.record for rung in self.pruning]
         if steps != sorted(set(steps)) or steps[-1] >= full or records != sorted(records):
             raise FieldError(
-                "the looks do not follow one another",
+                "the rungs do not follow one another",
                 expected=f"rising iterations below the {full} of the training, and records that do not shrink",
                 got=f"iterations {steps}, records {records}",
                 remedy="put them in order",

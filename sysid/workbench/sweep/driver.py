@@ -1,7 +1,7 @@
 """The driver: which jobs there are, in which order they may be done, who is dropped, what is announced.
 
 Nothing here depends on when a result comes in. A trial's seed follows from its point; a trial that begins from another
-waits for it; trials are dropped only when all of a look are in. So the same sweep gives the same trials and the same
+waits for it; trials are dropped only when all of a rung are in. So the same sweep gives the same trials and the same
 winner with any number of workers, killed or not. The driver alone writes: workers compute and answer.
 """
 
@@ -96,7 +96,7 @@ class Driver:
         return self._progress.n_fresh
 
     def rungs(self) -> list[Rung]:
-        """The looks, the end of the training last."""
+        """The rungs, the end of the training last."""
         rungs = [Rung(iterations=r.iterations, record=r.record, keep=r.keep) for r in self.config.pruning]
         return [*rungs, Rung(iterations=self._full, record=1.0, keep=1.0)]
 
@@ -112,7 +112,7 @@ class Driver:
             keep_all: Drop none.
 
         Returns:
-            A trial for each, in their order; those that were dropped say at which look.
+            A trial for each, in their order; those that were dropped say at which rung.
         """
         rungs = [replace(rung, keep=1.0) if keep_all else rung for rung in self.rungs()]
         self._progress.expect(points, rungs)
@@ -121,21 +121,21 @@ class Driver:
         jobs: dict[int, Job] = {}
         found: dict[int, Trial] = {}
         alive = list(points)
-        for look, rung in enumerate(rungs, start=1):
+        for number, rung in enumerate(rungs, start=1):
             begun: dict[int, Job] = {}
             for point in alive:
                 begun[point.number] = self._job(point, rung, jobs.get(point.number), begun)
             jobs = begun
             self.last.update(begun)
-            shared = [self._linear(point, rung) for point in alive] if look == 1 else []
+            shared = [self._linear(point, rung) for point in alive] if number == 1 else []
             trials = self._do([*(job for job in shared if job is not None), *jobs.values()])
             for point in alive:
                 trial = trials[jobs[point.number].key]
                 found[point.number] = as_trial_of(trial, point, before=found.get(point.number))
             alive, dropped = self._split(alive, found, rung.keep)
             for point in dropped:
-                found[point.number] = found[point.number].model_copy(update={"dropped_at": look})
-            self._progress.dropped(len(alive), rungs[look:])
+                found[point.number] = found[point.number].model_copy(update={"dropped_at": number})
+            self._progress.dropped(len(alive), rungs[number:])
         return [found[point.number] for point in points]
 
     def _split(self, points: list[Point], found: Mapping[int, Trial], keep: float) -> tuple[list[Point], list[Point]]:
@@ -153,7 +153,7 @@ class Driver:
         return not trial.usable, value if math.isfinite(value) else math.inf
 
     def _job(self, point: Point, rung: Rung, before: Job | None, begun: Mapping[int, Job]) -> Job:
-        """A point's training up to a look; smaller networks of the same look are in ``begun`` already."""
+        """A point's training up to a rung; smaller networks of the same rung are in ``begun`` already."""
         after, resume, done = None, False, 0
         if before is not None:
             # A state of training belongs to its records; with longer ones only the parameters go on.
@@ -296,7 +296,7 @@ def as_trial_of(trial: Trial, point: Point, *, before: Trial | None) -> Trial:
     Args:
         trial: The result.
         point: The point.
-        before: The point's result at the look before.
+        before: The point's result at the rung before.
 
     Returns:
         The trial.

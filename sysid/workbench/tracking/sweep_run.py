@@ -96,7 +96,7 @@ def _log_trial(
         "structure": trial.label,
         "status": trial.status,
         "data": ready.data,
-        "dropped": "no" if trial.dropped_at is None else f"after look {trial.dropped_at}",
+        "dropped": "no" if trial.dropped_at is None else f"at rung {trial.dropped_at}",
     }
     run = client.create_run(experiment, run_name=f"{trial.number} · {trial.label}", tags=tags)
     now, keys = int(time.time() * 1000), distinct(trial.values, tracking_key)

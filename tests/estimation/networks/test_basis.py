@@ -22,21 +22,21 @@ def records(n: int = 300, seed: int = 0) -> np.ndarray:
 
 def test_every_feature_peaks_at_one():
     X = records()
-    basis = RegressorBasis.levels_and_rates(LAGS, X)
+    basis = RegressorBasis.incremental(LAGS, X)
     features = (X - basis.centre) @ basis.matrix.T
     inputs = features[:, : len(LAGS.input_lag)]
     assert_allclose(np.abs(inputs).max(axis=0), 1.0)
 
 
 def test_rates_are_divided_differences_of_neighbouring_lags():
-    basis = RegressorBasis.levels_and_rates(LAGS, records())
+    basis = RegressorBasis.incremental(LAGS, records())
     row = basis.matrix[2] / basis.matrix[2, 1]
     assert_allclose(row, [0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_levels_of_the_inputs_are_uncorrelated():
     X = records()
-    basis = RegressorBasis.levels_and_rates(LAGS, X)
+    basis = RegressorBasis.incremental(LAGS, X)
     features = (X - basis.centre) @ basis.matrix.T
     assert abs(np.corrcoef(features[:, 0], features[:, 3])[0, 1]) < 1e-10
 
@@ -45,14 +45,14 @@ def test_a_constant_regressor_is_not_blown_up():
     X = records()
     X[:, 4] = 3.0
     X[:, 3] = 3.0
-    basis = RegressorBasis.levels_and_rates(LAGS, X)
+    basis = RegressorBasis.incremental(LAGS, X)
     assert np.abs(basis.matrix).max() < 1e3
 
 
 @pytest.mark.parametrize(("neurons", "gated"), [(0, False), (3, False), (3, True)], ids=["linear", "tanh", "gates"])
 def test_a_network_in_the_basis_is_the_network_over_plain_regressors(neurons, gated):
     X = records()
-    basis = RegressorBasis.levels_and_rates(LAGS, X)
+    basis = RegressorBasis.incremental(LAGS, X)
     layout = Layout(lags=LAGS, neurons=neurons, linear=True, gated=gated)
     theta = np.random.default_rng(1).standard_normal(layout.n_parameters)
     plain = basis.to_plain(layout) @ theta
@@ -76,7 +76,7 @@ def test_the_gradient_in_the_basis_is_the_gradient():
         history=History.at_rest(inputs=[0.0, 0.0], output=0.0),
     )
     inner = RecursionProvider(template=template, experiments=(experiment,), closed=True)
-    provider = RebasedProvider(inner=inner, to_plain=RegressorBasis.levels_and_rates(LAGS, records()).to_plain(layout))
+    provider = RebasedProvider(inner=inner, to_plain=RegressorBasis.incremental(LAGS, records()).to_plain(layout))
     theta = 0.1 * rng.standard_normal(layout.affine.stop)
     expected = finite_difference_jacobian(lambda p: np.array([provider.loss(p)]), theta)
     assert_allclose(provider.linearise(theta).gradient, expected[0], rtol=1e-4, atol=1e-6)
@@ -105,5 +105,5 @@ def test_correlation_time_of_what_has_none(residual):
 
 def test_a_single_row_has_a_basis_without_directions() -> None:
     lags = Lags(inputs=((0, 1), (0, 1)), output=(1, 2))
-    basis = RegressorBasis.levels_and_rates(lags, np.ones((1, lags.n_regressors)))
+    basis = RegressorBasis.incremental(lags, np.ones((1, lags.n_regressors)))
     assert np.isfinite(basis.matrix).all()

@@ -62,7 +62,7 @@ def test_the_fit_survives_storing(fit):
     unseen = measured(seed=3)
     assert_array_equal(again.model.simulate_trace(unseen).values, fit.model.simulate_trace(unseen).values)
     assert (again.status, again.errors, again.notes) == (fit.status, fit.errors, fit.notes)
-    assert repr(again.attempts) == repr(fit.attempts), "every start at every look"
+    assert repr(again.attempts) == repr(fit.attempts), "every start at every checkpoint"
     assert sum(one.chosen for one in fit.attempts) == 1
 
 

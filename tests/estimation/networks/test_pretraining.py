@@ -52,7 +52,7 @@ def all_samples(basis: RegressorBasis, *records: Experiment, network: NARX = NET
 def test_on_all_samples_it_is_the_open_loop(network: NARX):
     layout = Layout.of(network, 1)
     records = (experiment(), experiment(50, 1))
-    basis = RegressorBasis.levels_and_rates(LAYOUT.lags, np.random.default_rng(0).standard_normal((50, 4)))
+    basis = RegressorBasis.incremental(LAYOUT.lags, np.random.default_rng(0).standard_normal((50, 4)))
     theta = 0.3 * np.random.default_rng(2).standard_normal(layout.n_parameters)
     one = all_samples(basis, *records, network=network)
     # Without bounds, as the pretraining has none: what is far off has to be seen to be mended.

@@ -33,7 +33,7 @@ def test_a_page_has_every_table_and_a_chart_for_every_signal(run_folder: Path, r
     assert isinstance(digests, Table)
     assert [[cell.text for cell in row] for row in digests.rows] == [["tanks", "abc"], ["pool", "def"]]
     assert [word for word, _ in page.verdict.points] == [
-        "Accuracy", "Published", "Speed", "Lessons", "Everywhere", "Weakness",
+        "Accuracy", "Published", "Speed", "Ablation", "All positions", "Weakness",
     ]  # fmt: skip
 
 
@@ -81,10 +81,10 @@ def test_numbers_to_track_are_those_of_the_stages_and_of_positions_that_were_not
         "selection": 0.125,
         "lower/A/mse": 0.25,
         "lower/V/mse": 0.3,
-        "lower/A/unseen places/mse": 0.25,
-        "lower/A/unseen places/worst mse": 0.25,
-        "lower/V/unseen places/mse": 0.125,
-        "lower/V/unseen places/worst mse": 0.125,
+        "lower/A/unseen positions/mse": 0.25,
+        "lower/A/unseen positions/worst mse": 0.25,
+        "lower/V/unseen positions/mse": 0.125,
+        "lower/V/unseen positions/worst mse": 0.125,
     }
 
 

@@ -23,7 +23,7 @@ def test_a_row_has_the_figures_of_its_round(results: AssemblyResults) -> None:
 @pytest.mark.parametrize(
     ("changes", "column", "said"),
     [
-        ({"name": "2.1 of growth"}, 0, "2.1 of growth"),
+        ({"name": "2.1 of active learning"}, 0, "2.1 of active learning"),
         ({"trained": ["AR", "BC"], "all_instances": True}, 1, "AR, BC, everywhere"),
         ({"measured": ["BP", "AR", "ER"]}, 2, "BP, AR, ER"),
         ({"measured": ["BP", "AR", "ER", "VO"]}, 2, "4 outputs"),

@@ -1,4 +1,4 @@
-"""The line of an assembly: what runs along it, what stands at a place, and how places are scored."""
+"""The line of an assembly: what runs along it, what stands at a position, and how positions are scored."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from numpy.testing import assert_allclose
 from sysid.composite.members import assembled
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Role, Trace, TraceSet
-from sysid.workbench.assembly.interpolation import line_of, places_of, score_line
+from sysid.workbench.assembly.interpolation import line_of, positions_of, score_line
 from sysid.workbench.assembly.proof_config import InterpolationConfig
 from tests.composite.composites import models, pipe, trace
 from tests.workbench.assembly.test_config import TWO_PLACES, config
 
-ASKED = InterpolationConfig(channel="BP", knots={"BP": 1, "BP9": 9}, outputs=("AR",), data="places")
+ASKED = InterpolationConfig(channel="BP", knots={"BP": 1, "BP9": 9}, outputs=("AR",), data="positions")
 
 
 def whole():
     return assembled(pipe(), models())
 
 
-def places(n: int = 120) -> TraceSet:
-    """The whole's own line as the reference, at three places, with half a unit added at place 4."""
+def positions(n: int = 120) -> TraceSet:
+    """The whole's own line as the reference, at three positions, with half a unit added at position 4."""
     line = line_of(ASKED, whole())
     traces = {}
     for seed, name in enumerate(("A", "B")):
@@ -34,7 +34,7 @@ def places(n: int = 120) -> TraceSet:
         values = np.column_stack([handle, run["AR"].T + np.array([0.0, 0.5, 0.0])])
         channels = tuple(Channel(name=one, unit="psi") for one in names)
         traces[name] = Trace(name=name, sample_time=0.1, channels=channels, values=values)
-    return TraceSet(name="places", traces=tuple(traces.values()), roles=dict.fromkeys(traces, Role.VALIDATION))
+    return TraceSet(name="positions", traces=tuple(traces.values()), roles=dict.fromkeys(traces, Role.VALIDATION))
 
 
 def test_what_the_knots_need_runs_along_and_what_the_outputs_need_stands_at_a_place():
@@ -46,24 +46,24 @@ def test_what_the_knots_need_runs_along_and_what_the_outputs_need_stands_at_a_pl
     assert dict(line.knots) == {"BP": 1.0, "BP9": 9.0}
 
 
-def test_places_are_the_numbers_behind_an_output():
-    assert places_of(next(iter(places())), "AR") == {1.0: "AR1", 4.0: "AR4", 9.0: "AR9"}
+def test_positions_are_the_numbers_behind_an_output():
+    assert positions_of(next(iter(positions())), "AR") == {1.0: "AR1", 4.0: "AR4", 9.0: "AR9"}
 
 
-def test_each_place_is_scored_by_itself():
-    line, cases = line_of(ASKED, whole()), places()
+def test_each_position_is_scored_by_itself():
+    line, cases = line_of(ASKED, whole()), positions()
     scores = score_line(ASKED, line, cases)
-    assert scores.places["AR"].tolist() == [1.0, 4.0, 9.0]
+    assert scores.positions["AR"].tolist() == [1.0, 4.0, 9.0]
     assert scores.seen["AR"].tolist() == [True, False, True]
     for case in ("A", "B"):
         assert_allclose(scores.mse["AR"][case], [0.0, 0.25, 0.0], atol=1e-12)
 
 
-def test_data_without_places_are_refused():
+def test_data_without_positions_are_refused():
     line = line_of(ASKED, whole())
-    cases = places()
+    cases = positions()
     bare = replace(cases, traces=tuple(replace(t, channels=t.channels[:1], values=t.values[:, :1]) for t in cases))
-    with pytest.raises(ConfigError, match="no place of the line"):
+    with pytest.raises(ConfigError, match="no position of the line"):
         score_line(ASKED, line, bare)
 
 
@@ -72,14 +72,14 @@ def test_data_without_places_are_refused():
     [
         pytest.param("knots: {BP: 9, BP9: 1}, outputs: [AR]", "no line", id="knots out of order"),
         pytest.param("knots: {BP: 1, BP8: 9}, outputs: [AR]", "which no member writes", id="a stranger"),
-        pytest.param("knots: {BP: 1, BP9: 9}, outputs: [AR], judged: [BP]", "is not had at a place", id="judged"),
+        pytest.param("knots: {BP: 1, BP9: 9}, outputs: [AR], judged: [BP]", "is not had at a position", id="judged"),
     ],
 )
 def test_a_line_that_cannot_be_is_refused(line, match):
     with pytest.raises(ConfigError, match=match):
-        config(TWO_PLACES + f"interpolation: {{channel: BP, data: places, {line}}}\n")
+        config(TWO_PLACES + f"interpolation: {{channel: BP, data: positions, {line}}}\n")
 
 
 def test_outputs_that_do_not_follow_from_the_channel_are_refused():
-    with pytest.raises(ConfigError, match="cannot be had at a place"):
+    with pytest.raises(ConfigError, match="cannot be had at a position"):
         line_of(ASKED.model_copy(update={"channel": "BP9"}), whole())

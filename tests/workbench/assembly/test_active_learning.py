@@ -1,4 +1,4 @@
-"""Growth in a run: each round is a stage, a second run finds every round again, and the report has its curve."""
+"""Active learning in a run: each round is a stage, found again by a second run, and the report has its curve."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LEAN = (
     .replace("checkpoints: 2}\n", "checkpoints: 2}\n  traces: 1\n", 1)
     .replace("monte_carlo: {data: tanks, output: lower, within: 0.5}\n", GROWN)
 )
-"""Trained end to end on one trace, then grown by the two of the pool."""
+"""Trained end to end on one trace, then trained on the two too of the pool."""
 
 
 @pytest.fixture
@@ -54,22 +54,28 @@ def run(workspace: Path, text: str, name: str = "tanks"):
 
 def test_a_run_grows_resumes_and_reports(pooled: Path) -> None:
     results = run(pooled, LEAN)
-    stages = ["each alone", "trained end to end", "grown, round 1", "grown, round 2"]
+    stages = ["each alone", "trained end to end", "active learning, round 1", "active learning, round 2"]
     assert [one.name for one in results.stages] == stages
     (found,) = results.active_learning
     counts = [(len(one.added), one.traces, one.samples) for one in found.rounds]
     assert counts == [(0, 1, 300), (1, 2, 600), (1, 3, 900)]
-    assert [(one.name, one.traces) for one in results.rounds] == [("1", 1), ("1 of growth", 2), ("2 of growth", 3)]
+    assert [(one.name, one.traces) for one in results.rounds] == [
+        ("1", 1),
+        ("1 of active learning", 2),
+        ("2 of active learning", 3),
+    ]
     assert found.pick == "worst"
     # The stages' score and the curve's are one figure: by the selection traces and those of the pool.
     assert [one.selection for one in results.stages[1:]] == [one.selection for one in found.rounds]
 
-    files = [pooled / "runs" / "tanks" / f"{name}.json" for name in ("together", "grown-1", "grown-2")]
+    files = [
+        pooled / "runs" / "tanks" / f"{name}.json" for name in ("together", "active-learning-1", "active-learning-2")
+    ]
     stamps = [one.stat().st_mtime_ns for one in files]
     assert run(pooled, LEAN).stages == results.stages
     assert [one.stat().st_mtime_ns for one in files] == stamps, "nothing is trained again"
     run(pooled, LEAN.replace("add: 1, rounds: 2", "add: [1, 1], pick: next"))
-    assert files[0].stat().st_mtime_ns == stamps[0], "growth leaves what was before it"
+    assert files[0].stat().st_mtime_ns == stamps[0], "active learning leaves what was before it"
 
 
 def test_where_there_is_a_stress_each_round_is_put_to_it(pooled: Path) -> None:
@@ -103,14 +109,16 @@ def test_each_round_goes_through_several_trainings_that_have_all_that_was_added(
         (("upper",), ("lower",), 1, 3, 2),
         (("upper",), ("lower",), 2, 3, 2),
     ]
-    assert [one.name for one in results.rounds[1:]] == [f"{one} of growth" for one in ("1.1", "1.2", "2.1", "2.2")]
-    assert (pooled / "runs" / "tanks" / "grown-2-2.json").is_file()
+    assert [one.name for one in results.rounds[1:]] == [
+        f"{one} of active learning" for one in ("1.1", "1.2", "2.1", "2.2")
+    ]
+    assert (pooled / "runs" / "tanks" / "active-learning-2-2.json").is_file()
 
 
 def test_what_is_begun_from_another_whole_grows_too(pooled: Path) -> None:
     run(pooled, LEAN.replace("export: null", "export: {formats: [c]}").replace(GROWN, ""))
     results = run(pooled, LEAN.replace("seed: 3", "seed: 3\nwarm_start: ../runs/tanks/bundle"), "further")
-    stages = ["as it was begun from", "trained end to end", "grown, round 1", "grown, round 2"]
+    stages = ["as it was begun from", "trained end to end", "active learning, round 1", "active learning, round 2"]
     assert [one.name for one in results.stages] == stages
 
 
@@ -136,7 +144,7 @@ def test_a_pool_without_sequences_that_train_nothing_is_refused(pooled: Path) ->
         ("{max_iterations: 2}]", "{reads: {upper: {lower: 2}}}]", "reads"),
         ("{max_iterations: 2}]", "]", "train"),
         ("rounds: 2", "rounds: 2, pick: best", "pick"),
-        ("add: 1, rounds: 2", "add: [1, 2], rounds: 3", "3 rounds of growth, and what to add in 2"),
+        ("add: 1, rounds: 2", "add: [1, 2], rounds: 3", "3 rounds of active learning, and what to add in 2"),
         ("add: 1", "add: 0", "add"),
     ],
 )
@@ -146,13 +154,13 @@ def test_what_cannot_be_grown_is_refused(workspace: Path, old: str, new: str, co
         run(workspace, LEAN.replace(old, new, 1))
 
 
-def test_growth_goes_on_from_training_end_to_end(workspace: Path) -> None:
+def test_active_learning_goes_on_from_training_end_to_end(workspace: Path) -> None:
     before, _, behind = LEAN.partition("together:")
-    with pytest.raises(ConfigError, match="growth without training end to end"):
+    with pytest.raises(ConfigError, match="active learning without training end to end"):
         run(workspace, before + behind[behind.index("active_learning:") :])
 
 
-def test_the_rounds_of_growth_are_the_last_one_before_but_for_what_they_name():
+def test_the_rounds_of_active_learning_are_the_last_one_before_but_for_what_they_name():
     text = LEAN.replace("train: [{max_iterations: 2}]", "train: [{max_iterations: 2}, {targets: {lower: 0.3}}]")
     asked = config(text)
     last = asked.joint[-1]

@@ -1,4 +1,4 @@
-r"""A model in levels and rates: the form that files are written in, because short numbers can hold it.
+r"""A model in incremental (delta) form: the form that files are written in, because short numbers can hold it.
 
 A surrogate of a slow system is nearly an integrator, and its regressors are nearly equal: :math:`y(t-1)` and
 :math:`y(t-2)` differ in their last digits, and what counts are weights that nearly cancel. In float32 the rounding of
@@ -29,7 +29,7 @@ from sysid.export.cell import Cell
 
 @dataclass(frozen=True, kw_only=True)
 class Term:
-    """A regressor in levels and rates.
+    """A regressor in incremental (delta) form.
 
     Args:
         channel: An input, or the number of inputs plus the place of an output.
@@ -43,7 +43,7 @@ class Term:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RateForm:
+class IncrementalForm:
     """Terms and their weights: the same sums as the cell's, over other regressors.
 
     Args:
@@ -62,8 +62,8 @@ class RateForm:
     linear: NDArray[np.float64]
 
     @classmethod
-    def of(cls, cell: Cell, *, blocks: bool = False) -> RateForm:
-        """A cell in levels and rates.
+    def of(cls, cell: Cell, *, blocks: bool = False) -> IncrementalForm:
+        """A cell in incremental (delta) form.
 
         Args:
             cell: The cell.
@@ -79,7 +79,7 @@ class RateForm:
             >>> arx = ARXModel(orders=ARX(na=2, nb=(1,), nk=(1,)), coefficients=[0.5, 1.75, -0.75], intercept=0.0,
             ...     mapping=Mapping.parse("u -> y"), sample_time=0.1, input_units=("V",), output_unit="V",
             ...     rest_output=0.0)
-            >>> form = RateForm.of(Cell.of(arx))
+            >>> form = IncrementalForm.of(Cell.of(arx))
             >>> [(term.channel, term.lag, term.older) for term in (*form.inputs, *form.outputs)]
             [(0, 1, None), (1, 1, None), (1, 1, 2)]
             >>> form.linear.tolist()
