@@ -18,6 +18,7 @@ from sysid.errors import ChannelError, TraceError
 from sysid.estimation import FitResult
 from sysid.ingest.arrays import inputs_of
 from sysid.models import Cascade, History, Start
+from sysid.models.form import unheeded
 from sysid.traces import Role, TraceSet
 from sysid.validation.residuals import ResidualAnalysis, analyse_residuals
 
@@ -61,10 +62,16 @@ class Fit(FitResult):
 
         Raises:
             ChannelError: If an input is missing.
+            ConfigError: If a number is given, and the run is the same without it: a transfer function rests where its
+                inputs hold it.
             TraceError: If the inputs are not as many as the model has.
         """
         inputs = inputs_of(u, self.model.mapping.inputs)
-        return self.model.simulate(inputs, self._history(inputs, initial))
+        run = self.model.simulate(inputs, self._history(inputs, initial))
+        level = None if initial is None or isinstance(initial, History | tuple) else float(initial)
+        if level not in {None, self.model.rest_output} and np.array_equal(run, self.model.simulate(inputs)):
+            raise unheeded(f"{level:g}", model=self.model.structure.label)
+        return run
 
     def predict(
         self, y: Any, u: Any, *, steps: int = 1, initial: float | History | tuple[Any, Any] | None = None

@@ -111,7 +111,7 @@ class Bundle:
 
         Raises:
             ChannelError: If an input is missing, or ``initial`` names no output.
-            ConfigError: If an array has another number of columns.
+            ConfigError: If an array has another number of columns, or ``initial`` says nothing to the model.
         """
         names = tuple(str(entry["name"]) for entry in self.outputs)
         inputs = inputs_of(u, tuple(str(entry["name"]) for entry in self.inputs))
@@ -120,9 +120,7 @@ class Bundle:
         strangers = [name for name in given if name not in names]
         if strangers:
             raise ChannelError(strangers, names, where="initial")
-        levels = surrogate.chosen(surrogate.rest(inputs[0])[np.newaxis])[0]
-        begun = np.array([given.get(name, level) for name, level in zip(names, levels, strict=True)], dtype=np.float64)
-        found = surrogate.chosen(surrogate.compute(inputs, surrogate.rest(inputs[0], begun)))
+        found = surrogate.chosen(surrogate.run_from(inputs, {name: float(level) for name, level in given.items()}))
         if hasattr(u, "columns") and hasattr(u, "index"):
             return type(u)(found, index=u.index, columns=list(names))
         return found[:, 0] if len(names) == 1 else found

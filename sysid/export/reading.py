@@ -14,6 +14,7 @@ from typing import Any
 from sysid.bounded_text import parse_json, read_bounded
 from sysid.errors import BundleError, SysidError, shortened
 from sysid.export.bundle import Bundle, bundle_files
+from sysid.export.finding import find_bundle
 from sysid.export.manifest import MANIFEST, SCHEMA_VERSION, manifest_digest
 from sysid.models import AbstractModel, Cascade, cascade_from_dict, model_from_dict
 
@@ -28,7 +29,7 @@ def read_bundle(folder: Path) -> Bundle:
     The exported files are hashed, not loaded.
 
     Args:
-        folder: The bundle's folder, or its zip.
+        folder: The bundle's folder, its zip, or the folder of the run that exported it.
 
     Returns:
         The model or cascade, and what ``model.json`` says.
@@ -36,7 +37,7 @@ def read_bundle(folder: Path) -> Bundle:
     Raises:
         BundleError: If a file is missing, changed or newer than this version can read.
     """
-    folder = Path(folder)
+    folder = find_bundle(Path(folder))
     content: _AbstractContent = _Zipped(path=folder) if folder.is_file() else _Folder(path=folder)
     manifest = _read_manifest(content)
     try:

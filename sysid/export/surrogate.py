@@ -22,6 +22,7 @@ from sysid.export.cell import cell_of
 from sysid.export.layout import DelayLine, SpaceState
 from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
 from sysid.models import AbstractModel, Cascade, History
+from sysid.models.form import unheeded
 from sysid.models.wiring import Wiring
 from sysid.names import c_identifier, distinct, written_side
 
@@ -263,6 +264,29 @@ class Surrogate:
             return self.source.simulate(inputs, rest=levels).values[:, len(self.inputs) :]
         history = History.at_rest(inputs=inputs[0], output=float(rest[0]))
         return self.source.simulate(inputs, history)[:, np.newaxis]
+
+    def run_from(self, inputs: NDArray[np.float64], initial: Dict[str, float]) -> NDArray[np.float64]:
+        """Free run from other outputs than the declared levels.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in their units.
+            initial: Outputs before the first sample, in their units, by name.
+
+        Returns:
+            Everything that is computed, shape ``(n_samples, n_computed)``.
+
+        Raises:
+            ConfigError: If one of them says nothing to the models: the run would be the same without it.
+        """
+        names = [port.name for port in self.outputs]
+        declared = self.chosen(self.rest(inputs[0])[np.newaxis])[0]
+        moved = np.array([initial.get(name, level) for name, level in zip(names, declared, strict=True)])
+        run = self.compute(inputs, self.rest(inputs[0], moved))
+        for at in np.flatnonzero(moved != declared):
+            kept = np.where(np.arange(len(names)) == at, declared, moved)
+            if np.array_equal(self.compute(inputs, self.rest(inputs[0], kept)), run):
+                raise unheeded(f"{names[at]} = {moved[at]:g}", model=self.label)
+        return run
 
     def state_text(self) -> dict[str, Any]:
         """The state as JSON values, with how to read it."""

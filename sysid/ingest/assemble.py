@@ -37,6 +37,7 @@ class Wanted:
         decimals: Decimals to round to, by channel.
         start: Seconds, in the file's time: what is before is cut off.
         stop: Seconds, in the file's time: what is after is cut off.
+        fixed: Whether the sample time is somebody else's, a model's, and cannot be changed.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Wanted:
     decimals: Mapping[str, int] = field(default_factory=dict)
     start: float | None = None
     stop: float | None = None
+    fixed: bool = False
 
 
 def assemble(
@@ -374,12 +376,13 @@ def _step_error(record: Record, timing: Timing, wanted: Wanted, *, uneven: bool)
             got="no method",
             remedy="add grid: {method: linear} to source",
         )
+    change = "" if wanted.fixed else f"write sample_time: {timing.step:.6g}, or "
     return TraceError(
-        "the record has another sample time than the data set",
+        f"the record has another sample time than the {'model' if wanted.fixed else 'data set'}",
         where=record.table.source,
         expected=f"{wanted.sample_time:g} s between samples",
         got=f"{timing.step:.9g} s",
-        remedy=f"write sample_time: {timing.step:.6g}, or ask for a resampling: grid: {{method: average}} to "
+        remedy=f"{change}ask for a resampling: grid: {{method: average}} to "
         "decimate, {method: linear} or {method: hold} to interpolate; check the unit of time too",
     )
 

@@ -57,6 +57,17 @@ class AbstractForm(ABC):
         return history
 
     @abstractmethod
+    def followed(self, history: History) -> NDArray[np.float64]:
+        """The free run over a history itself, from the state that is estimated on it.
+
+        Args:
+            history: Measured samples, oldest first.
+
+        Returns:
+            Output of shape ``(n_past,)``, in its unit; as measured where a recursion has lags before its first row.
+        """
+
+    @abstractmethod
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run: the model is fed its own past output.
 
@@ -90,6 +101,25 @@ class AbstractForm(ABC):
             ConfigError: If the form does not predict.
             TraceError: If the number of inputs is not the model's.
         """
+
+
+def unheeded(initial: object, *, model: str) -> ConfigError:
+    """Why a run does not begin at an output that was given.
+
+    Args:
+        initial: The output.
+        model: The model's structure, or mapping.
+
+    Returns:
+        The error.
+    """
+    return ConfigError(
+        f"an output before the first sample says nothing to {model}: the run would be the same without it",
+        where="initial",
+        expected="a model that remembers its own output, or one that may rest at any",
+        got=f"initial {initial}",
+        remedy="leave it out, or give measured samples of the output: the initial state is estimated from them",
+    )
 
 
 def no_prediction(kind: str) -> ConfigError:

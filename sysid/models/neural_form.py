@@ -183,13 +183,20 @@ class NeuralForm(AbstractForm):
         Returns:
             Shape ``(n_states,)``.
         """
+        x = self._begun(history)
+        if len(history.output) > 1:
+            self.run(self.scaled(history.inputs), x)
+        return x
+
+    def followed(self, history: History) -> NDArray[np.float64]:
+        """The free run over a history itself; see the base class."""
+        return self.scaling.unscale_output(self.run(self.scaled(history.inputs), self._begun(history)))
+
+    def _begun(self, history: History) -> NDArray[np.float64]:
+        """The state before the oldest sample of a history; of a single one, the state after it."""
         scaled, output = self.scaled(history.inputs), self.scaling.scale_output(history.output)
         x = self.resting(scaled[0], float(output[0]))
-        if len(output) == 1:
-            return x
-        x = self.corrected(scaled, output, x, history.known)
-        self.run(scaled, x)
-        return x
+        return x if len(output) == 1 else self.corrected(scaled, output, x, history.known)
 
     def resting(self, inputs: NDArray[np.float64], output: float) -> NDArray[np.float64]:
         """The state of a system that has stood at these scaled values, by the map ``E``.

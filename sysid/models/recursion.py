@@ -197,6 +197,10 @@ class Recursion(AbstractForm):
         y[places] = run(found)
         return History(inputs=history.inputs, output=self.scaling.unscale_output(y))
 
+    def followed(self, history: History) -> NDArray[np.float64]:
+        """The free run over a history itself; see the base class."""
+        return self.refined(history).output
+
     def predict(
         self, inputs: NDArray[np.float64], output: NDArray[np.float64], history: History, steps: int
     ) -> NDArray[np.float64]:

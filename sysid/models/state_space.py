@@ -85,13 +85,23 @@ class StateSpace(AbstractForm):
         Returns:
             Shape ``(n_state,)``.
         """
+        x = self._begun(history)
+        if len(history.output) > 1:
+            self._run(self._checked(history.inputs), x)
+        return x
+
+    def followed(self, history: History) -> NDArray[np.float64]:
+        """The free run over a history itself; see the base class."""
+        y = self._run(self._checked(history.inputs), self._begun(history))
+        return self.scaling.unscale_output(np.clip(y, self.low, self.high))
+
+    def _begun(self, history: History) -> NDArray[np.float64]:
+        """The state before the oldest sample of a history; of a single one, the state after it."""
         inputs, output = self._checked(history.inputs), self.scaling.scale_output(history.output)
         if len(inputs) == 1:
             return self._resting(inputs[0], float(output[0]))
         x = self.equilibrium(inputs[0]) if self._radius < 1.0 - AT_ONE else np.zeros(self.n_state)
-        x = x + self._correction(inputs, output, x, history.known)
-        self._run(inputs, x)
-        return x
+        return x + self._correction(inputs, output, x, history.known)
 
     @property
     def memory(self) -> int:

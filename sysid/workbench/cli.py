@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from sysid.errors import SysidError
-from sysid.workbench.commands.reader_options import META, ReaderCommand
+from sysid.workbench.commands.reader_options import META, ReaderCommand, RecordCommand
 
 app = typer.Typer(
     name="sysid",
@@ -232,9 +232,13 @@ def orders(
     orders_command(source, mapping=mapping, max_na=max_na, max_nb=max_nb, max_nk=max_nk)
 
 
-@app.command(epilog="Example: sysid simulate runs/service-brake/bundle new.csv --out simulated.csv")
+@app.command(
+    epilog="Example: sysid simulate runs/service-brake new.csv --out simulated.csv --constant valve=3",
+    cls=RecordCommand,
+)
 def simulate(
-    bundle: Annotated[Path, typer.Argument(help="Folder or zip of an exported model or cascade.")],
+    ctx: typer.Context,
+    bundle: Annotated[Path, typer.Argument(help="Folder or zip of an exported model or cascade, or a run folder.")],
     inputs: Annotated[Path | None, typer.Argument(help="File with the input channels at every sample.")] = None,
     *,
     out: Annotated[Path, typer.Option(help="File to write, .csv or .parquet: time, inputs and simulated outputs.")],
@@ -249,8 +253,18 @@ def simulate(
     plot: Annotated[
         Path | None, typer.Option(help="Picture to draw, .png, .svg or .pdf; beside OUT by default for a command.")
     ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            help="How the run begins: estimated, rest, first-sample or measured=N. By default as the pipeline said "
+            "where INPUTS has the measured output, and at rest without it."
+        ),
+    ] = None,
     initial: Annotated[
         float | None, typer.Option(help="Output before the first sample; its declared level by default.")
+    ] = None,
+    constant: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=NUMBER", help="An input that is a number and no column; repeated.")
     ] = None,
     positions: Annotated[
         str | None,
@@ -261,21 +275,23 @@ def simulate(
     old_positions: Annotated[str | None, typer.Option("--places", hidden=True)] = None,
 ) -> None:
     """Run an exported model or cascade on a file of inputs or a command, fed with nothing but its own past."""
+    from sysid.workbench.commands.simulate import Wish, simulate_command
+
     if old_positions is not None:
         from sysid.workbench.old_words import tell_old_word
 
         tell_old_word("--places", "--positions")
         positions = positions or old_positions
-    if positions is not None:
-        from sysid.workbench.commands.simulate_line import simulate_line_command
-
-        simulate_line_command(
-            bundle, command, positions, out, time_unit=time_unit, unit=unit, plot=plot, inputs=inputs, initial=initial
-        )
+    wish = Wish(
+        bundle=bundle, inputs=inputs, out=out, initial=initial, start=start, constants=constant or [],
+        command=command, time_unit=time_unit, unit=unit, plot=plot, reading=ctx.meta[META],
+    )  # fmt: skip
+    if positions is None:
+        simulate_command(wish)
         return
-    from sysid.workbench.commands.simulate import simulate_command
+    from sysid.workbench.commands.simulate_line import simulate_line_command
 
-    simulate_command(bundle, inputs, out, initial=initial, command=command, time_unit=time_unit, unit=unit, plot=plot)
+    simulate_line_command(wish, positions)
 
 
 @app.command(

@@ -21,6 +21,7 @@ from sysid.export.bundle import Bundle
 from sysid.export.simulation import simulate_bundle
 from sysid.ingest import DatasetDescription, Progress, load_described
 from sysid.ingest.description import CaseDescription
+from sysid.models import Start
 from sysid.traces import Role
 from sysid.yaml_files import yaml_text
 
@@ -97,7 +98,7 @@ def errors_of(
                 progress(case, first + index, len(names))
 
         for trace in load_described(sequences, where, cases=some, progress=report):
-            run = simulate_bundle(bundle, trace).trace[output]
+            run = simulate_bundle(bundle, trace, start=Start()).trace[output]
             found.append(np.sqrt(np.mean((run - trace[output])[trace.usable_samples] ** 2)))
     errors = np.array(found)
     return np.where(np.isfinite(errors), errors, np.inf)

@@ -209,7 +209,7 @@ COMMANDS = [
     Bad(id="a promotion of no model", command="promote nothing", tracked=True, says=("nothing", "remedy")),
     Bad(id="a bundle that is not there", command="simulate nowhere datasets/rig/run-1.csv --out o.csv", says=("nowhere", "no model.json", "remedy")),
     Bad(id="inputs that are not there", command="simulate runs/first/bundle no.csv --out o.csv", says=("no.csv", "no such file", "remedy")),
-    Bad(id="inputs without a channel", command="simulate runs/first/bundle a.csv --out o.csv", files={"a.csv": rows().replace("valve", "valbe")}, says=("a.csv", "missing channel valve", "did you mean valbe?")),
+    Bad(id="inputs without a channel", command="simulate runs/first/bundle a.csv --out o.csv", files={"a.csv": rows().replace("valve", "valbe")}, says=("a.csv", "missing channel valve", "--columns valve=valbe")),
     Bad(id="inputs at another sample time", command="simulate runs/first/bundle a.csv --out o.csv", files={"a.csv": rows().replace("[s]", "[min]")}, says=("a.csv", "0.05 s", "3 s", "remedy")),
     Bad(id="an output of an unknown ending", command="simulate runs/first/bundle a.csv --out o.xlsx", files={"a.csv": rows()}, says=("o.xlsx", ".csv", "remedy")),
     Bad(id="an output into a file's inside", command="simulate runs/first/bundle a.csv --out pipelines/first.yaml/o.csv", files={"a.csv": rows()}, says=("o.csv", "remedy")),

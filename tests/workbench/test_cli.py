@@ -141,7 +141,9 @@ def test_a_workspace_of_ones_own_from_first_to_last(tmp_path: Path) -> None:
     assert (mine / "runs/tank/report/index.html").is_file()
     assert not (mine / "mlflow.db").exists()
 
-    simulated = sysid(mine, "simulate", "runs/tank/bundle", "datasets/tank/val.csv", "--out", "out.csv")
+    simulated = sysid(
+        mine, "simulate", "runs/tank/bundle", "datasets/tank/val.csv", "--out", "out.csv", "--start", "rest"
+    )
     assert (simulated.returncode, simulated.stderr) == (0, "")
     output, bundle = read_trace(mine / "out.csv"), read_bundle(mine / "runs/tank/bundle")
     inputs = read_trace(mine / "datasets/tank/val.csv")

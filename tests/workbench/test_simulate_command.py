@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sysid.estimation import FitResult, Loop, Status
 from sysid.export import export_bundle, simulate_bundle
 from sysid.ingest import read_trace
-from sysid.models import ARX, ARXModel, Cascade, Limit, Mapping
+from sysid.models import ARX, ARXModel, Cascade, Limit, Mapping, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.cli import run_cli
 
@@ -80,3 +81,123 @@ def test_a_case_of_the_literature_is_the_trace_of_its_data_set(tmp_path):
     trace = load_dataset("abdx-service")["VAL04"]
     found = read_command(tmp_path / "c.yaml", [trace.channel("STP")]).trace(trace.sample_time)
     np.testing.assert_array_equal(found["STP"], trace["STP"])
+
+
+DECAY = np.concatenate([[5.0], np.zeros(39)])
+for _t in range(1, 40):
+    DECAY[_t] = 0.9 * DECAY[_t - 1] + 0.1 * (_t - 1) / 40 + 0.2 * 3.0
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run folder with one exported model of two inputs, as ``sysid run`` leaves it."""
+    model = ARXModel(
+        orders=ARX(na=1, nb=(1, 1), nk=(1, 1)), coefficients=np.array([0.1, 0.2, 0.9]), intercept=0.0,
+        mapping=Mapping.parse("u+v -> y"), sample_time=0.1, input_units=("V", "V"), output_unit="m", rest_output=0.0,
+    )  # fmt: skip
+    channels = (Channel(name="u", unit="V"), Channel(name="v", unit="V"), Channel(name="y", unit="m"))
+    values = np.column_stack([np.linspace(0.0, 1.0, 50), np.linspace(0.0, 5.0, 50), np.linspace(0.0, 6.0, 50)])
+    record = Trace(name="EST", sample_time=0.1, channels=channels, values=values)
+    traces = TraceSet(name="t", traces=(record,), roles={"EST": Role.ESTIMATION})
+    folder = tmp_path_factory.mktemp("runs") / "mine"
+    (folder / "fits" / "arx").mkdir(parents=True)
+    (folder / "pipeline.yaml").write_text("name: mine")
+    fit = FitResult(model=model, status=Status.EXACT, loop=Loop.OPEN, history={}, train_time_s=0.0)
+    export_bundle(fit, traces, folder / "bundle", formats=[], start=Start(kind="estimated"))
+    return folder
+
+
+def table(path, **columns):
+    """A CSV of 40 samples, 0.1 s apart; headers as they are given, numbers are held."""
+    held = {name: np.broadcast_to(np.asarray(values, dtype=float), 40) for name, values in columns.items()}
+    rows = np.column_stack([0.1 * np.arange(40), *held.values()])
+    np.savetxt(path, rows, delimiter=",", header=",".join(["time [s]", *held]), comments="")
+    return str(path)
+
+
+def simulated(run, *words, out):
+    code = run_cli(["simulate", str(run), *words, "--out", str(out)])
+    return code, (read_trace(out) if code == 0 else None)
+
+
+RAMP = np.arange(40) / 40
+
+
+def test_a_constant_is_an_input_as_a_column_and_as_a_number(run, tmp_path):
+    whole = table(tmp_path / "w.csv", **{"u [V]": RAMP, "v [V]": 3.0})
+    part = table(tmp_path / "p.csv", **{"u [V]": RAMP})
+    _, column = simulated(run, whole, out=tmp_path / "a.csv")
+    _, number = simulated(run, part, "--constant", "v=3", out=tmp_path / "b.csv")
+    np.testing.assert_array_equal(column.values, number.values)
+    (tmp_path / "c.csv").write_text("time [s],u [V]\n0,1\n2,1\n")
+    code, command = simulated(run, "--command", str(tmp_path / "c.csv"), "--constant", "v=3", out=tmp_path / "d.csv")
+    assert code == 0 and set(command["v"]) == {3.0}
+
+
+def test_with_the_measured_output_the_run_begins_where_the_plant_is(run, tmp_path, capsys):
+    file = table(tmp_path / "w.csv", **{"u [V]": RAMP, "v [V]": 3.0, "y [m]": DECAY})
+    _, found = simulated(run, file, out=tmp_path / "a.csv")
+    np.testing.assert_allclose(found["y"], DECAY, atol=1e-10)
+    assert "estimated on the first 8 samples" in capsys.readouterr().out
+    _, rest = simulated(run, file, "--start", "rest", out=tmp_path / "b.csv")
+    assert abs(rest["y"][1] - DECAY[1]) > 1.0
+    _, first = simulated(run, file, "--start", "first-sample", out=tmp_path / "c.csv")
+    assert first["y"][0] == pytest.approx(0.9 * 5.0 + 0.6)
+
+
+def test_samples_at_which_the_output_is_missing_take_no_part(run, tmp_path):
+    """Measured up to now, and the rest of the column is blank."""
+    seen = DECAY.copy()
+    seen[[2, *range(9, 40)]] = np.nan
+    file = table(tmp_path / "w.csv", **{"u [V]": RAMP, "v [V]": 3.0, "y [m]": seen})
+    _, found = simulated(run, file, out=tmp_path / "a.csv")
+    np.testing.assert_allclose(found["y"][10:], DECAY[10:], atol=1e-10)
+
+
+@pytest.mark.parametrize("folder", ["", "fits"])
+def test_a_run_folder_is_taken_for_its_bundle(run, tmp_path, folder):
+    file = table(tmp_path / "w.csv", **{"u [V]": RAMP, "v [V]": 3.0})
+    assert simulated(run / folder, file, out=tmp_path / "a.csv")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("columns", "repaired"),
+    [
+        pytest.param({"U1 [V]": RAMP, "v [V]": RAMP}, ["--columns", "u=U1"], id="another name"),
+        pytest.param({"u": RAMP, "v [V]": RAMP}, ["--units", "u=V"], id="no unit"),
+        pytest.param({"u [V]": RAMP}, ["--constant", "v=0.5"], id="no column"),
+        pytest.param({"u [V]": np.where(RAMP == 0.5, np.nan, RAMP), "v [V]": 1}, ["--repairs", "nan=hold"], id="nan"),
+    ],
+)
+def test_the_remedy_is_an_option_of_this_command(run, tmp_path, capsys, columns, repaired):
+    file = table(tmp_path / "w.csv", **columns)
+    assert simulated(run, file, out=tmp_path / "a.csv")[0] == 2
+    assert repaired[0] in capsys.readouterr().err
+    assert simulated(run, file, *repaired, out=tmp_path / "a.csv")[0] == 0
+
+
+def test_another_sample_time_is_resampled_where_that_is_asked_for(run, tmp_path, capsys):
+    rows = np.column_stack([0.2 * np.arange(40), RAMP, RAMP])
+    np.savetxt(tmp_path / "s.csv", rows, delimiter=",", header="time [s],u [V],v [V]", comments="")
+    assert simulated(run, str(tmp_path / "s.csv"), out=tmp_path / "a.csv")[0] == 2
+    said = capsys.readouterr().err
+    assert "--grid method=linear" in said and "sample_time:" not in said
+    assert simulated(run, str(tmp_path / "s.csv"), "--grid", "method=linear", out=tmp_path / "a.csv")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        pytest.param(["--constant", "w=3"], "missing channel w", id="no such input"),
+        pytest.param(["--constant", "v=3"], "v is given twice", id="twice"),
+        pytest.param(["--constant", "v=nan"], "cannot be held there", id="not finite"),
+        pytest.param(["--constant", "v"], "NAME=NUMBER", id="no number"),
+        pytest.param(["--start", "estimated"], "needs the measured output", id="nothing measured"),
+        pytest.param(["--start", "sleepy"], "cannot begin so", id="no such start"),
+        pytest.param(["--start", "first-sample", "--initial", "3"], "two ways", id="two starts"),
+    ],
+)
+def test_how_a_run_cannot_begin(run, tmp_path, capsys, words, says):
+    file = table(tmp_path / "w.csv", **{"u [V]": RAMP, "v [V]": RAMP})
+    assert simulated(run, file, *words, out=tmp_path / "a.csv")[0] == 2
+    assert says in capsys.readouterr().err

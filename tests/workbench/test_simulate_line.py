@@ -17,6 +17,7 @@ from sysid.units import Reference
 from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.assembly.runner import read_line
 from sysid.workbench.cli import app
+from sysid.workbench.commands.simulate import Wish
 from sysid.workbench.commands.simulate_line import parse_positions, simulate_line_command
 from tests.models.test_interpolation import line
 
@@ -60,7 +61,15 @@ def test_a_command_in_kilopascal_is_converted(run_folder: Path, tmp_path: Path) 
     rows = "time [s],STP [kPa]\n" + "\n".join(f"{t / 10},{p * 6.894757293168}" for t, p in ROWS)
     (tmp_path / "command.csv").write_text(rows, encoding="utf-8")
     for name in ("command.csv", "command.json"):
-        simulate_line_command(run_folder, tmp_path / name, "17", tmp_path / f"{Path(name).suffix[1:]}.parquet")
+        simulate_line_command(
+            Wish(
+                bundle=run_folder,
+                inputs=None,
+                command=tmp_path / name,
+                out=tmp_path / f"{Path(name).suffix[1:]}.parquet",
+            ),
+            "17",
+        )
     channels = (Channel(name="BC17", unit="psi", reference=Reference.GAUGE),)
     one, other = (
         read_trace(tmp_path / f"{name}.parquet", channels=channels, sample_time=0.1)["BC17"] for name in ("csv", "json")
@@ -91,7 +100,9 @@ def test_positions_that_cannot_be_meant_are_refused(text):
 def test_a_run_without_a_line_is_refused(tmp_path: Path) -> None:
     (tmp_path / "command.json").write_text(json.dumps({"command": ROWS}), encoding="utf-8")
     with pytest.raises(ConfigError, match="the run has no line"):
-        simulate_line_command(tmp_path, tmp_path / "command.json", "1:50", tmp_path / "out.csv")
+        simulate_line_command(
+            Wish(bundle=tmp_path, command=tmp_path / "command.json", out=tmp_path / "out.csv"), "1:50"
+        )
 
 
 @pytest.mark.parametrize(
@@ -104,13 +115,22 @@ def test_a_run_without_a_line_is_refused(tmp_path: Path) -> None:
 )
 def test_a_line_is_simulated_from_a_command_alone(tmp_path: Path, command, options, got) -> None:
     with pytest.raises(ConfigError, match="not how a line is simulated") as caught:
-        simulate_line_command(tmp_path, command, "1:50", tmp_path / "out.csv", **options)
+        simulate_line_command(Wish(bundle=tmp_path, command=command, out=tmp_path / "out.csv", **options), "1:50")
     assert got in str(caught.value)
 
 
 def test_a_picture_of_another_kind_is_refused(run_folder: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no picture of this kind"):
-        simulate_line_command(run_folder, tmp_path / "command.json", "2", tmp_path / "o.csv", plot=tmp_path / "o.bmp")
+        simulate_line_command(
+            Wish(
+                bundle=run_folder,
+                inputs=None,
+                command=tmp_path / "command.json",
+                out=tmp_path / "o.csv",
+                plot=tmp_path / "o.bmp",
+            ),
+            "2",
+        )
     assert not (tmp_path / "o.csv").exists()
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 import re
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from types import UnionType
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from typer.core import TyperCommand
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, UserError
 
 if TYPE_CHECKING:
     from sysid.ingest import FileOptions
@@ -23,6 +24,11 @@ META = "sysid.reader_options"
 
 _APART = frozenset({"columns", "units", "references"})
 """What the proposal itself says of each channel."""
+
+_GROUPS = {
+    "repairs": "A repair that may be made, as nan=interpolate, gaps=linear, jitter=resample, duplicates=drop.",
+    "grid": "How samples come onto the sample time of the bundle, as method=average or method=linear.",
+}
 
 _SHORT = {"time_zone": "zone", "time_column": "time"}
 _MARKS = {"\\t": "\t", "tab": "\t", "blank": " ", "space": " "}
@@ -52,13 +58,16 @@ class ReaderOption:
 class ReaderCommand(TyperCommand):
     """A command that takes the readers' options beside its own; they are imported only where one is given."""
 
+    whole = False
+    """Whether columns and units by channel, repairs and the grid are options of it too."""
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Take the readers' options out, and leave the rest to the command."""
         own = {word for parameter in self.params for word in (*parameter.opts, *parameter.secondary_opts)}
         foreign = [
             word for word in args if word.startswith("--") and word.split("=", 1)[0] not in {*own, "--help", "--"}
         ]
-        given, rest = take_options(args) if foreign else ({}, args)
+        given, rest = take_options(args, whole=self.whole) if foreign else ({}, args)
         ctx.meta[META] = given
         return super().parse_args(ctx, rest)
 
@@ -73,9 +82,86 @@ class ReaderCommand(TyperCommand):
         )
         table.add_column("option", no_wrap=True)
         table.add_column("")
-        for option in reader_options().values():
+        for option in reader_options(whole=self.whole).values():
             table.add_row(option.flag + (f", --no-{option.flag[2:]}" if option.truth else ""), option.told)
         Console(highlight=False).print(table, markup=False)
+
+
+class RecordCommand(ReaderCommand):
+    """A command that makes a record of a file, with no ``dataset.yaml`` beside it."""
+
+    whole = True
+
+
+def reading_options(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The options of a :class:`RecordCommand` as those who read records take them.
+
+    Args:
+        given: From the context's ``meta``.
+
+    Returns:
+        ``files``, ``repairs`` and ``grid``, those that were given.
+
+    Raises:
+        ConfigError: If a value cannot be.
+    """
+    from sysid.ingest import GridOptions, RepairOptions
+    from sysid.yaml_files import check
+
+    parts: dict[str, type[Any]] = {"repairs": RepairOptions, "grid": GridOptions}
+    defaults = {"grid": {"fewest_samples": 2}}
+    found: dict[str, Any] = {
+        name: check(kind, {**defaults.get(name, {}), **given[name]}, where=f"the command line, --{name}")
+        for name, kind in parts.items()
+        if name in given
+    }
+    files = {name: value for name, value in given.items() if name not in parts}
+    return found | ({"files": files_from(files)} if files else {})
+
+
+@contextmanager
+def as_typed() -> Iterator[None]:
+    """What is refused within says what helps as it is typed, not as it stands in a ``dataset.yaml``."""
+    try:
+        yield
+    except UserError as error:
+        if error.remedy is None:
+            raise
+        told = typed(error.remedy)
+        if told == error.remedy:
+            raise
+        raise UserError(error.what, where=error.where, expected=error.expected, got=error.got, remedy=told) from error
+
+
+def typed(text: str) -> str:
+    """Options of a data set as options of a command.
+
+    Args:
+        text: A remedy.
+
+    Returns:
+        The same, with ``repairs: {nan: hold}`` as ``--repairs nan=hold`` and ``files: {time: 't [ms]'}`` as
+        ``--time 't [ms]'``.
+
+    Example:
+        >>> typed("ask for repairs: {gaps: linear} or {gaps: hold}; (grid: {longest_step: ...})")
+        'ask for --repairs gaps=linear or --repairs gaps=hold; (--grid longest_step=...)'
+    """
+    section = ""
+
+    def option(found: re.Match[str]) -> str:
+        nonlocal section
+        section = found[1] or section
+        if not section:
+            return found[0]
+        name, value = found[2], found[3].strip()
+        inner = re.fullmatch(r"\{([^:{}]+): ([^{}]*)\}", value)
+        if section == "files" and inner:
+            return f"--{name}-{inner[1]} {inner[2]}" if name == "time" else f"--{name} {inner[1]}={inner[2]}"
+        return f"--{name} {value}" if section == "files" else f"--{section} {name}={value}"
+
+    said = re.sub(r"(?:(repairs|grid|files): )?\{(\w+): (\{[^{}]*\}|[^{}]*)\}", option, text)
+    return said.replace(" in a dataset.yaml", "").replace(" to source", "")
 
 
 def files_from(given: Mapping[str, Any]) -> FileOptions:
@@ -96,11 +182,12 @@ def files_from(given: Mapping[str, Any]) -> FileOptions:
     return check(FileOptions, given, where="the command line") if given else FileOptions()
 
 
-def take_options(words: Sequence[str]) -> tuple[dict[str, Any], list[str]]:
+def take_options(words: Sequence[str], *, whole: bool = False) -> tuple[dict[str, Any], list[str]]:
     """The readers' options among the words of a command line.
 
     Args:
         words: For example ``["log.csv", "--separator", ";", "--states", "OFF=0"]``.
+        whole: Whether columns and units by channel, repairs and the grid are among them.
 
     Returns:
         The options as plain data, and the words that are left.
@@ -108,7 +195,7 @@ def take_options(words: Sequence[str]) -> tuple[dict[str, Any], list[str]]:
     Raises:
         ConfigError: If a value is missing or cannot be read.
     """
-    known = reader_options()
+    known = reader_options(whole=whole)
     given: dict[str, Any] = {}
     rest: list[str] = []
     queue = list(words)
@@ -171,8 +258,12 @@ def _bad(option: ReaderOption, got: str) -> ConfigError:
 
 
 @cache
-def reader_options() -> dict[str, ReaderOption]:
-    """Every option of the readers that can be typed, by its flag."""
+def reader_options(*, whole: bool = False) -> dict[str, ReaderOption]:
+    """Every option of the readers that can be typed, by its flag.
+
+    Args:
+        whole: Whether columns and units by channel, repairs and the grid are among them.
+    """
     from pydantic import BaseModel
 
     from sysid.ingest import FileOptions
@@ -185,7 +276,7 @@ def reader_options() -> dict[str, ReaderOption]:
             inner = next(
                 (t for t in _types(field.annotation) if isinstance(t, type) and issubclass(t, BaseModel)), None
             )
-            if not place and name in _APART:
+            if not place and name in _APART and not whole:
                 continue
             if inner is not None:
                 walk(inner, (*place, name))
@@ -193,6 +284,11 @@ def reader_options() -> dict[str, ReaderOption]:
             found.append(_option((*place, name), _types(field.annotation), told.get(name, "")))
 
     walk(FileOptions, ())
+    if whole:
+        found += [
+            ReaderOption(flag=f"--{name}", place=(name,), truth=False, literal=False, repeated=False, told=told)
+            for name, told in _GROUPS.items()
+        ]
     return {option.flag: option for option in found}
 
 

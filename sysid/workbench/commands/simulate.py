@@ -2,65 +2,155 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.export.flags import Flag
+from sysid.export.inputs import InputOptions, read_inputs
 from sysid.export.reading import read_bundle
-from sysid.export.simulation import Simulation, read_inputs, simulate_bundle
+from sysid.export.simulation import Simulation, simulate_bundle
 from sysid.ingest import write_trace
+from sysid.models import Start, StartKind
+from sysid.validation.metrics import percent
+from sysid.workbench.commands.reader_options import as_typed, reading_options
 from sysid.workbench.runner.console import console
 
 PICTURES = (".png", ".svg", ".pdf")
 """What a picture may end in."""
 
 
-def simulate_command(
-    bundle: Path,
-    inputs: Path | None,
-    out: Path,
-    *,
-    initial: float | None = None,
-    command: Path | None = None,
-    time_unit: str | None = None,
-    unit: str | None = None,
-    plot: Path | None = None,
-) -> None:
-    """Simulate and write time, inputs and outputs.
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What was typed.
 
     Args:
-        bundle: The bundle's folder, or its zip.
-        inputs: A file with the input channels; units are converted to the bundle's.
+        bundle: The bundle's folder or zip, or the folder of the run that exported it.
         out: The file to write, ``.csv`` or ``.parquet``.
+        inputs: A file with the input channels; units are converted to the bundle's.
         initial: The output's value before the first sample; ``None`` is its declared level.
+        start: How the run begins, as in a pipeline; ``None`` leaves it to the bundle and the file.
+        constants: ``NAME=NUMBER`` of inputs that are held.
         command: A command table in place of ``inputs``.
         time_unit: Unit of the command's times, where it does not say.
         unit: Unit of the command's values, likewise.
         plot: A picture to draw; by default beside ``out`` for a command, and none for inputs.
+        reading: The options of the readers, and ``repairs`` and ``grid``, as plain data.
+    """
+
+    bundle: Path
+    out: Path
+    inputs: Path | None = None
+    initial: float | None = None
+    start: str | None = None
+    constants: Sequence[str] = ()
+    command: Path | None = None
+    time_unit: str | None = None
+    unit: str | None = None
+    plot: Path | None = None
+    reading: Mapping[str, Any] = field(default_factory=dict)
+
+
+def simulate_command(wish: Wish) -> None:
+    """Simulate and write time, inputs and outputs.
+
+    Args:
+        wish: What was typed.
 
     Raises:
         BundleError: If the bundle is damaged or incomplete.
         UserError: If the inputs cannot be read, or the output not written.
     """
-    _check(inputs, command, initial, plot)
-    read = read_bundle(bundle)
-    if command is not None:
-        simulation = simulate_bundle(read, command, time_unit=time_unit, unit=unit, initial=initial)
-        plot = plot or out.with_suffix(".png")
+    _check(wish)
+    read, plot, start = read_bundle(wish.bundle), wish.plot, parse_start(wish.start)
+    constants = parse_constants(wish.constants)
+    if wish.command is not None:
+        words = {"time_unit": wish.time_unit, "unit": wish.unit}
+        simulation = simulate_bundle(
+            read, wish.command, **words, initial=wish.initial, start=start, constants=constants
+        )
+        plot = plot or wish.out.with_suffix(".png")
     else:
-        simulation = simulate_bundle(read, read_inputs(read, Path(str(inputs))), initial=initial)
-    write_trace(replace(simulation.trace, name=out.stem), out)
-    _tell(simulation, out)
+        measured = wish.initial is None and (start is None or start.kind is not StartKind.REST)
+        with as_typed():
+            options = InputOptions(constants=constants, measured=measured, **reading_options(wish.reading))
+            inputs = read_inputs(read, Path(str(wish.inputs)), options)
+        simulation = simulate_bundle(read, inputs, initial=wish.initial, start=start)
+    write_trace(replace(simulation.trace, name=wish.out.stem), wish.out)
+    _tell(simulation, wish.out)
     if plot is not None:
         _draw(simulation, plot, title=read.metadata["mapping"])
         console().print(f"drawn in {plot}", soft_wrap=True)
 
 
-def _check(inputs: Path | None, command: Path | None, initial: float | None, plot: Path | None) -> None:
+def parse_constants(words: Sequence[str]) -> dict[str, float]:
+    """Inputs that are a number, as they are typed.
+
+    Args:
+        words: ``NAME=NUMBER`` each; a name may hold further ``=``.
+
+    Returns:
+        The numbers by name.
+
+    Raises:
+        ConfigError: If one cannot be read, or is there twice.
+
+    Example:
+        >>> parse_constants(["u2=3", "a=b=-1e-3"])
+        {'u2': 3.0, 'a=b': -0.001}
+    """
+    found: dict[str, float] = {}
+    for word in words:
+        name, equals, number = word.rpartition("=")
+        try:
+            value = float(number)
+        except ValueError:
+            value = None
+        if not equals or value is None or name in found:
+            raise ConfigError(
+                "an input cannot be held at this", where="option --constant", expected="NAME=NUMBER, each name once",
+                got=word, remedy="write the input's name, = and a number in its unit, as in --constant valve=3",
+            )  # fmt: skip
+        found[name] = value
+    return found
+
+
+def parse_start(word: str | None) -> Start | None:
+    """How a run begins, as it is typed.
+
+    Args:
+        word: ``estimated``, ``rest``, ``first-sample`` or ``measured=50``; ``estimated=20`` says on how many samples.
+
+    Returns:
+        The start; ``None`` where nothing is said.
+
+    Raises:
+        ConfigError: If it cannot be read.
+
+    Example:
+        >>> parse_start("measured=50").n_measured
+        50
+    """
+    if word is None:
+        return None
+    kind, _, number = word.partition("=")
+    try:
+        return Start(kind=StartKind(kind), n_measured=int(number or 0))
+    except (ValueError, ConfigError):
+        raise ConfigError(
+            "a run cannot begin so", where="option --start",
+            expected="estimated, rest, first-sample or measured=N", got=word,
+            remedy="choose one of them, as in --start measured=50",
+        ) from None  # fmt: skip
+
+
+def _check(wish: Wish) -> None:
+    inputs, command, initial = wish.inputs, wish.command, wish.initial
     if (inputs is None) == (command is None):
         raise ConfigError(
             "nothing says what to simulate" if inputs is None else "two files say what to simulate",
@@ -68,6 +158,14 @@ def _check(inputs: Path | None, command: Path | None, initial: float | None, plo
             expected="a file of inputs at every sample, or --command with a table of a few rows",
             got="neither" if inputs is None else f"{inputs} and --command {command}",
             remedy="give one of them",
+        )
+    if command is not None and wish.reading:
+        raise ConfigError(
+            "these options are for a file of samples",
+            where="sysid simulate --command",
+            expected="--time-unit, --unit, --constant and --initial",
+            got=", ".join(wish.reading),
+            remedy="leave them out: a command table says its units, or --time-unit and --unit do",
         )
     if initial is not None and not np.isfinite(initial):
         raise ConfigError(
@@ -77,7 +175,7 @@ def _check(inputs: Path | None, command: Path | None, initial: float | None, plo
             got=f"--initial {initial}",
             remedy="give the output's value before the first sample, or leave --initial out",
         )
-    check_picture(plot)
+    check_picture(wish.plot)
 
 
 def check_picture(plot: Path | None) -> None:
@@ -102,6 +200,13 @@ def check_picture(plot: Path | None) -> None:
 def _tell(simulation: Simulation, out: Path) -> None:
     names = ", ".join(simulation.outputs)
     console().print(f"{len(simulation.trace)} samples of {names} written to {out}", soft_wrap=True)
+    console().print(simulation.begins, soft_wrap=True)
+    for name, found in simulation.scored.items():
+        of = (
+            f"on the {len(simulation.trace) - simulation.first} samples after" if simulation.first else "on all samples"
+        )
+        text = f"fit {percent(found.nrmse_fit)} %, mean squared error {found.mse:.4g} {found.unit}²"
+        console().print(f"against the measured {name}: {text}, {of}", soft_wrap=True, markup=False)
     for sentence in simulation.sentences:
         console().print(sentence, soft_wrap=True)
 

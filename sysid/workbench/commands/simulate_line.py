@@ -15,7 +15,7 @@ from sysid.ingest import write_trace
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.assembly.runner import read_line
-from sysid.workbench.commands.simulate import check_picture
+from sysid.workbench.commands.simulate import Wish, check_picture
 from sysid.workbench.runner.console import console
 
 DRAWN = 5
@@ -25,51 +25,41 @@ MOST = 10_000
 """Positions in one call: more are not meant."""
 
 
-def simulate_line_command(
-    folder: Path,
-    command: Path | None,
-    asked: str,
-    out: Path,
-    *,
-    time_unit: str | None = None,
-    unit: str | None = None,
-    plot: Path | None = None,
-    inputs: Path | None = None,
-    initial: float | None = None,
-) -> None:
+def simulate_line_command(wish: Wish, asked: str) -> None:
     """Simulate a line and write time, inputs and every output at every position, as ``BC17`` for position 17.
 
     Args:
-        folder: The run folder of an assembly with a line.
-        command: A command table.
+        wish: What was typed; its bundle is the run folder of an assembly with a line.
         asked: ``1:50``, ``1:50:5`` or ``1,10,25.5``.
-        out: The file to write, ``.csv`` or ``.parquet``.
-        time_unit: Unit of the command's times, where it does not say.
-        unit: Unit of the command's values, likewise.
-        plot: A picture to draw; beside ``out`` by default.
-        inputs: Not for a line: refused.
-        initial: Not for a line: refused.
 
     Raises:
+        ConfigError: If more than a command was given: a line has no inputs at every sample, and begins at rest.
         UserError: If the line or the command cannot be read, or the output not written.
     """
-    if command is None or inputs is not None or initial is not None:
-        given = {"no command": command is None, f"inputs {inputs}": inputs, f"--initial {initial}": initial is not None}
+    given = {
+        "no command": wish.command is None,
+        f"inputs {wish.inputs}": wish.inputs is not None,
+        f"--initial {wish.initial}": wish.initial is not None,
+        f"--start {wish.start}": wish.start not in {None, "rest"},
+        f"--constant {' '.join(wish.constants)}": bool(wish.constants),
+        ", ".join(wish.reading): bool(wish.reading),
+    }
+    if wish.command is None or sum(given.values()):
         raise ConfigError(
             "that is not how a line is simulated",
             where="sysid simulate --positions",
-            expected="--command with a table of a few rows, and neither inputs nor --initial",
+            expected="--command with a table of a few rows, and nothing else that says what goes in or how it begins",
             got=", ".join(what for what, yes in given.items() if yes),
-            remedy="give the command alone",
+            remedy="give --command FILE alone",
         )
-    check_picture(plot)
-    stored, positions = read_line(folder), parse_positions(asked)
-    table = read_command(command, stored.inputs, time_unit=time_unit, unit=unit)
+    check_picture(wish.plot)
+    out, stored, positions = wish.out, read_line(wish.bundle), parse_positions(asked)
+    table = read_command(wish.command, stored.inputs, time_unit=wish.time_unit, unit=wish.unit)
     trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
     write_trace(replace(trace, name=out.stem), out)
     names = ", ".join(channel.name for channel in stored.outputs)
     console().print(f"{len(trace)} samples of {names} at {len(positions)} positions written to {out}", soft_wrap=True)
-    _draw(stored, trace, positions, plot or out.with_suffix(".png"), title=folder.name)
+    _draw(stored, trace, positions, wish.plot or out.with_suffix(".png"), title=wish.bundle.name)
 
 
 def simulate_line(stored: StoredInterpolation, given: Trace, positions: list[float]) -> Trace:
