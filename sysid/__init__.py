@@ -17,8 +17,8 @@ __version__ = "0.1.0"
 
 WORDS = (
     *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
-    *("ARX", "NARX", "NeuralStateSpace", "TransferFunction"),
-    *("Training", "TransferFunctionTraining", "StabilityOptions", "Start", "Role"),
+    *("OrderSearch", "ARX", "NARX", "NeuralStateSpace", "TransferFunction", "VectorNARX"),
+    *("Training", "JointTraining", "TransferFunctionTraining", "StabilityOptions", "Start", "Role"),
 )
 """What is imported when it is first used: ``sysid --help`` loads none of it."""
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models import Cascade, Ends, History, Limit, Member, NeuralForm, Recursion, VectorNARXModel
+from sysid.models import Cascade, Ends, History, Limit, Member, NeuralForm, Recursion
 
 
 def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float64]) -> float:
@@ -106,26 +106,22 @@ def _member_step(model: Member, past: dict[str, list[float]]) -> list[float]:
     past = {
         name: values + [np.nan] * (n_known + 1 - len(values)) for name, values in past.items() if name in ends.inputs
     } | {name: past[name] for name in ends.outputs}
-    if not isinstance(model, VectorNARXModel):
-        form = model.recursion
-        if not isinstance(form, Recursion):
-            raise TypeError(f"{model.mapping} is no recursion over lagged regressors")
-        inputs = form.scaling.scale_inputs(np.array([past[name] for name in ends.inputs]).T)
-        outputs = form.scaling.scale_output(np.array(past[ends.outputs[0]]))
-        return [float(form.scaling.unscale_output(np.array(step(form, inputs, outputs))))]
-    scaling, n = model.scaling, model.network.neurons
+    part = model.recursion.part
+    if part is None:
+        raise TypeError(f"{model.mapping} is no recursion over lagged regressors")
     x = []
-    for column, (name, lags) in enumerate(zip((*ends.inputs, *ends.outputs), model.lags.inputs, strict=True)):
+    for column, (name, lags) in enumerate(zip((*ends.inputs, *ends.outputs), part.lags.inputs, strict=True)):
         own = column >= len(ends.inputs)
-        offset = (*scaling.input_offset, *scaling.output_offset)[column]
-        scale = (*scaling.input_scale, *scaling.output_scale)[column]
-        x += [(past[name][-lag if own else -1 - lag] - offset) / scale for lag in lags]
-    r, m = len(x), len(ends.outputs)
-    W, b, V, c, w = np.split(model.theta, np.cumsum([n * r, n, m * n, m]))
+        x += [(past[name][-lag if own else -1 - lag] - part.offset[column]) / part.scale[column] for lag in lags]
+    n, r, m = part.neurons, len(x), len(ends.outputs)
+    W, b, V, c, w, gates = np.split(part.theta, np.cumsum([n * r, n, m * n, m, m * r if part.linear else 0]))
     h = np.tanh(W.reshape(n, r) @ x + b)
-    y = V.reshape(m, n) @ h + c + (w.reshape(m, r) @ x if len(w) else 0.0)
-    y = np.clip(y, -model.clamp, model.clamp)
-    return [float(v * s + o) for v, s, o in zip(y, scaling.output_scale, scaling.output_offset, strict=True)]
+    y = V.reshape(m, n) @ h + c
+    y = y + w.reshape(m, r) @ x if part.linear else y
+    y = y + h @ (gates.reshape(n, r) @ x) if part.gated else y
+    y = np.clip(y, part.low, part.high)
+    units = zip(y, part.scale[-m:], part.offset[-m:], strict=True)
+    return [float(value * scale + offset) for value, scale, offset in units]
 
 
 def run_neural(form: NeuralForm, inputs: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from sysid.api.several import Several
 from sysid.estimation import FitResult
 from sysid.models import Start, StartKind
 from sysid.traces import TraceSet
-from sysid.validation import Evaluation, evaluate
+from sysid.validation import Evaluation, evaluate_outputs
 from sysid.validation.metrics import percent
 
 if TYPE_CHECKING:
@@ -115,14 +115,15 @@ def compare(traces: TraceSet, *fits: FitResult | Several, start: Start = ESTIMAT
     Returns:
         The figures; printing them shows a table, ``plot()`` draws them.
     """
-    single = [
-        (one, output) for fit in fits for output, one in ({"": fit} if isinstance(fit, FitResult) else fit.fits).items()
-    ]
     evaluations: dict[str, Evaluation] = {}
     outputs: dict[str, tuple[str, str]] = {}
-    for one, output in single:
-        label = f"{one.model.structure.label} -> {output}" if output else one.model.structure.label
-        label = label if label not in evaluations else f"{label} ({len(evaluations) + 1})"
-        evaluations[label] = evaluate(one.model, traces, start, posterior=one.posterior)
-        outputs[label] = (one.model.mapping.output, one.model.output_unit)
+    for fit in fits:
+        members = [fit] if isinstance(fit, FitResult) else list(fit.fits.values())
+        several = len(members) > 1 or len(members[0].model.mapping.outputs) > 1
+        for one in members:
+            units = dict(zip(one.model.mapping.outputs, one.model.ends.output_units, strict=True))
+            for output, found in evaluate_outputs(one.model, traces, start, posterior=one.posterior).items():
+                label = f"{one.model.structure.label} -> {output}" if several else one.model.structure.label
+                label = label if label not in evaluations else f"{label} ({len(evaluations) + 1})"
+                evaluations[label], outputs[label] = found, (output, units[output])
     return Comparison(evaluations=evaluations, outputs=outputs)

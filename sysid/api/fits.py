@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
     from sysid.export import Bundle
 
+Initial = float | Dict[str, float] | History | tuple[Any, Any] | None
+"""What stands before a run; see :meth:`Fit.simulate`."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Fit(FitResult):
@@ -48,47 +52,48 @@ class Fit(FitResult):
         fields = {field.name: getattr(result, field.name) for field in dataclasses.fields(FitResult)}
         return cls(**fields, traces=traces, start=start)
 
-    def simulate(self, u: Any, *, initial: float | History | tuple[Any, Any] | None = None) -> NDArray[np.float64]:
+    def simulate(self, u: Any, *, initial: Initial = None) -> NDArray[np.float64]:
         """Free run: the model is fed nothing but inputs and its own past output.
 
         Args:
             u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the mapping's order, a frame
                 or dict with columns by name, or a trace; for a model without input the number of samples.
             initial: What stands before the first sample: nothing for the system at rest; a number, the output that it
-                has stood at; a pair ``(u, y)`` of the samples before, oldest first; or a history.
+                has stood at, or numbers by name of several outputs; a pair ``(u, y)`` of the samples before, oldest
+                first; or a history.
 
         Returns:
-            The output, shape ``(n_samples,)``, in its unit.
+            The output, shape ``(n_samples,)``, in its unit; of a model of several outputs ``(n_samples, n_outputs)``.
 
         Raises:
-            ChannelError: If an input is missing.
+            ChannelError: If an input is missing, or ``initial`` names no output.
             ConfigError: If a number is given, and the run is the same without it: a transfer function rests where its
                 inputs hold it.
             TraceError: If the inputs are not as many as the model has.
         """
         inputs = inputs_of(u, self.model.mapping.inputs)
-        run = self.model.simulate(inputs, self._history(inputs, initial))
-        level = None if initial is None or isinstance(initial, History | tuple) else float(initial)
-        if level not in {None, self.model.rest_output} and np.array_equal(run, self.model.simulate(inputs)):
-            raise unheeded(f"{level:g}", model=self.model.structure.label)
+        history = self._history(inputs, initial)
+        run = self.model.simulate(inputs, history)
+        if history is not None and not isinstance(initial, History | tuple):
+            other = not np.array_equal(history.output[0], self.model.resting)
+            if other and np.array_equal(run, self.model.simulate(inputs)):
+                raise unheeded(f"{initial}", model=self.model.structure.label)
         return run
 
-    def predict(
-        self, y: Any, u: Any, *, steps: int = 1, initial: float | History | tuple[Any, Any] | None = None
-    ) -> NDArray[np.float64]:
+    def predict(self, y: Any, u: Any, *, steps: int = 1, initial: Initial = None) -> NDArray[np.float64]:
         """Prediction from measured output.
 
         Args:
-            y: Measured output, shape ``(n_samples,)``.
+            y: Measured output, shape ``(n_samples,)``, or ``(n_samples, n_outputs)`` of a model of several outputs.
             u: Inputs, as for :meth:`simulate`.
             steps: How many samples ahead.
             initial: As for :meth:`simulate`.
 
         Returns:
-            What each sample was predicted to be ``steps`` before it, shape ``(n_samples,)``, in the output's unit.
+            What each sample was predicted to be ``steps`` before it, of the shape of ``y``, in the output's unit.
         """
         inputs = inputs_of(u, self.model.mapping.inputs)
-        output = np.asarray(y, dtype=np.float64).reshape(-1)
+        output = self._outputs(y)
         if len(output) != len(inputs):
             raise TraceError(
                 "inputs and output have different lengths",
@@ -98,18 +103,21 @@ class Fit(FitResult):
             )
         return self.model.predict(inputs, output, self._history(inputs, initial), steps=steps)
 
-    def residuals(self, traces: TraceSet | None = None, *, free_run: bool = False) -> ResidualAnalysis:
+    def residuals(
+        self, traces: TraceSet | None = None, *, free_run: bool = False, output: str | None = None
+    ) -> ResidualAnalysis:
         """Are the residuals white, and independent of the inputs?
 
         Args:
             traces: The cases; those that the fit was made of by default.
             free_run: Residuals of the free run in place of those one step ahead.
+            output: Which output, of a model of several.
 
         Returns:
             Correlations with their bounds, and the Ljung-Box test.
         """
         records = tuple(traces) if traces is not None else self.traces.with_role(Role.ESTIMATION)
-        return analyse_residuals(self.model, records, self.start, free_run=free_run)
+        return analyse_residuals(self.model, records, self.start, free_run=free_run, output=output)
 
     def plot(self, traces: TraceSet | None = None) -> Figure:
         """Its free run over the measured output, case by case.
@@ -151,15 +159,30 @@ class Fit(FitResult):
     def _compared(self) -> Any:
         return compare(self.traces, self, start=self.start)
 
-    def _history(
-        self, inputs: NDArray[np.float64], initial: float | History | tuple[Any, Any] | None
-    ) -> History | None:
+    def _outputs(self, y: Any) -> NDArray[np.float64]:
+        output = np.asarray(y, dtype=np.float64)
+        return output.reshape(len(output), -1) if self.model.structure.several_outputs else output.reshape(-1)
+
+    def _history(self, inputs: NDArray[np.float64], initial: Initial) -> History | None:
+        model = self.model
         if initial is None or isinstance(initial, History):
             return initial
         if isinstance(initial, tuple):
-            before = inputs_of(initial[0], self.model.mapping.inputs)
-            return History(inputs=before, output=np.asarray(initial[1], dtype=np.float64).reshape(-1))
-        return History.at_rest(inputs=inputs[0], output=float(initial))
+            return History(inputs=inputs_of(initial[0], model.mapping.inputs), output=self._outputs(initial[1]))
+        if not model.structure.several_outputs and not isinstance(initial, Dict):
+            return History.at_rest(inputs=inputs[0], output=float(initial))
+        names = model.mapping.outputs
+        given = dict(initial) if isinstance(initial, Dict) else dict.fromkeys(names, initial)
+        check_outputs(given, names)
+        rest = np.array([given.get(n, r) for n, r in zip(names, model.ends.rest_outputs, strict=True)], dtype=float)
+        return History.at_rest(inputs=inputs[0], output=rest if model.structure.several_outputs else float(rest[0]))
+
+
+def check_outputs(given: Iterable[str], names: tuple[str, ...]) -> None:
+    """Refuse names of initial values that are no outputs."""
+    strangers = [name for name in given if name not in names]
+    if strangers:
+        raise ChannelError(strangers, names, where="initial")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -206,10 +229,23 @@ class SystemFit:
             Shape ``(n_samples, n_outputs)``, in the outputs' units.
         """
         given = dict(initial or {})
-        strangers = [name for name in given if name not in self.fits]
-        if strangers:
-            raise ChannelError(strangers, self.outputs, where="initial")
+        check_outputs(given, self.outputs)
         return np.column_stack([fit.simulate(u, initial=given.get(name)) for name, fit in self.fits.items()])
+
+    def predict(self, y: Any, u: Any, *, steps: int = 1) -> NDArray[np.float64]:
+        """Prediction of all outputs from measured ones; see :meth:`Fit.predict`.
+
+        Args:
+            y: Measured outputs, shape ``(n_samples, n_outputs)``, in their order.
+            u: Inputs, as for :meth:`Fit.simulate`.
+            steps: How many samples ahead.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``, in the outputs' units.
+        """
+        columns = np.asarray(y, dtype=np.float64).reshape(-1, len(self.fits)).T
+        found = [fit.predict(column, u, steps=steps) for fit, column in zip(self.fits.values(), columns, strict=True)]
+        return np.column_stack(found)
 
     def plot(self, traces: TraceSet | None = None) -> Figure:
         """The free run of each output over its measurement, case by case."""

@@ -12,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimators import Options
 from sysid.ingest import READERS, load_dataset, read_trace
-from sysid.models import AbstractStructure, Mapping, Start, VectorMapping
+from sysid.models import AbstractStructure, Mapping, Start
 from sysid.traces import Role, TraceSet
 
 
@@ -49,7 +49,7 @@ def fit(
     training: Options | None = None,
     *,
     start: Start = ESTIMATED,
-    rest_output: float | None = None,
+    rest_output: float | Dict[str, float] | None = None,
     initial: FitResult | None = None,
     stability: StabilityOptions = StabilityOptions(),  # noqa: B008 - frozen
 ) -> Fit | SystemFit:
@@ -57,13 +57,14 @@ def fit(
 
     Args:
         traces: The data set.
-        mapping: Which channels go in, which come out: ``"u1+u2 -> y"``, or ``"u1+u2 -> y1+y2"``, where each output gets
-            a model of the structure and all of them are run as one. As lists, ``{"inputs": ["P+"], "output": "V->C"}``,
+        mapping: Which channels go in, which come out: ``"u1+u2 -> y"``, or ``"u1+u2 -> y1+y2"``. A structure with
+            several outputs of its own, such as :class:`~sysid.VectorNARX`, gives one model of all; of any other, each
+            output gets a model, and all of them are run as one. As lists, ``{"inputs": ["P+"], "output": "V->C"}``,
             names may hold anything.
         structure: What is fitted.
         training: How a network is trained, or a transfer function; an ARX model has nothing to choose.
         start: How each free run begins.
-        rest_output: The output's value at rest, in its unit; needed where ``start`` is rest.
+        rest_output: The output's value at rest, in its unit, or by name of several; needed where ``start`` is rest.
         initial: A fit to begin with: of the same network, whose loop is to be closed, of a smaller one, or of an ARX
             model over its lags.
         stability: How the free run is checked: by default over 1,000 random sequences, in some seconds;
@@ -77,7 +78,7 @@ def fit(
             apply to it.
         ChannelError: If a channel of the mapping is missing.
     """
-    chosen = _single(VectorMapping.of(mapping))
+    chosen = structure.mappings(Mapping.of(mapping))
     estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)
     if not estimation:
         raise ConfigError(
@@ -87,7 +88,7 @@ def fit(
             got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
             remedy="give one that role",
         )
-    fits: dict[str, Fit] = {}
+    fits: list[Fit] = []
     for one in chosen:
         found = estimators.fit(
             estimation,
@@ -100,10 +101,5 @@ def fit(
             initial=initial,
             stability=stability,
         )
-        fits[one.output] = Fit.of(found, traces, start)
-    return SystemFit.of(fits) if len(fits) > 1 else next(iter(fits.values()))
-
-
-def _single(mapping: VectorMapping) -> tuple[Mapping, ...]:
-    """One mapping an output, all of the same inputs."""
-    return tuple(Mapping(inputs=mapping.inputs, output=output) for output in mapping.outputs)
+        fits.append(Fit.of(found, traces, start))
+    return SystemFit.of({fit.model.mapping.output: fit for fit in fits}) if len(fits) > 1 else fits[0]

@@ -202,6 +202,7 @@ def search_orders(
         'ARX [2; 1; 3]'
     """
     chosen = Mapping.of(mapping)
+    chosen.check_single("an order search")
     estimation = traces.with_role(Role.ESTIMATION)
     if not estimation:
         raise ConfigError(

@@ -40,7 +40,7 @@ def equilibrium_notes(model: AbstractModel, traces: Sequence[Trace], start: Star
     asked = [model, *_plain_models(traces, model)]
     told = []
     for trace in traces:
-        found = [sentence for one in asked if (sentence := _of(one, trace, start))]
+        found = [sentence for one in asked for sentence in _of(one, trace, start)]
         told += found[:1]
     rest = len(told) - MOST_TOLD
     return (*told[:MOST_TOLD], *([f"{rest} more records do not begin so."] if rest > 0 else []))
@@ -51,32 +51,38 @@ def _plain_models(traces: Sequence[Trace], model: AbstractModel) -> list[Abstrac
     m = len(model.mapping.inputs)
     lags = max(1, min(LAGS, min(len(trace) for trace in traces) // (4 * (1 + m))))
     orders = ARX(na=min(2, lags), nb=(lags,) * m, nk=(0,) * m)
-    try:
-        found = fit_arx(traces, model.mapping, orders, start=ESTIMATED).model
-    except TraceError:
-        return []
-    return [found] if isinstance(found, ARXModel) and np.abs(found.poles).max(initial=0.0) < 1.0 else []
+    models: list[AbstractModel] = []
+    for mapping in model.mapping.each:
+        try:
+            found = fit_arx(traces, mapping, orders, start=ESTIMATED).model
+        except TraceError:
+            continue
+        if isinstance(found, ARXModel) and np.abs(found.poles).max(initial=0.0) < 1.0:
+            models.append(found)
+    return models
 
 
-def _of(model: AbstractModel, trace: Trace, start: Start) -> str:
-    inputs, output = trace.columns(model.mapping.inputs), trace[model.mapping.output]
+def _of(model: AbstractModel, trace: Trace, start: Start) -> list[str]:
+    inputs, output = trace.columns(model.mapping.inputs), model.measured(trace)
     usable = trace.usable_samples
     begun = beginning(model, inputs, output, ESTIMATED, usable)
     n = begun.first
     if n == 0:
-        return ""
-    declared = model.simulate(inputs[:n], start.history(inputs, output, model.rest_output, usable))
+        return []
+    declared = model.simulate(inputs[:n], start.history(inputs, output, model.resting, usable))
     after = model.simulate(inputs[n:], begun.history) - output[n:]
-    off = np.abs(declared - output[:n])[usable[:n]]
-    later = after[usable[n:]]
+    off = np.abs(declared - output[:n])[usable[:n]].reshape(-1, len(model.mapping.outputs))
+    later = after[usable[n:]].reshape(-1, len(model.mapping.outputs))
     if not len(off) or not len(later) or not np.isfinite(off).all() or not np.isfinite(later).all():
-        return ""
-    level = float(np.sqrt(np.mean(later**2)))
-    if float(off.max()) <= max(BEYOND * level, LEAST * float(np.ptp(output[usable]))):
-        return ""
-    unit = model.output_unit
-    return (
-        f"{trace.name} does not begin in equilibrium, as start: {start.kind.value} declares: over its first {n} "
-        f"samples the free run is up to {off.max():.3g} {unit} off, and afterwards, from an estimated state, "
-        f"{level:.3g} {unit}. For such a record write start: estimated."
-    )
+        return []
+    found = []
+    ranges = np.ptp(output[usable].reshape(len(output[usable]), -1), axis=0)
+    for j, unit in enumerate(model.ends.output_units):
+        level, most = float(np.sqrt(np.mean(later[:, j] ** 2))), float(off[:, j].max())
+        if most > max(BEYOND * level, LEAST * float(ranges[j])):
+            found.append(
+                f"{trace.name} does not begin in equilibrium, as start: {start.kind.value} declares: over its first "
+                f"{n} samples the free run is up to {most:.3g} {unit} off, and afterwards, from an estimated state, "
+                f"{level:.3g} {unit}. For such a record write start: estimated."
+            )
+    return found

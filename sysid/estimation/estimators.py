@@ -22,9 +22,11 @@ from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
+from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.narx import fit_narx
 from sysid.estimation.networks.neural_state_space import check_training, fit_neural_state_space
 from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial
 from sysid.estimation.result import FitResult
 from sysid.estimation.stability.check import (
@@ -34,10 +36,20 @@ from sysid.estimation.stability.check import (
     PoleCheck,
     StabilityOptions,
 )
-from sysid.models import ARX, NARX, AbstractModel, AbstractStructure, Mapping, NeuralStateSpace, Start, TransferFunction
+from sysid.models import (
+    ARX,
+    NARX,
+    AbstractModel,
+    AbstractStructure,
+    Mapping,
+    NeuralStateSpace,
+    Start,
+    TransferFunction,
+    VectorNARX,
+)
 from sysid.traces import Trace
 
-Options = Training | TransferFunctionTraining
+Options = Training | JointTraining | TransferFunctionTraining
 """What some estimator takes."""
 
 
@@ -123,9 +135,12 @@ class Estimator:
         self.check_training(options)
         return options
 
-    def check(self, training: object, initial: AbstractStructure | None, structure: Any, n_inputs: int) -> None:
+    def check(
+        self, training: object, initial: AbstractStructure | None, structure: Any, n_inputs: int, n_outputs: int
+    ) -> None:
         """Refuse what does not go together; see :func:`check`."""
         structure.check_inputs(n_inputs)
+        structure.check_outputs(n_outputs)
         if training is not None:
             if self.training is None:
                 raise self.takes_none(training)
@@ -233,6 +248,13 @@ ESTIMATORS: dict[str, Estimator] = {
             begins=LINEAR_START,
             stability=PoleCheck,
         ),
+        Estimator(
+            structure=VectorNARX,
+            name="a NARX network of several outputs",
+            fit=fit_vector_narx,
+            training=JointTraining,
+            initial=check_vector_initial,
+        ),
     )
 }
 """By kind of structure how it is fitted."""
@@ -260,7 +282,7 @@ def estimator_of(structure: AbstractStructure) -> Estimator:
             where="structure",
             expected=", ".join(row.structure.__name__ for row in ESTIMATORS.values()),
             got=type(structure).__name__,
-            remedy="choose one of these; several outputs as one network: sysid.estimation.fit_vector_narx",
+            remedy="choose one of these",
         )
     return found
 
@@ -269,6 +291,7 @@ def check(
     structure: AbstractStructure,
     n_inputs: int,
     *,
+    n_outputs: int = 1,
     training: object = None,
     initial: AbstractStructure | None = None,
 ) -> None:
@@ -277,13 +300,14 @@ def check(
     Args:
         structure: What is to be fitted.
         n_inputs: Inputs of the mapping.
+        n_outputs: Outputs of the mapping.
         training: Its options, if any are given.
         initial: The structure of the fit that it is to start from, if there is one.
 
     Raises:
         ConfigError: If the structure is not for so many inputs, an option does not apply, or it cannot start there.
     """
-    estimator_of(structure).check(training, initial, structure, n_inputs)
+    estimator_of(structure).check(training, initial, structure, n_inputs, n_outputs)
 
 
 def fit(
@@ -293,7 +317,7 @@ def fit(
     training: Options | None = None,
     *,
     start: Start | None = None,
-    rest_output: float | None = None,
+    rest_output: float | Dict[str, float] | None = None,
     selection: Sequence[Trace] = (),
     initial: FitResult | None = None,
     stability: StabilityOptions | None = StabilityOptions(),  # noqa: B008 - frozen
@@ -305,11 +329,11 @@ def fit(
 
     Args:
         traces: Estimation traces.
-        mapping: Which channels go in, which comes out.
+        mapping: Which channels go in, which come out; one comes out, unless the structure has several outputs.
         structure: What is fitted.
         training: Options of the class in the structure's row.
         start: What stands before each trace; at rest by default.
-        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        rest_output: Output at rest in its unit, or by name; the mean of the traces' first samples by default.
         selection: Traces that choose between starts.
         initial: A fit to start from: of the same structure, a smaller one, or an ARX model over its lags.
         stability: How the free run is checked, by default over 1,000 random sequences; ``None`` checks nothing.
@@ -325,7 +349,10 @@ def fit(
         ChannelError: If a trace lacks a channel of the mapping.
     """
     row = estimator_of(structure)
-    row.check(training, None if initial is None else initial.model.structure, structure, len(mapping.inputs))
+    if not structure.several_outputs:
+        mapping.check_single(row.name)
+    begun = None if initial is None else initial.model.structure
+    row.check(training, begun, structure, len(mapping.inputs), len(mapping.outputs))
     if initial is not None:
         _check_terms(initial.model, mapping, traces[0].sample_time)
     return row.run(
@@ -335,13 +362,22 @@ def fit(
         training,
         stability,
         start=start or Start(),
-        rest_output=rest_output,
+        rest_output=_rest(rest_output, mapping, structure),
         selection=selection,
         initial=initial,
         resume=resume,
         on_checkpoint=on_checkpoint,
         on_progress=on_progress,
     )
+
+
+def _rest(
+    given: float | Dict[str, float] | None, mapping: Mapping, structure: AbstractStructure
+) -> float | Dict[str, float] | None:
+    """Outputs at rest as the estimator takes them: by name for several outputs, else one number."""
+    if structure.several_outputs:
+        return given if isinstance(given, Dict) or given is None else {mapping.output: given}
+    return given.get(mapping.output) if isinstance(given, Dict) else given
 
 
 def _check_terms(model: AbstractModel, mapping: Mapping, sample_time: float) -> None:

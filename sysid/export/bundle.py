@@ -262,7 +262,7 @@ def _surrogate(source: AbstractModel | Cascade, traces: TraceSet, outputs: Seque
 
 
 def _check_finite(model: Member) -> None:
-    numbers = model.recursion.numbers if isinstance(model, AbstractModel) else model.theta
+    numbers = model.recursion.numbers
     lost = int(np.sum(~np.isfinite(numbers)))
     if lost:  # such a file would reproduce its model: both compute nothing but NaN
         raise ConfigError(

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.export.space import SpaceCell
 from sysid.models import NeuralForm, StateSpace
-from sysid.models.cascade_program import Part
 from sysid.models.ends import Ends
+from sysid.models.part import Part
 from sysid.models.wiring import Member
 
 
@@ -129,7 +129,7 @@ def cell_of(model: Member) -> Cell | SpaceCell:
     Raises:
         ConfigError: If it lowers to neither kind.
     """
-    form = getattr(model, "recursion", None)  # a network of several outputs has none
+    form = model.recursion
     lowered = SPACES.get(type(form))
     return Cell.of(model) if lowered is None else lowered(form, model.ends)
 

@@ -52,7 +52,8 @@ class SpaceState:
         Returns:
             Shape ``(size,)``.
         """
-        return self.from_history(History.at_rest(inputs=levels[:-1], output=float(levels[-1])))
+        n = self.cell.n_inputs
+        return self.from_history(History.at_rest(inputs=levels[:n], output=self.cell.rest_of(levels[n:])))
 
     def to_dict(self) -> dict[str, Any]:
         """How to begin at rest, as JSON values."""
@@ -186,7 +187,7 @@ class StateLayout:
         return self.lines[-1].first + self.lines[-1].length
 
     def from_history(self, history: History) -> NDArray[np.float64]:
-        """The state after some samples of a model of one output.
+        """The state after some samples of a model.
 
         Args:
             history: The samples, oldest first, in units; a single one is a system at rest.
@@ -195,7 +196,7 @@ class StateLayout:
             Shape ``(size,)``.
         """
         inputs, output = history.padded(max(line.length for line in self.lines))
-        columns = (*inputs.T, output)
+        columns = (*inputs.T, *output.reshape(len(output), -1).T)
         return np.concatenate(
             [
                 (past[::-1][: line.length] - line.offset) / line.scale

@@ -104,17 +104,18 @@ def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[
 
 
 def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, start: Start) -> ParityCase:
-    inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
+    inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
     begun = beginning(model, inputs, target, start, trace.usable_samples)
     history, inputs = begun.history, inputs[begun.first :]
-    output, change = model.simulate(inputs, history), float(_disturbances(surrogate)[0])
-    disturbed = model.simulate(inputs, History(inputs=history.inputs, output=history.output + change))
+    output, change = model.simulate(inputs, history).reshape(len(inputs), -1), _disturbances(surrogate)
+    moved = history.output + (change if model.structure.several_outputs else change[0])
+    disturbed = model.simulate(inputs, History(inputs=history.inputs, output=moved)).reshape(len(inputs), -1)
     return ParityCase(
         name=trace.name,
         inputs=inputs,
         state=surrogate.stages[0].state.from_history(history),
-        output=output[:, np.newaxis],
-        amplification=largest_difference(disturbed, output) / change,
+        output=output,
+        amplification=largest_difference(disturbed / change, output / change),
     )
 
 

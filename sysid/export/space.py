@@ -155,6 +155,10 @@ class SpaceCell:
         """Upper bound of the output in scaled numbers."""
         return self.form.high
 
+    def rest_of(self, levels: NDArray[np.float64]) -> float | NDArray[np.float64]:
+        """The levels of the outputs, shape ``(n_outputs,)``, as a history has them."""
+        return float(levels[0])
+
     @property
     def rest_channels(self) -> tuple[str, ...]:
         """The channels that ``gain`` takes."""

@@ -27,7 +27,7 @@ def check_free_run(model: AbstractModel, traces: TraceSet) -> Stability | None:
         What was found; ``None`` where no estimation trace is long enough to make sequences from.
     """
     try:
-        sequences = Excursions.of(traces.with_role(Role.ESTIMATION), model.mapping.inputs, (model.mapping.output,))
+        sequences = Excursions.of(traces.with_role(Role.ESTIMATION), model.mapping.inputs, model.mapping.outputs)
     except TraceError:
         return None
     return check_stability(model, sequences, count=SEQUENCES)

@@ -262,8 +262,9 @@ class Surrogate:
         if isinstance(self.source, Cascade):
             levels = dict(zip(self.source.outputs, map(float, rest), strict=True))
             return self.source.simulate(inputs, rest=levels).values[:, len(self.inputs) :]
-        history = History.at_rest(inputs=inputs[0], output=float(rest[0]))
-        return self.source.simulate(inputs, history)[:, np.newaxis]
+        resting = rest if self.source.structure.several_outputs else float(rest[0])
+        run = self.source.simulate(inputs, History.at_rest(inputs=inputs[0], output=resting))
+        return run.reshape(len(inputs), -1)
 
     def run_from(self, inputs: NDArray[np.float64], initial: Dict[str, float]) -> NDArray[np.float64]:
         """Free run from other outputs than the declared levels.

@@ -194,3 +194,17 @@ def run(p, depth, rest, values, kept, held):
     _walk(p, layout, room, depth, 0, kept, held)
     values[:first] = room[depth:]
     _walk(p, layout, values, first, first, kept, held)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def go_on(p, past, values, kept, held):
+    """Run all members from a row on, whatever stands in the rows before it.
+
+    Args:
+        p: The members.
+        past: The first row that is run, at least the longest lag.
+        values: As for :func:`run`; its first ``past`` rows are the history.
+        kept: As for :func:`run`.
+        held: As for :func:`run`, from row ``past`` on.
+    """
+    _walk(p, laid_out(p), values, past, 0, kept, held)

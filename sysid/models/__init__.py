@@ -1,7 +1,7 @@
 """What a model is: structure, parameters, scaling, initial state; free run and prediction."""
 
 from sysid.models.arx import ARX, ARXModel
-from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
 from sysid.models.beginning import Beginning, beginning
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_batch import simulate_family
@@ -18,11 +18,12 @@ from sysid.models.neural_form import NeuralForm
 from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
 from sysid.models.orthonormal_basis import Domain
 from sysid.models.recursion import Recursion, parameter_count
-from sysid.models.scaling import Scaling
+from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_space import StateSpace
 from sysid.models.store import cascade_from_dict, model_from_dict, structure_from_dict
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
-from sysid.models.vector_narx import VectorMapping, VectorNARX, VectorNARXModel, VectorScaling
+from sysid.models.vector_narx import VectorNARX, VectorNARXModel
+from sysid.models.vector_recursion import VectorRecursion
 from sysid.models.wiring import Member, Wiring
 
 __all__ = [
@@ -51,14 +52,15 @@ __all__ = [
     "NeuralStateSpaceModel",
     "Recursion",
     "Scaling",
+    "SeveralOutputs",
     "Start",
     "StartKind",
     "StateSpace",
     "TransferFunction",
     "TransferFunctionModel",
-    "VectorMapping",
     "VectorNARX",
     "VectorNARXModel",
+    "VectorRecursion",
     "VectorScaling",
     "Wiring",
     "beginning",

@@ -16,6 +16,7 @@ from sysid.models.history import History
 from sysid.models.lags import Lagged
 from sysid.models.mapping import Mapping
 from sysid.models.ratio import Ratio
+from sysid.traces import Trace
 
 
 class AbstractStructure(ABC):
@@ -32,6 +33,9 @@ class AbstractStructure(ABC):
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values, with ``kind``."""
+
+    several_outputs: bool = False
+    """Whether one model has all outputs of a mapping; where it is false, each output gets a model of its own."""
 
     per_input: tuple[str, ...] = ()
     """Fields that hold one number per input."""
@@ -60,6 +64,28 @@ class AbstractStructure(ABC):
         del neurons
         return None
 
+    def mappings(self, mapping: Mapping) -> tuple[Mapping, ...]:
+        """What its models map, of a mapping of any number of outputs.
+
+        Args:
+            mapping: Which channels go in, which come out.
+
+        Returns:
+            The mapping where one model has all outputs, else one an output.
+        """
+        return (mapping,) if self.several_outputs else mapping.each
+
+    def check_outputs(self, n_outputs: int) -> None:
+        """Refuse a number of outputs that a structure of several is not for.
+
+        Args:
+            n_outputs: Outputs of the mapping.
+
+        Raises:
+            ConfigError: If a field does not have one entry per output.
+        """
+        del n_outputs
+
     def check_inputs(self, n_inputs: int) -> None:
         """Refuse a number of inputs that the structure is not for.
 
@@ -84,11 +110,12 @@ class AbstractStructure(ABC):
 class AbstractModel(ABC):
     """Structure, parameters, scaling and rest value: everything a free run needs.
 
-    Concrete models are frozen dataclasses with at least these fields.
+    Concrete models are frozen dataclasses with at least these fields. Of a model of several outputs
+    (:class:`SeveralOutputs`) the output is an array with one column an output wherever it is ``(n_samples,)`` below.
     """
 
     mapping: Mapping
-    """Which channels go in, which comes out."""
+    """Which channels go in, which come out."""
     sample_time: float
     """Seconds between samples."""
     input_units: tuple[str, ...]
@@ -147,16 +174,35 @@ class AbstractModel(ABC):
         """
 
     @property
+    def resting(self) -> float | NDArray[np.float64]:
+        """The output at rest, as a history has it."""
+        return self.rest_output
+
+    @property
     def ends(self) -> Ends:
         """Its channels, as wiring sees them."""
         return Ends(
             inputs=self.mapping.inputs,
-            outputs=(self.mapping.output,),
+            outputs=self.mapping.outputs,
             input_units=self.input_units,
             output_units=(self.output_unit,),
             rest_outputs=(self.rest_output,),
             direct=self.recursion.reads_now(self.mapping.inputs),
         )
+
+    def measured(self, trace: Trace) -> NDArray[np.float64]:
+        """What a trace has of its outputs.
+
+        Args:
+            trace: The trace.
+
+        Returns:
+            Shape ``(n_samples,)``, or ``(n_samples, n_outputs)`` for a model of several outputs.
+
+        Raises:
+            ChannelError: If it lacks one.
+        """
+        return trace.columns([self.mapping.output])[:, 0]
 
     def with_theta(self, theta: NDArray[np.float64]) -> AbstractModel | None:
         """The same model with other parameters.
@@ -182,13 +228,16 @@ class AbstractModel(ABC):
         Returns:
             Every output, shape ``(n_samples,)``; NaN for a model that predicts nothing.
         """
-        names, output = self.mapping.inputs, self.mapping.output
-        history = History.at_rest(inputs=[rest[name] for name in names], output=rest[output])
-        measured = signals[output]
+        names, outputs = self.mapping.inputs, self.mapping.outputs
+        columns = [signals[name] for name in outputs]
         if not self.recursion.predicts:
-            return {output: np.full(len(measured), np.nan)}
-        inputs = np.column_stack([signals[name] for name in names])
-        return {output: self.predict(inputs, measured, history)}
+            return {name: np.full(len(columns[0]), np.nan) for name in outputs}
+        several = self.structure.several_outputs
+        resting = np.array([rest[name] for name in outputs]) if several else rest[outputs[0]]
+        history = History.at_rest(inputs=[rest[name] for name in names], output=resting)
+        inputs = np.array([signals[name] for name in names]).reshape(len(names), -1).T
+        found = self.predict(inputs, np.column_stack(columns) if several else columns[0], history)
+        return dict(zip(outputs, found.reshape(len(found), -1).T, strict=True))
 
     def simulate(self, inputs: NDArray[np.float64], history: History | None = None) -> NDArray[np.float64]:
         """Free run: the model is fed its own past output.
@@ -232,4 +281,50 @@ class AbstractModel(ABC):
         return self.recursion.predict(inputs, output, history or self._rest(inputs), steps)
 
     def _rest(self, inputs: NDArray[np.float64]) -> History:
-        return History.at_rest(inputs=np.asarray(inputs, dtype=np.float64)[0], output=self.rest_output)
+        return History.at_rest(inputs=np.asarray(inputs, dtype=np.float64)[0], output=self.resting)
+
+
+class SeveralOutputs(AbstractModel):
+    """A model of a structure with several outputs of its own.
+
+    It simulates and predicts arrays of shape ``(n_samples, n_outputs)``, and so does the form that it lowers to; the
+    output of its histories has as many columns. Concrete models have the fields ``output_units`` and ``rest_outputs``
+    in place of ``output_unit`` and ``rest_output``; :attr:`ends` has both of either kind.
+    """
+
+    output_units: tuple[str, ...]
+    """Unit of each output."""
+    rest_outputs: tuple[float, ...]
+    """Each output at rest, in its unit."""
+
+    @property
+    def ends(self) -> Ends:
+        """Its channels, as wiring sees them."""
+        return Ends(
+            inputs=self.mapping.inputs,
+            outputs=self.mapping.outputs,
+            input_units=self.input_units,
+            output_units=self.output_units,
+            rest_outputs=self.rest_outputs,
+            direct=self.recursion.reads_now(self.mapping.inputs),
+        )
+
+    @property
+    def output_unit(self) -> str:  # type: ignore[override]  # read only: a model is frozen
+        """The units of all outputs in one text, for people."""
+        return ", ".join(dict.fromkeys(self.output_units))
+
+    @property
+    def rest_output(self) -> float:  # type: ignore[override]
+        """Of a model whose mapping has one output; :class:`ConfigError` for several."""
+        self.mapping.check_single()
+        return self.rest_outputs[0]
+
+    @property
+    def resting(self) -> NDArray[np.float64]:
+        """The outputs at rest, shape ``(n_outputs,)``."""
+        return np.array(self.rest_outputs, dtype=np.float64)
+
+    def measured(self, trace: Trace) -> NDArray[np.float64]:
+        """What a trace has of its outputs, shape ``(n_samples, n_outputs)``."""
+        return trace.columns(self.mapping.outputs)

@@ -72,7 +72,8 @@ def beginning(
     Args:
         model: The model.
         inputs: The record's inputs, shape ``(n_samples, n_inputs)``.
-        output: The record's measured output, shape ``(n_samples,)``; read only as the start allows.
+        output: The record's measured output, shape ``(n_samples,)``, or ``(n_samples, n_outputs)`` for a model of
+            several outputs; read only as the start allows.
         start: Which start.
         usable: Which samples are not masked; all by default.
 
@@ -83,13 +84,13 @@ def beginning(
         TraceError: If the record is not longer than a measured start.
     """
     if start.kind is not StartKind.ESTIMATED:
-        history = start.history(inputs, output, model.rest_output, usable)
+        history = start.history(inputs, output, model.resting, usable)
         return Beginning(history=history, first=start.n_measured)
     known = np.ones(len(output), dtype=np.bool_) if usable is None else usable
     form = model.recursion
     first = window(form.memory, known, asked=start.n_measured)
     if first == 0:  # a single sample: nothing is left to estimate on
-        return Beginning(history=History.at_rest(inputs=inputs[0], output=model.rest_output), first=0)
+        return Beginning(history=History.at_rest(inputs=inputs[0], output=model.resting), first=0)
     seen = None if known[:first].all() else known[:first]
     history = History(inputs=inputs[:first], output=output[:first], usable=seen)
     return Beginning(history=form.refined(history), first=first)

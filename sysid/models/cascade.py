@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.models.cascade_batch import simulate_records
-from sysid.models.cascade_program import Limit, Part
+from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
 from sysid.models.ends import Ends
+from sysid.models.part import Part
 from sysid.models.wiring import Member, Wiring
 from sysid.traces import Trace
 

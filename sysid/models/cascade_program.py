@@ -12,70 +12,9 @@ from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import Program
 from sysid.models.ends import Ends
-from sysid.models.lags import Lags
-from sysid.models.recursion import Recursion
-from sysid.models.vector_narx import VectorNARXModel
-from sysid.models.wiring import Member
+from sysid.models.part import Part
 
 _Number = TypeVar("_Number", np.int64, np.float64)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Part:
-    """One member as the compiled pass sees it: a recursion over columns, its inputs' and then its outputs'.
-
-    Args:
-        lags: Lags of every column, as ``inputs``; ``output`` is empty.
-        neurons: Number of neurons.
-        theta: Flat parameters.
-        linear: Whether there is a linear part.
-        gated: Whether the neurons have gates.
-        offset: Of every column, in its unit.
-        scale: Of every column, in its unit.
-        low: Lower bound of the outputs in scaled numbers.
-        high: Upper bound of the outputs in scaled numbers.
-    """
-
-    lags: Lags
-    neurons: int
-    theta: NDArray[np.float64]
-    linear: bool
-    gated: bool
-    offset: tuple[float, ...]
-    scale: tuple[float, ...]
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, model: Member) -> Part | None:
-        """A member as a part; ``None`` for one that is no recursion over lagged regressors."""
-        if isinstance(model, VectorNARXModel):
-            scaling = model.scaling
-            return cls(
-                lags=model.lags,
-                neurons=model.network.neurons,
-                theta=model.theta,
-                linear=model.network.feedthrough,
-                gated=False,
-                offset=(*scaling.input_offset, *scaling.output_offset),
-                scale=(*scaling.input_scale, *scaling.output_scale),
-                low=-model.clamp,
-                high=model.clamp,
-            )
-        form = model.recursion
-        if not isinstance(form, Recursion):
-            return None
-        return cls(
-            lags=Lags(inputs=(*form.lags.inputs, form.lags.output), output=()),
-            neurons=form.neurons,
-            theta=form.theta,
-            linear=len(form.theta) > form.neurons * (form.lags.n_regressors + 2) + 1,
-            gated=form.gates is not None,
-            offset=(*form.scaling.input_offset, form.scaling.output_offset),
-            scale=(*form.scaling.input_scale, form.scaling.output_scale),
-            low=form.low,
-            high=form.high,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, Program
 from sysid.models.base import AbstractModel
-from sysid.models.cascade_program import Limit, Part, program_of
+from sysid.models.cascade_program import Limit, program_of
 from sysid.models.ends import Ends
 from sysid.models.history import History
+from sysid.models.part import Part
 from sysid.models.wiring import Member
 
 _NOTHING = np.empty((0, 0))
@@ -53,32 +54,41 @@ class ModelStage:
     Args:
         model: The model.
         channels: Columns of the arrays that it reads and writes.
-        limit: Of its output.
+        limits: Of each of its outputs.
     """
 
     model: AbstractModel
     channels: tuple[str, ...]
-    limit: Limit
-    n_outputs: int = 1
+    limits: tuple[Limit, ...]
+
+    @property
+    def n_outputs(self) -> int:
+        """How many channels it writes."""
+        return len(self.limits)
 
     def run(self, levels: NDArray[np.float64], values: NDArray[np.float64], held: NDArray[np.int8]) -> None:
         """Run over one record; as for :class:`CompiledStage`."""
         sources = [self.channels.index(name) for name in self.model.mapping.inputs]
-        column = self.channels.index(self.model.mapping.output)
-        history = History.at_rest(inputs=levels[sources], output=float(levels[column]))
-        output = self.model.simulate(values[:, sources], history)
+        columns = [self.channels.index(name) for name in self.model.mapping.outputs]
+        resting = levels[columns] if self.model.structure.several_outputs else float(levels[columns[0]])
+        output = self.model.simulate(values[:, sources], History.at_rest(inputs=levels[sources], output=resting))
+        for j, (column, limit) in enumerate(zip(columns, self.limits, strict=True)):
+            values[:, column] = output.reshape(len(values), -1)[:, j]
+            self._hold(values, column, limit, held[:, j])
+
+    def _hold(self, values: NDArray[np.float64], column: int, limit: Limit, held: NDArray[np.int8]) -> None:
+        """Hold an output within its limits."""
         held[:] = FREE
         for side, constant, channel, sign in (
-            (self.limit.high, HIGH, HIGH_CHANNEL, 1.0),
-            (self.limit.low, LOW, LOW_CHANNEL, -1.0),
+            (limit.high, HIGH, HIGH_CHANNEL, 1.0),
+            (limit.low, LOW, LOW_CHANNEL, -1.0),
         ):
             if side is not None:
                 named = isinstance(side, str)
                 bound = values[:, self.channels.index(side)] if isinstance(side, str) else np.full(len(values), side)
-                beyond = sign * output > sign * bound
-                output = np.where(beyond, bound, output)
-                held[beyond, 0] = channel if named else constant
-        values[:, column] = output
+                beyond = sign * values[:, column] > sign * bound
+                values[:, column] = np.where(beyond, bound, values[:, column])
+                held[beyond] = channel if named else constant
 
 
 def stages_of(
@@ -108,7 +118,7 @@ def stages_of(
                 )
             )
         else:
-            for model in (model for model, _ in run if isinstance(model, AbstractModel)):
-                limit = limits.get(model.mapping.output, Limit())
-                stages.append(ModelStage(model=model, channels=channels, limit=limit))
+            for model, _ in run:
+                own = tuple(limits.get(name, Limit()) for name in model.mapping.outputs)
+                stages.append(ModelStage(model=model, channels=channels, limits=own))
     return tuple(stages)

@@ -9,13 +9,18 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.models.history import History
-from sysid.models.scaling import Scaling
+from sysid.models.part import Part
+from sysid.models.scaling import Scaling, VectorScaling
 
 
 class AbstractForm(ABC):
-    """A recursion in scaled numbers that can be run freely and be fed with measured output."""
+    """A recursion in scaled numbers that can be run freely and be fed with measured output.
 
-    scaling: Scaling
+    Of a model of one output, the output is an array of shape ``(n_samples,)``; of several outputs, everywhere below,
+    ``(n_samples, n_outputs)``.
+    """
+
+    scaling: Scaling | VectorScaling
     """Between units and scaled numbers."""
     low: float
     """Lower bound of the output in scaled numbers; ``-inf`` for none."""
@@ -41,6 +46,11 @@ class AbstractForm(ABC):
         """Every number of the form, flat."""
 
     @property
+    def part(self) -> Part | None:
+        """What runs in the compiled pass of a cascade; ``None`` for a form that is no function of lagged samples."""
+        return None
+
+    @property
     @abstractmethod
     def memory(self) -> int:
         """Samples of a record from which the state after them can be told."""
@@ -64,7 +74,8 @@ class AbstractForm(ABC):
             history: Measured samples, oldest first.
 
         Returns:
-            Output of shape ``(n_past,)``, in its unit; as measured where a recursion has lags before its first row.
+            Output of the shape of the history's, in its unit; as measured where a recursion has lags before its first
+            row.
         """
 
     @abstractmethod

@@ -20,7 +20,7 @@ class History:
 
     Args:
         inputs: Shape ``(n_past, n_inputs)``.
-        output: Shape ``(n_past,)``.
+        output: Shape ``(n_past,)``, or ``(n_past, n_outputs)`` before a model of several outputs.
         usable: Which outputs are not masked, shape ``(n_past,)``; ``None`` for all. A state is estimated from those.
 
     Raises:
@@ -38,7 +38,7 @@ class History:
     def __post_init__(self) -> None:
         inputs = np.array(self.inputs, dtype=np.float64, ndmin=2)
         output = np.array(self.output, dtype=np.float64, ndmin=1)
-        if inputs.ndim != 2 or output.ndim != 1 or len(inputs) != len(output) or len(output) == 0:
+        if inputs.ndim != 2 or output.ndim not in {1, 2} or len(inputs) != len(output) or len(output) == 0:
             raise TraceError(
                 "the history's inputs and output do not match",
                 expected="inputs of shape (n_past, n_inputs) and an output of shape (n_past,), n_past at least 1",
@@ -49,17 +49,17 @@ class History:
         object.__setattr__(self, "output", output)
 
     @classmethod
-    def at_rest(cls, *, inputs: NDArray[np.float64] | list[float], output: float) -> History:
+    def at_rest(cls, *, inputs: NDArray[np.float64] | list[float], output: float | NDArray[np.float64]) -> History:
         """A system that has stood at these values for ever.
 
         Args:
             inputs: One value per input.
-            output: The output's value.
+            output: The output's value, or one for each of several outputs, shape ``(n_outputs,)``.
 
         Returns:
             A history of one sample.
         """
-        return cls(inputs=np.atleast_2d(np.asarray(inputs, dtype=np.float64)), output=np.array([output]))
+        return cls(inputs=np.atleast_2d(np.asarray(inputs, dtype=np.float64)), output=np.asarray(output)[np.newaxis])
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -73,13 +73,13 @@ class History:
             n_past: Samples wanted.
 
         Returns:
-            Inputs of shape ``(n_past, n_inputs)`` and output of shape ``(n_past,)``.
+            Inputs of shape ``(n_past, n_inputs)`` and output of shape ``(n_past,)``, or ``(n_past, n_outputs)``.
         """
         if n_past == 0:
             return self.inputs[:0], self.output[:0]
         missing = max(0, n_past - len(self.output))
         inputs = np.concatenate([np.repeat(self.inputs[:1], missing, axis=0), self.inputs])[-n_past:]
-        output = np.concatenate([np.repeat(self.output[:1], missing), self.output])[-n_past:]
+        output = np.concatenate([np.repeat(self.output[:1], missing, axis=0), self.output])[-n_past:]
         return inputs, output
 
 
@@ -135,14 +135,15 @@ class Start:
         self,
         inputs: NDArray[np.float64],
         output: NDArray[np.float64],
-        rest_output: float,
+        rest_output: float | NDArray[np.float64],
         usable: NDArray[np.bool_] | None = None,
     ) -> History:
         """The history that a record begins with, before any model is known.
 
         Args:
             inputs: The record's inputs, shape ``(n_samples, n_inputs)``.
-            output: The record's measured output, shape ``(n_samples,)``; read only as the kind allows.
+            output: The record's measured output, shape ``(n_samples,)`` or ``(n_samples, n_outputs)``; read only as the
+                kind allows.
             rest_output: The output's declared rest value.
             usable: Which samples are not masked; all by default. The first sample is then the first of those.
 
@@ -157,7 +158,7 @@ class Start:
             return History.at_rest(inputs=inputs[0], output=rest_output)
         if self.kind is not StartKind.MEASURED:
             first = 0 if usable is None or not usable.any() else int(np.argmax(usable))
-            return History.at_rest(inputs=inputs[first], output=float(output[first]))
+            return History.at_rest(inputs=inputs[first], output=output[first])
         if len(output) <= self.n_measured:
             raise TraceError(
                 "the record is too short for its start",

@@ -1,7 +1,8 @@
-"""Mapping: which channels go in and which one comes out."""
+"""Mapping: which channels go in and which come out."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from typing import Any
@@ -57,46 +58,86 @@ def check_fields(value: Dict[str, Any], known: tuple[str, ...], example: str) ->
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, init=False, repr=False)
 class Mapping:
-    """Which channels go in, which comes out; written ``BP+AR -> BC``.
+    """Which channels go in, which come out; written ``BP+AR -> BC``, or ``STP -> BP+AR`` for several outputs.
 
     Args:
         inputs: Names of the input channels, all different; none for a time series or a decay (``-> BC``).
-        output: Name of the output channel.
+        outputs: Names of the output channels, at least one.
+        output: The output channel, in place of ``outputs``, where there is one.
 
     Raises:
-        ConfigError: If a name is empty, or a channel appears twice.
+        ConfigError: If there is no output, a name is empty, or a channel appears twice.
 
     Example:
         >>> Mapping.parse("BP + AR -> BC")
         Mapping(inputs=('BP', 'AR'), output='BC')
+        >>> [str(one) for one in Mapping.parse("STP -> BP+AR").each]
+        ['STP -> BP', 'STP -> AR']
     """
 
     inputs: tuple[str, ...]
-    output: str
+    outputs: tuple[str, ...]
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "inputs", tuple(self.inputs))
-        names = (*self.inputs, self.output)
-        if not all(names) or len(set(names)) != len(names):
+    def __init__(self, *, inputs: Iterable[str], outputs: Iterable[str] = (), output: str | None = None) -> None:
+        object.__setattr__(self, "inputs", tuple(inputs))
+        object.__setattr__(self, "outputs", tuple(outputs) if output is None else (output,))
+        names = (*self.inputs, *self.outputs)
+        if not self.outputs or not all(names) or len(set(names)) != len(names):
             raise ConfigError(
-                "not a mapping of input channels to one output channel",
+                "not a mapping of input channels to output channels",
                 expected="different channel names on both sides, as in BP+AR -> BC",
                 got=str(self),
-                remedy="name each channel once; a model's own past output is an input by its structure",
+                remedy="name each channel once; a model's own past outputs are inputs by its structure",
             )
 
+    def __repr__(self) -> str:
+        out = f"output={self.outputs[0]!r}" if len(self.outputs) == 1 else f"outputs={self.outputs}"
+        return f"Mapping(inputs={self.inputs}, {out})"
+
     def __str__(self) -> str:
-        return f"{written_side(self.inputs)} -> {written_side([self.output])}".lstrip()
+        return f"{written_side(self.inputs)} -> {written_side(self.outputs)}".lstrip()
+
+    @property
+    def output(self) -> str:
+        """The output, of a mapping that has one.
+
+        Raises:
+            ConfigError: If there are several.
+        """
+        self.check_single()
+        return self.outputs[0]
+
+    @property
+    def each(self) -> tuple[Mapping, ...]:
+        """One mapping an output, all of the same inputs."""
+        return tuple(Mapping(inputs=self.inputs, output=output) for output in self.outputs)
+
+    def check_single(self, what: str = "") -> None:
+        """Refuse several outputs.
+
+        Args:
+            what: What takes one output only, for the error.
+
+        Raises:
+            ConfigError: If there are several.
+        """
+        if len(self.outputs) != 1:
+            raise ConfigError(
+                f"{what or 'a mapping here'} has one output",
+                expected="input channels, an arrow and one output channel, as in BP+AR -> BC",
+                got=str(self),
+                remedy=f"write one mapping for each output; {LISTS}",
+            )
 
     @classmethod
     def of(cls, value: object) -> Mapping:
         """A mapping from what people write.
 
         Args:
-            value: A mapping, its text, or its lists: ``{"inputs": ["P+", "V->C"], "output": "y"}``, where any name may
-                stand as it is.
+            value: A mapping, its text, or its lists: ``{"inputs": ["P+", "V->C"], "output": "y"}``, or ``outputs``,
+                where any name may stand as it is.
 
         Returns:
             The mapping.
@@ -112,19 +153,17 @@ class Mapping:
             return value
         if not isinstance(value, Dict):
             return cls.parse(str(value))
-        check_fields(value, ("inputs", "output"), "{inputs: [BP, AR], output: BC}")
-        output = listed(value["output"], what="outputs")
-        if len(output) != 1:
-            raise _several(", ".join(output))
-        return cls(inputs=listed(value["inputs"], what="inputs"), output=output[0])
+        word = "outputs" if "outputs" in value else "output"
+        check_fields(value, ("inputs", word), "{inputs: [BP, AR], output: BC}")
+        return cls(inputs=listed(value["inputs"], what="inputs"), outputs=listed(value[word], what="outputs"))
 
     @classmethod
     def parse(cls, text: str) -> Mapping:
         """Read a mapping from text.
 
         Args:
-            text: Input names joined by ``+``, or nothing, an arrow, the output name. A name that holds ``+`` or ``->``
-                stands in double quotes.
+            text: Input names joined by ``+``, or nothing, an arrow, output names joined by ``+``. A name that holds
+                ``+`` or ``->`` stands in double quotes.
 
         Returns:
             The mapping.
@@ -136,20 +175,9 @@ class Mapping:
         if len(sides) != 2:
             raise ConfigError(
                 "not a mapping",
-                expected="input channels, an arrow and one output channel, as in BP+AR -> BC",
+                expected="input channels, an arrow and output channels, as in BP+AR -> BC",
                 got=text,
-                remedy="write -> between inputs and output" if len(sides) < 2 else f"write {LISTS}",
+                remedy="write -> between inputs and outputs" if len(sides) < 2 else f"write {LISTS}",
             )
         inputs, outputs = sides
-        if len(outputs) > 1:
-            raise _several(text)
-        return cls(inputs=tuple(inputs), output="".join(outputs))
-
-
-def _several(got: str) -> ConfigError:
-    return ConfigError(
-        "a mapping has one output",
-        expected="input channels, an arrow and one output channel, as in BP+AR -> BC",
-        got=got,
-        remedy=f"write one pipeline, or one mapping, for each output; {LISTS}",
-    )
+        return cls(inputs=inputs, outputs=outputs)

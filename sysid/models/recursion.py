@@ -14,6 +14,7 @@ from sysid.models.ends import read_now
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lags
+from sysid.models.part import Part
 from sysid.models.scaling import Scaling
 
 
@@ -114,6 +115,21 @@ class Recursion(AbstractForm):
         flat = self.theta[self.neurons * (r + 2) + 1 + r :]
         return flat.reshape(self.neurons, r) if len(flat) else None
 
+    @property
+    def part(self) -> Part:
+        """Its output is one more column of lagged regressors."""
+        return Part(
+            lags=Lags(inputs=(*self.lags.inputs, self.lags.output), output=()),
+            neurons=self.neurons,
+            theta=self.theta,
+            linear=len(self.theta) > self.neurons * (self.lags.n_regressors + 2) + 1,
+            gated=self.gates is not None,
+            offset=(*self.scaling.input_offset, self.scaling.output_offset),
+            scale=(*self.scaling.input_scale, self.scaling.output_scale),
+            low=self.low,
+            high=self.high,
+        )
+
     def extended(
         self, inputs: NDArray[np.float64], history: History
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -190,7 +206,7 @@ class Recursion(AbstractForm):
             kernel.free_run(u, y, *self._arguments(len(measured) - depth))
             return y[places]
 
-        found = _gauss_newton(run, measured[depth - own : depth], measured[places], known)
+        found = gauss_newton(run, measured[depth - own : depth], measured[places], known)
         if found is None:
             return history
         y = measured.copy()
@@ -227,17 +243,27 @@ class Recursion(AbstractForm):
         return (lags.depth, n_steps, *tables, self.theta, self.neurons, self.low, self.high)
 
 
-_STEPS, _APART = 12, 1e-5
+STEPS, APART = 12, 1e-5
 """Gauss-Newton steps at most, and how far apart outputs are put for a derivative, in scaled numbers."""
 
 
-def _gauss_newton(
+def gauss_newton(
     run: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     start: NDArray[np.float64],
     target: NDArray[np.float64],
     known: NDArray[np.bool_],
 ) -> NDArray[np.float64] | None:
-    """What to begin a run with so that it comes closest to a target; ``None`` where no run is finite."""
+    """What to begin a run with so that it comes closest to a target.
+
+    Args:
+        run: From what it begins with to what it gives, both flat.
+        start: The first guess.
+        target: What it should give.
+        known: Which of the target's values count.
+
+    Returns:
+        What was found; ``None`` where no run is finite.
+    """
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.where(known, run(x) - target, 0.0)
@@ -245,9 +271,9 @@ def _gauss_newton(
     x, r = start.copy(), residual(start)
     if not np.isfinite(r).all():
         return None
-    for _ in range(_STEPS):
-        moved = [residual(x + step) - residual(x - step) for step in _APART * np.eye(len(x))]
-        J = np.column_stack(moved) / (2.0 * _APART)
+    for _ in range(STEPS):
+        moved = [residual(x + step) - residual(x - step) for step in APART * np.eye(len(x))]
+        J = np.column_stack(moved) / (2.0 * APART)
         if not np.isfinite(J).all():
             return x
         step, share, better = np.linalg.lstsq(J, -r, rcond=1e-10)[0], 1.0, False

@@ -97,3 +97,51 @@ class Scaling:
     def unscale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in the channel's unit, any shape."""
         return output * self.output_scale + self.output_offset
+
+
+@dataclass(frozen=True, kw_only=True)
+class VectorScaling:
+    """``scaled = (value - offset) / scale`` for every input and every one of several outputs.
+
+    Args:
+        input_offset: One per input, in its unit.
+        input_scale: One per input, in its unit, positive.
+        output_offset: One per output, in its unit.
+        output_scale: One per output, in its unit, positive.
+    """
+
+    input_offset: tuple[float, ...]
+    input_scale: tuple[float, ...]
+    output_offset: tuple[float, ...]
+    output_scale: tuple[float, ...]
+
+    @classmethod
+    def of(cls, scalings: Sequence[Scaling]) -> VectorScaling:
+        """Scalings of single outputs of the same inputs, side by side."""
+        return cls(
+            input_offset=scalings[0].input_offset,
+            input_scale=scalings[0].input_scale,
+            output_offset=tuple(one.output_offset for one in scalings),
+            output_scale=tuple(one.output_scale for one in scalings),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        return {name: list(getattr(self, name)) for name in self.__dataclass_fields__}
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> VectorScaling:
+        """The scaling that :meth:`to_dict` wrote."""
+        return cls(**{name: tuple(fields[name]) for name in cls.__dataclass_fields__})
+
+    def scale_inputs(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Inputs in the model's numbers, shape ``(n_samples, n_inputs)``."""
+        return np.ascontiguousarray((inputs - np.array(self.input_offset)) / np.array(self.input_scale))
+
+    def scale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Outputs in the model's numbers, the last axis that of the outputs."""
+        return np.asarray((output - np.array(self.output_offset)) / np.array(self.output_scale))
+
+    def unscale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Outputs in the channels' units, the last axis that of the outputs."""
+        return np.asarray(output * np.array(self.output_scale) + np.array(self.output_offset))

@@ -14,7 +14,6 @@ from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
 from sysid.models.vector_narx import VectorNARX, VectorNARXModel
-from sysid.models.wiring import Member
 
 _KINDS: dict[str, tuple[type[AbstractStructure], type[AbstractModel]]] = {
     structure.kind: (structure, model)
@@ -23,6 +22,7 @@ _KINDS: dict[str, tuple[type[AbstractStructure], type[AbstractModel]]] = {
         (NARX, NARXModel),
         (NeuralStateSpace, NeuralStateSpaceModel),
         (TransferFunction, TransferFunctionModel),
+        (VectorNARX, VectorNARXModel),
     )
 }
 """By kind the structure and its models."""
@@ -84,29 +84,6 @@ def structure_from_dict(fields: Dict[str, Any]) -> AbstractStructure:
         ) from error
 
 
-def member_from_dict(fields: Dict[str, Any]) -> Member:
-    """Build the member of a cascade that some model's ``to_dict`` wrote.
-
-    Args:
-        fields: What it wrote.
-
-    Returns:
-        A model of one output, or of several.
-
-    Raises:
-        ConfigError: If the kind is unknown or a field is missing.
-    """
-    if fields.get("structure", {}).get("kind") != VectorNARX.kind:
-        return model_from_dict(fields)
-    try:
-        return VectorNARXModel.from_dict(fields)
-    except KeyError as error:
-        raise ConfigError(
-            f"the stored {VectorNARX.kind} model lacks the field {error}",
-            remedy="store the model again; this file is incomplete",
-        ) from error
-
-
 def cascade_from_dict(fields: Dict[str, Any]) -> Cascade:
     """Build the cascade that :meth:`Cascade.to_dict` wrote.
 
@@ -128,7 +105,7 @@ def cascade_from_dict(fields: Dict[str, Any]) -> Cascade:
             remedy="store the cascade again, or use model_from_dict for a single model",
         )
     return Cascade(
-        models=tuple(member_from_dict(member) for member in fields["members"]),
+        models=tuple(model_from_dict(member) for member in fields["members"]),
         rest=fields.get("rest", {}),
         limits={name: Limit(**limit) for name, limit in fields.get("limits", {}).items()},
     )

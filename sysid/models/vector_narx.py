@@ -5,104 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
-from sysid.models.ends import Ends, read_now
+from sysid.models.base import AbstractStructure, SeveralOutputs
 from sysid.models.lags import Lags, LagSpec
-from sysid.models.mapping import LISTS, Mapping, check_fields, listed
+from sysid.models.mapping import Mapping
 from sysid.models.narx import CLAMP, NARX
-from sysid.names import read_sides, written_side
+from sysid.models.scaling import VectorScaling
+from sysid.models.vector_recursion import VectorRecursion
 
 
 @dataclass(frozen=True, kw_only=True)
-class VectorMapping:
-    """Which channels go in, which come out; written ``STP -> BP+AR+BC``.
-
-    Args:
-        inputs: Names of the input channels; none for a record without input.
-        outputs: Names of the output channels, at least one.
-
-    Raises:
-        ConfigError: If there is no output, or a channel appears twice.
-
-    Example:
-        >>> str(VectorMapping.parse("STP -> BP + AR"))
-        'STP -> BP+AR'
-    """
-
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "inputs", tuple(self.inputs))
-        object.__setattr__(self, "outputs", tuple(self.outputs))
-        names = (*self.inputs, *self.outputs)
-        if not self.outputs or not all(names) or len(set(names)) != len(names):
-            raise ConfigError(
-                "not a mapping of input channels to output channels",
-                expected="different channel names on both sides, as in STP -> BP+AR",
-                got=str(self),
-                remedy="name each channel once; a model's own past outputs are inputs by its structure",
-            )
-
-    def __str__(self) -> str:
-        return f"{written_side(self.inputs)} -> {written_side(self.outputs)}".lstrip()
-
-    @classmethod
-    def of(cls, value: object) -> VectorMapping:
-        """A mapping from what people write.
-
-        Args:
-            value: A mapping of one output or of several, its text, or its lists:
-                ``{"inputs": ["STP"], "outputs": ["BP", "AR"]}``.
-
-        Returns:
-            The mapping.
-
-        Raises:
-            ConfigError: If it is none of these.
-        """
-        if isinstance(value, VectorMapping):
-            return value
-        if isinstance(value, Mapping) or (isinstance(value, Dict) and "output" in value):
-            one = Mapping.of(value)
-            return cls(inputs=one.inputs, outputs=(one.output,))
-        if not isinstance(value, Dict):
-            return cls.parse(str(value))
-        check_fields(value, ("inputs", "outputs"), "{inputs: [STP], outputs: [BP, AR]}")
-        return cls(inputs=listed(value["inputs"], what="inputs"), outputs=listed(value["outputs"], what="outputs"))
-
-    @classmethod
-    def parse(cls, text: str) -> VectorMapping:
-        """Read a mapping from text.
-
-        Args:
-            text: Input names joined by ``+``, an arrow, output names joined by ``+``.
-
-        Returns:
-            The mapping.
-
-        Raises:
-            ConfigError: If the text does not have that form.
-        """
-        sides = read_sides(text)
-        if len(sides) != 2:
-            raise ConfigError(
-                "not a mapping",
-                expected="input channels, an arrow and output channels, as in STP -> BP+AR",
-                got=text,
-                remedy="write -> between inputs and outputs" if len(sides) < 2 else f"write {LISTS}",
-            )
-        inputs, outputs = sides
-        return cls(inputs=tuple(inputs), outputs=tuple(outputs))
-
-
-@dataclass(frozen=True, kw_only=True)
-class VectorNARX:
+class VectorNARX(AbstractStructure):
     """Delays and neurons of a network with several outputs.
 
     Every output is a function of the same neurons, and every neuron reads the past of all outputs: what one reservoir
@@ -130,6 +49,7 @@ class VectorNARX:
     feedthrough: bool = True
 
     kind = "VectorNARX"
+    several_outputs = True
 
     def __init__(
         self,
@@ -160,6 +80,18 @@ class VectorNARX:
         )
         return f"{self.kind} {', '.join(labels)}"
 
+    def resized(self, neurons: int) -> VectorNARX:
+        """The same structure with another number of neurons."""
+        return replace(self, neurons=neurons)
+
+    def check_inputs(self, n_inputs: int) -> None:
+        """Refuse sets of input delays that are not one per input; see the base class."""
+        self._sets("input", self.input_delays, n_inputs)
+
+    def check_outputs(self, n_outputs: int) -> None:
+        """Refuse sets of output delays that are not one per output; see the base class."""
+        self._sets("output", self.output_delays, n_outputs)
+
     def lags(self, n_inputs: int, n_outputs: int) -> Lags:
         """The regressors: inputs, then outputs, all as channels that are read with a lag.
 
@@ -173,18 +105,20 @@ class VectorNARX:
         Raises:
             ConfigError: If several sets are given and their number is not that of the channels.
         """
-        sets: list[tuple[int, ...]] = []
-        for what, given, n in (("input", self.input_delays, n_inputs), ("output", self.output_delays, n_outputs)):
-            if len(given) not in {1, n}:
-                raise ConfigError(
-                    f"the sets of {what} delays do not match the {what}s",
-                    where=f"{what}_delays",
-                    expected=f"one set, or {n}: one per {what}",
-                    got=f"{len(given)} sets",
-                    remedy=f"give each {what} its own list, or one list for all",
-                )
-            sets += given * n if len(given) == 1 else given
-        return Lags(inputs=tuple(sets), output=())
+        inputs = self._sets("input", self.input_delays, n_inputs)
+        return Lags(inputs=(*inputs, *self._sets("output", self.output_delays, n_outputs)), output=())
+
+    @staticmethod
+    def _sets(what: str, given: tuple[tuple[int, ...], ...], n: int) -> tuple[tuple[int, ...], ...]:
+        if len(given) not in {1, n}:
+            raise ConfigError(
+                f"the sets of {what} delays do not match the {what}s",
+                where=f"{what}_delays",
+                expected=f"one set, or {n}: one per {what}",
+                got=f"{len(given)} sets",
+                remedy=f"give each {what} its own list, or one list for all",
+            )
+        return given * n if len(given) == 1 else given
 
     def parameter_count(self, n_inputs: int, n_outputs: int) -> int:
         """Length of the flat parameters ``[W | b | V | c | w]`` for so many channels."""
@@ -202,29 +136,12 @@ class VectorNARX:
         }
 
 
-@dataclass(frozen=True, kw_only=True)
-class VectorScaling:
-    """``scaled = (value - offset) / scale`` for every input and output.
-
-    Args:
-        input_offset: One per input, in its unit.
-        input_scale: One per input, in its unit, positive.
-        output_offset: One per output, in its unit.
-        output_scale: One per output, in its unit, positive.
-    """
-
-    input_offset: tuple[float, ...]
-    input_scale: tuple[float, ...]
-    output_offset: tuple[float, ...]
-    output_scale: tuple[float, ...]
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VectorNARXModel:
+class VectorNARXModel(SeveralOutputs):
     r"""A fitted network with several outputs.
 
     In scaled numbers :math:`\hat y_t = \mathrm{clip}(w x_t + c + V \tanh(W x_t + b))` with one row of :math:`w` and
-    :math:`V` for each output, and the past of all outputs in :math:`x_t`. It runs as a cascade of one member.
+    :math:`V` for each output, and the past of all outputs in :math:`x_t`.
 
     Args:
         network: The structure.
@@ -244,7 +161,7 @@ class VectorNARXModel:
     network: VectorNARX
     theta: NDArray[np.float64]
     scaling: VectorScaling
-    mapping: VectorMapping
+    mapping: Mapping
     sample_time: float
     input_units: tuple[str, ...]
     output_units: tuple[str, ...]
@@ -281,52 +198,26 @@ class VectorNARXModel:
         """The regressors over inputs and outputs."""
         return self.network.lags(len(self.mapping.inputs), len(self.mapping.outputs))
 
-    @property
-    def ends(self) -> Ends:
-        """Its channels, as wiring sees them."""
-        return Ends(
-            inputs=self.mapping.inputs,
-            outputs=self.mapping.outputs,
-            input_units=self.input_units,
-            output_units=self.output_units,
-            rest_outputs=self.rest_outputs,
-            direct=read_now(self.mapping.inputs, self.lags.inputs),
+    @cached_property
+    def recursion(self) -> VectorRecursion:
+        """The form that is run and exported."""
+        return VectorRecursion(
+            lags=self.lags,
+            n_outputs=len(self.mapping.outputs),
+            neurons=self.network.neurons,
+            theta=self.theta,
+            linear=self.network.feedthrough,
+            scaling=self.scaling,
+            low=-self.clamp,
+            high=self.clamp,
         )
 
     def with_theta(self, theta: NDArray[np.float64]) -> VectorNARXModel:
         """The same network with other weights."""
         return replace(self, theta=theta)
 
-    def predict_outputs(
-        self, signals: Dict[str, NDArray[np.float64]], rest: Dict[str, float]
-    ) -> dict[str, NDArray[np.float64]]:
-        """Prediction one step ahead from measured outputs.
-
-        Args:
-            signals: Every input and output, in its unit, shape ``(n_samples,)`` each.
-            rest: Their values before the first sample.
-
-        Returns:
-            Every output, shape ``(n_samples,)``.
-        """
-        scaling, depth, n_out = self.scaling, self.lags.depth, len(self.mapping.outputs)
-        names = (*self.mapping.inputs, *self.mapping.outputs)
-        z = np.column_stack([np.concatenate([np.full(depth, rest[name]), signals[name]]) for name in names])
-        z = (z - np.array(scaling.input_offset + scaling.output_offset)) / np.array(
-            scaling.input_scale + scaling.output_scale
-        )
-        n, pairs = len(z) - depth, zip(self.lags.input_channel, self.lags.input_lag, strict=True)
-        x = np.column_stack([z[depth - lag : depth - lag + n, column] for column, lag in pairs])
-        k, r = self.network.neurons, x.shape[1]
-        W, b, V, c, w = np.split(self.theta, np.cumsum([k * r, k, n_out * k, n_out]))
-        y = np.tanh(x @ W.reshape(k, r).T + b) @ V.reshape(n_out, k).T + c
-        y = np.clip(y + x @ w.reshape(n_out, r).T if len(w) else y, -self.clamp, self.clamp)
-        y = y * np.array(scaling.output_scale) + np.array(scaling.output_offset)
-        return {name: y[:, j] for j, name in enumerate(self.mapping.outputs)}
-
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""
-        scaling = self.scaling
         return {
             "structure": self.network.to_dict(),
             "mapping": str(self.mapping),
@@ -335,7 +226,7 @@ class VectorNARXModel:
             "output_units": list(self.output_units),
             "rest_outputs": list(self.rest_outputs),
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
-            "scaling": {name: list(getattr(scaling, name)) for name in VectorScaling.__dataclass_fields__},
+            "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
         }
 
@@ -345,8 +236,8 @@ class VectorNARXModel:
         return cls(
             network=VectorNARX(**{key: value for key, value in fields["structure"].items() if key != "kind"}),
             theta=np.array(fields["theta"], dtype=np.float64),
-            scaling=VectorScaling(**{key: tuple(value) for key, value in fields["scaling"].items()}),
-            mapping=VectorMapping.parse(fields["mapping"]),
+            scaling=VectorScaling.from_dict(fields["scaling"]),
+            mapping=Mapping.parse(fields["mapping"]),
             sample_time=fields["sample_time"],
             input_units=tuple(fields["input_units"]),
             output_units=tuple(fields["output_units"]),

@@ -10,9 +10,8 @@ from itertools import pairwise
 from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel
 from sysid.models.ends import Ends
-from sysid.models.vector_narx import VectorNARXModel
 
-Member = AbstractModel | VectorNARXModel
+Member = AbstractModel
 """What can be wired: a model of one output, or of several."""
 
 

@@ -2,7 +2,7 @@
 
 from sysid.estimation.stability.free_run import Stability, check_stability
 from sysid.estimation.stability.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
-from sysid.validation.evaluate import CaseResult, Evaluation, evaluate, evaluate_case
+from sysid.validation.evaluate import CaseResult, Evaluation, case_results, evaluate, evaluate_case, evaluate_outputs
 from sysid.validation.evaluate_cascade import CascadeEvaluation, evaluate_cascade
 from sysid.validation.intervals import CaseIntervals, Coverage, OutputInterval, predict_interval
 from sysid.validation.linearity import Linearity, judge_linearity
@@ -25,10 +25,12 @@ __all__ = [
     "Stability",
     "TraceSequences",
     "analyse_residuals",
+    "case_results",
     "check_stability",
     "evaluate",
     "evaluate_cascade",
     "evaluate_case",
+    "evaluate_outputs",
     "figures",
     "judge_linearity",
     "predict_interval",

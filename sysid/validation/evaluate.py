@@ -100,7 +100,7 @@ class Evaluation:
 def evaluate(
     model: AbstractModel, traces: TraceSet, start: Start, *, repeats: int = 5, posterior: Posterior | None = None
 ) -> Evaluation:
-    """Run a model over every trace of a set.
+    """Run a model of one output over every trace of a set.
 
     Args:
         model: The model.
@@ -114,19 +114,50 @@ def evaluate(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
+        ConfigError: If the model has several outputs.
     """
-    return Evaluation(
-        cases={
-            trace.name: evaluate_case(model, trace, traces.roles[trace.name], start, repeats, posterior=posterior)
-            for trace in traces
-        }
-    )
+    return evaluate_outputs(model, traces, start, repeats=repeats, posterior=posterior)[model.mapping.output]
+
+
+def evaluate_outputs(
+    model: AbstractModel, traces: TraceSet, start: Start, *, repeats: int = 5, posterior: Posterior | None = None
+) -> dict[str, Evaluation]:
+    """Run a model of any number of outputs over every trace of a set.
+
+    Args:
+        model: The model.
+        traces: The cases.
+        start: How each free run begins, and from which sample on it is scored.
+        repeats: Timed repetitions of each free run, after one that warms up.
+        posterior: As for :func:`evaluate`.
+
+    Returns:
+        By output its evaluation; the run time is that of the whole model.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+    """
+    cases = {
+        trace.name: case_results(model, trace, traces.roles[trace.name], start, repeats, posterior=posterior)
+        for trace in traces
+    }
+    return {
+        output: Evaluation(cases={name: case[output] for name, case in cases.items()})
+        for output in model.mapping.outputs
+    }
 
 
 def evaluate_case(
     model: AbstractModel, trace: Trace, role: Role, start: Start, repeats: int, *, posterior: Posterior | None = None
 ) -> CaseResult:
-    """Run a model over one trace.
+    """Run a model of one output over one trace; see :func:`case_results`."""
+    return case_results(model, trace, role, start, repeats, posterior=posterior)[model.mapping.output]
+
+
+def case_results(
+    model: AbstractModel, trace: Trace, role: Role, start: Start, repeats: int, *, posterior: Posterior | None = None
+) -> dict[str, CaseResult]:
+    """Run a model of any number of outputs over one trace.
 
     Args:
         model: The model.
@@ -137,12 +168,12 @@ def evaluate_case(
         posterior: Of the model's parameters, for intervals of its output.
 
     Returns:
-        The result.
+        The result by output.
 
     Raises:
         ChannelError: If the trace lacks a channel of the mapping.
     """
-    inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
+    inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
     begun = beginning(model, inputs, target, start, trace.usable_samples)
     history, scored = begun.history, slice(begun.first, None)
     inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
@@ -153,21 +184,27 @@ def evaluate_case(
         model.simulate(inputs, history)
         seconds.append(time.perf_counter() - began)
     predicts = model.recursion.predicts
-    predicted = model.predict(inputs, target, history) if predicts else np.full(len(target), np.nan)
+    predicted = model.predict(inputs, target, history) if predicts else np.full(target.shape, np.nan)
     intervals = None
     if posterior is not None:
         experiment = Experiment.for_model(trace, model, start)
         intervals = case_intervals(posterior, model, experiment, simulated, predicted)
-    return CaseResult(
-        case=trace.name,
-        role=role,
-        free_run=figures(target, simulated, model.output_unit, counted),
-        one_step=figures(target, predicted, model.output_unit, counted) if predicts else none(model.output_unit),
-        run_time_s=float(np.median(seconds)),
-        first=begun.first,
-        time=trace.time[scored],
-        target=target,
-        simulated=simulated,
-        predicted=predicted,
-        intervals=intervals,
-    )
+    columns = [array.reshape(len(target), -1).T for array in (target, simulated, predicted)]
+    return {
+        output: CaseResult(
+            case=trace.name,
+            role=role,
+            free_run=figures(measured, run, unit, counted),
+            one_step=figures(measured, ahead, unit, counted) if predicts else none(unit),
+            run_time_s=float(np.median(seconds)) if seconds else float("nan"),
+            first=begun.first,
+            time=trace.time[scored],
+            target=measured,
+            simulated=run,
+            predicted=ahead,
+            intervals=intervals,
+        )
+        for output, unit, measured, run, ahead in zip(
+            model.mapping.outputs, model.ends.output_units, *columns, strict=True
+        )
+    }

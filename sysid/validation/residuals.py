@@ -155,6 +155,7 @@ def analyse_residuals(
     n_lags: int = 25,
     probability: float = 0.99,
     free_run: bool = False,
+    output: str | None = None,
 ) -> ResidualAnalysis:
     """Analyse the residuals of a model.
 
@@ -166,6 +167,7 @@ def analyse_residuals(
         probability: Of the bounds.
         free_run: Residuals of the free run in place of the one-step prediction. They are not expected to be white,
             but to be independent of the inputs.
+        output: Which output, of a model of several.
 
     Returns:
         The analysis.
@@ -174,7 +176,8 @@ def analyse_residuals(
         ChannelError: If a trace lacks a channel of the mapping.
         TraceError: If there are not more residuals than lags, or a residual is not finite.
     """
-    records = [_record(model, trace, start or Start(), free_run) for trace in traces]
+    column = model.mapping.outputs.index(model.mapping.output if output is None else output)
+    records = [_record(model, trace, start or Start(), free_run, column) for trace in traces]
     n = sum(int(record.counted.sum()) for record in records)
     if n <= n_lags + 1 or not all(np.isfinite(record.residual).all() for record in records):
         raise TraceError(
@@ -206,15 +209,16 @@ def analyse_residuals(
     )
 
 
-def _record(model: AbstractModel, trace: Trace, start: Start, free_run: bool) -> _Record:
-    inputs, target = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
+def _record(model: AbstractModel, trace: Trace, start: Start, free_run: bool, column: int) -> _Record:
+    inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
     begun = beginning(model, inputs, target, start, trace.usable_samples)
     history, scored = begun.history, slice(begun.first, None)
     inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
     # With noise added to the output alone the free run is the best prediction, any number of steps ahead.
     free_run = free_run or not model.recursion.predicts
     output = model.simulate(inputs, history) if free_run else model.predict(inputs, target, history)
-    return _Record(np.where(counted, target - output, 0.0), inputs, counted)
+    residual = (target - output).reshape(len(target), -1)[:, column]
+    return _Record(np.where(counted, residual, 0.0), inputs, counted)
 
 
 def _centred(records: Sequence[_Record]) -> list[_Record]:

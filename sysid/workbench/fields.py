@@ -140,6 +140,16 @@ def _mapping(value: object) -> Mapping:
         raise as_field_error(error) from error
 
 
+def _single_mapping(value: object) -> Mapping:
+    """A mapping of one output."""
+    mapping = _mapping(value)
+    try:
+        mapping.check_single()
+    except ConfigError as error:
+        raise as_field_error(error) from error
+    return mapping
+
+
 def _past_lags(value: object) -> tuple[int, ...]:
     """Lags from 1 on, in the forms that people write."""
     try:
@@ -177,23 +187,31 @@ StartField = Annotated[
     ),
 ]
 _NAME = {"type": "string", "minLength": 1}
-MappingField = Annotated[
-    Mapping,
-    PlainValidator(_mapping),
-    PlainSerializer(str),
-    WithJsonSchema(
+_NAMES = {"anyOf": [_NAME, {"type": "array", "items": _NAME}]}
+
+
+def _mapping_schema(*words: str) -> WithJsonSchema:
+    return WithJsonSchema(
         {
             "anyOf": [
                 {"type": "string", "pattern": "->"},
-                {
-                    "type": "object",
-                    "properties": {"inputs": {"anyOf": [_NAME, {"type": "array", "items": _NAME}]}, "output": _NAME},
-                    "required": ["inputs", "output"],
-                    "additionalProperties": False,
-                },
+                *(
+                    {
+                        "type": "object",
+                        "properties": {"inputs": _NAMES, word: _NAME if word == "output" else _NAMES},
+                        "required": ["inputs", word],
+                        "additionalProperties": False,
+                    }
+                    for word in words
+                ),
             ]
         }
-    ),
+    )
+
+
+MappingField = Annotated[Mapping, PlainValidator(_mapping), PlainSerializer(str), _mapping_schema("output", "outputs")]
+SingleMappingField = Annotated[
+    Mapping, PlainValidator(_single_mapping), PlainSerializer(str), _mapping_schema("output")
 ]
 
 
@@ -251,12 +269,13 @@ else:
     )
     JointConfig = create_model("JointConfig", __base__=_JointWords, **_fields_of(JointTraining))
 
-OptionsConfig = TrainingConfig | TransferFunctionConfig
+OptionsConfig = TrainingConfig | TransferFunctionConfig | JointConfig
 """Options that some structure takes, as the YAML has them."""
 
 _OPTIONS: dict[type, type[BaseModel]] = {
     Training: TrainingConfig,
     TransferFunctionTraining: TransferFunctionConfig,
+    JointTraining: JointConfig,
 }
 
 

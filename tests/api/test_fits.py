@@ -140,3 +140,36 @@ def test_a_parameter_that_the_data_leave_open_has_no_spread_in_the_summary() -> 
     assert found.uncertainty is not None
     assert np.isnan(found.uncertainty.standard_deviations).any()
     assert "± nan" not in found.summary()
+
+
+@pytest.fixture(scope="module")
+def whole() -> sysid.Fit:
+    """One network of both outputs."""
+    frame = pd.DataFrame({"u": U, "y": Y, "z": 2.0 * Y + 1.0})
+    traces = sysid.data(frame, inputs="u", outputs=["y", "z"], sample_time=0.1)
+    network = sysid.VectorNARX(input_delays=1, output_delays=1, neurons=1)
+    training = sysid.JointTraining(max_iterations=15, checkpoints=1)
+    found = sysid.fit(traces, "u -> y+z", network, training, stability=sysid.StabilityOptions(count=5))
+    assert isinstance(found, sysid.Fit)
+    return found
+
+
+def test_a_structure_with_several_outputs_is_one_fit(whole: sysid.Fit) -> None:
+    both = np.column_stack([Y, 2.0 * Y + 1.0])
+    assert_allclose(whole.simulate(U, initial={"y": 0.0, "z": 1.0}), both, atol=0.3)
+    assert_allclose(whole.predict(both, U, steps=2), both, atol=0.3)
+    assert whole.residuals(output="z").n_samples > 50
+    figures = sysid.compare(whole.traces, whole).to_frame()
+    assert figures["output"].tolist() == ["y", "z"]
+    assert figures["fit"].min() > 80.0
+    assert len(whole.plot().axes) == 2
+    with pytest.raises(ChannelError, match="initial"):
+        whole.simulate(U, initial={"x": 0.0})
+
+
+def test_a_structure_with_several_outputs_is_saved_as_one_model(whole: sysid.Fit, tmp_path: Path) -> None:
+    bundle = whole.save(tmp_path / "bundle", formats=("onnx", "c"))
+    assert [one["name"] for one in bundle.outputs] == ["y", "z"]
+    assert_allclose(bundle.simulate(U), whole.simulate(U), atol=1e-9)
+    again = sysid.read_bundle(tmp_path / "bundle")
+    assert_array_equal(again.simulate(U, initial={"y": 0.3}), bundle.simulate(U, initial={"y": 0.3}))

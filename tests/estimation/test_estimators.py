@@ -10,7 +10,7 @@ import pytest
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Status, Training, fit_arx
 from sysid.estimation.estimators import ESTIMATORS, JOINING, estimator_of, fit, with_stability
-from sysid.models import ARX, NARX, Mapping, VectorNARX
+from sysid.models import ARX, NARX, Mapping
 from sysid.traces import Channel, Trace
 
 MAPPING = Mapping.parse("u -> y")
@@ -28,12 +28,22 @@ def trace(pole: float = 0.9) -> Trace:
 
 def test_a_structure_without_a_row_is_refused() -> None:
     with pytest.raises(ConfigError, match="no estimator belongs to the structure") as caught:
-        estimator_of(VectorNARX(input_delays=1, output_delays=1, neurons=1))  # type: ignore[arg-type]
-    assert "fit_vector_narx" in str(caught.value.remedy)
+        estimator_of(object())  # type: ignore[arg-type]
+    assert "VectorNARX" in str(caught.value.expected)
+
+
+def test_a_structure_of_one_output_refuses_several() -> None:
+    with pytest.raises(ConfigError, match="an ARX model has one output"):
+        fit([trace()], Mapping.parse("u -> y+u2"), ARX(na=1, nb=1, nk=1))
 
 
 def test_a_row_says_what_its_function_knows() -> None:
-    assert {kind for kind, row in ESTIMATORS.items() if row.selects} == {"NARX", "NSS", "TransferFunction"}
+    assert {kind for kind, row in ESTIMATORS.items() if row.selects} == {
+        "NARX",
+        "NSS",
+        "TransferFunction",
+        "VectorNARX",
+    }
     assert {kind for kind, row in ESTIMATORS.items() if row.resumes} == {"NARX"} == set(JOINING)
     assert {kind for kind, row in ESTIMATORS.items() if row.linear} == {"ARX", "TransferFunction"}
 

@@ -15,7 +15,6 @@ from sysid.models import (
     NARXModel,
     Scaling,
     TransferFunction,
-    VectorMapping,
     VectorNARX,
     VectorNARXModel,
     VectorScaling,
@@ -48,7 +47,7 @@ def wired_narx(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) 
 
 def wired_vector(mapping: str, structure: VectorNARX, seed: int) -> VectorNARXModel:
     """A network of several outputs in a cascade."""
-    parsed = VectorMapping.parse(mapping)
+    parsed = Mapping.parse(mapping)
     n, m = len(parsed.inputs), len(parsed.outputs)
     theta = np.random.default_rng(seed).normal(size=structure.parameter_count(n, m))
     return VectorNARXModel(

@@ -13,7 +13,6 @@ from sysid.models import (
     Mapping,
     NARXModel,
     Scaling,
-    VectorMapping,
     VectorNARX,
     VectorNARXModel,
     VectorScaling,
@@ -84,7 +83,7 @@ def block(
     text: str, *, seed: int = 0, neurons: int = 4, output_delays=(1, 2), feedthrough: bool = True
 ) -> VectorNARXModel:
     """One network for several reservoirs."""
-    mapping = VectorMapping.parse(text)
+    mapping = Mapping.parse(text)
     structure = VectorNARX(input_delays=[0, 2], output_delays=output_delays, neurons=neurons, feedthrough=feedthrough)
     n, m = len(mapping.inputs), len(mapping.outputs)
     return VectorNARXModel(

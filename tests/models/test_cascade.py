@@ -19,7 +19,6 @@ from sysid.models import (
     Scaling,
     TransferFunction,
     TransferFunctionModel,
-    VectorMapping,
     cascade_from_dict,
     simulate_family,
 )
@@ -365,7 +364,7 @@ def test_a_trace_of_another_sample_time_is_refused():
 @pytest.mark.parametrize("text", ["STP", "STP -> BP+STP", "STP -> "], ids=str)
 def test_mappings_that_cannot_be_are_refused(text):
     with pytest.raises(ConfigError, match="not a mapping"):
-        VectorMapping.parse(text)
+        Mapping.parse(text)
 
 
 def test_a_run_becomes_a_trace():

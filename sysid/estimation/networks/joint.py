@@ -83,6 +83,7 @@ class JointTraining:
         traces: Sequence[Trace],
         errors: Dict[str, float],
         trained: Sequence[str] | None = None,
+        begins: Callable[[Trace], Dict[str, float]] = lambda _: {},
     ) -> CascadeProvider:
         """Residuals and Jacobians of a whole as these options have them count; every option that the provider has.
 
@@ -91,6 +92,7 @@ class JointTraining:
             traces: Estimation traces.
             errors: For each target the error in its unit that counts as one.
             trained: Outputs of the members that are trained; all by default.
+            begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
 
         Returns:
             The provider.
@@ -109,6 +111,7 @@ class JointTraining:
             leverage=self.leverage,
             robust_scale=self.robust_scale,
             workers=self.workers,
+            begins=begins,
         )
 
 
@@ -216,10 +219,9 @@ class _Candidate:
 
     @property
     def sentence(self) -> str:
-        seconds = self.solution.curve[-1].elapsed_s if self.solution else 0.0
         return (
-            f"from {self.origin} after {self.iteration} iterations ({seconds:.1f} s): mean squared residual "
-            f"{self.loss:.4g}, on the selection traces {self.score:.4g}"
+            f"from {self.origin} after {self.iteration} iterations: mean squared residual {self.loss:.4g}, on the "
+            f"selection traces {self.score:.4g}"
         )
 
 
@@ -329,7 +331,7 @@ class Joint:
         """As between the starts of a network: one trace on which all fail must not choose alone."""
         scores = []
         for trace in self.selection:
-            run, usable = model.simulate_trace(trace), trace.usable_samples
+            run, usable = model.simulate_trace(trace, rest=self.provider.begins(trace)), trace.usable_samples
             for name, error in self.provider.errors.items():
                 scores.append(float(np.mean((run[name] - trace[name])[usable] ** 2)) / error**2)
         return float(np.exp(np.mean(np.log(np.maximum(scores, NEGLIGIBLE))))) if scores else float("nan")
@@ -361,7 +363,8 @@ class Joint:
     def _status(self, chosen: _Candidate, seen: Sequence[_Candidate], *, interrupted: bool) -> Status:
         if interrupted:
             return Status.INTERRUPTED
-        runs = [chosen.model.simulate_trace(trace) for trace in (*self.provider.traces, *self.selection)]
+        traces = (*self.provider.traces, *self.selection)
+        runs = [chosen.model.simulate_trace(trace, rest=self.provider.begins(trace)) for trace in traces]
         if any(activity.lost for run in runs for activity in run.activity.values()):
             return Status.UNSTABLE
         if chosen.solution is None:

@@ -78,6 +78,7 @@ class CascadeProvider(AbstractProvider):
         robust_scale: Root mean squared residual of a trace from which on it counts by its logarithm
             (``robust_scale.py``); infinity for plain squares.
         workers: Records that are worked on at the same time.
+        begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
 
     Raises:
         ChannelError: If a trace lacks an input or a target, or a name is no output of the cascade.
@@ -93,6 +94,7 @@ class CascadeProvider(AbstractProvider):
     leverage: float = np.inf
     robust_scale: float = np.inf
     workers: int = 1
+    begins: Callable[[Trace], Dict[str, float]] = lambda _: {}
     n_samples: int = field(init=False)
     _trained: TrainedMembers = field(init=False, repr=False)
     _records: tuple[_Record, ...] = field(init=False, repr=False)
@@ -209,12 +211,13 @@ class CascadeProvider(AbstractProvider):
     def _record(self, trace: Trace) -> _Record:
         cascade = self.cascade
         inputs, target = trace.columns(cascade.inputs), trace.columns(list(self.errors))
-        run = cascade.simulate_trace(trace)
+        rest = self.begins(trace)
+        run = cascade.simulate_trace(trace, rest=rest)
         rows = counted_rows(target / np.array(list(self.errors.values())), self.stride, self.moves)
         usable = trace.usable_samples[rows]
         return _Record(
             values=run.values,
-            levels=cascade.levels(inputs[0]),
+            levels=cascade.levels(inputs[0], rest),
             rows=rows,
             target=target[rows],
             root_weights=None if usable.all() else usable.astype(np.float64),

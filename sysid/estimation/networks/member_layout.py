@@ -17,7 +17,7 @@ from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.models import Ends, Lags, Member
-from sysid.models.cascade_program import Part
+from sysid.models.part import Part
 
 MAX_ROWS = 50_000
 """Samples that the basis is scaled to; more say nothing new about the range of a regressor."""

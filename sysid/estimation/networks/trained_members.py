@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.kernels.cascade_layout import Program
 from sysid.models import Cascade, Ends, Member
-from sysid.models.cascade_program import Part, program_of
+from sysid.models.cascade_program import program_of
+from sysid.models.part import Part
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,96 +12,168 @@ from sysid.errors import ConfigError
 from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
 from sysid.estimation.networks.member_layout import JointLayout, MemberLayout
 from sysid.estimation.networks.training import FitProgress
-from sysid.models import Cascade, Scaling, VectorMapping, VectorNARX, VectorNARXModel, VectorScaling
-from sysid.models.cascade_program import Limit, Part
+from sysid.estimation.result import FitResult, Loop
+from sysid.models import (
+    AbstractStructure,
+    Cascade,
+    Mapping,
+    Scaling,
+    Start,
+    StartKind,
+    VectorNARX,
+    VectorNARXModel,
+    VectorScaling,
+)
+from sysid.models.part import Part
 from sysid.traces import Trace
+
+DEFAULT = JointTraining(max_iterations=500, patience=50)
+HELD = (
+    "Each record began at its first sample, as of a system that stood there; no initial state was estimated in the fit."
+)
 
 
 def fit_vector_narx(
     traces: Sequence[Trace],
-    mapping: VectorMapping,
+    mapping: Mapping,
     network: VectorNARX,
     training: JointTraining | None = None,
     *,
-    rest: Dict[str, float | str] | None = None,
-    limits: Dict[str, Limit] | None = None,
+    start: Start | None = None,
+    rest_output: Dict[str, float] | None = None,
     targets: Dict[str, float] | None = None,
     selection: Sequence[Trace] = (),
-    initial: VectorNARXModel | None = None,
+    initial: FitResult | None = None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
-) -> CascadeFit:
+) -> FitResult:
     """Fit a network of several outputs in free run, from random starts.
 
     Args:
-        traces: Estimation traces; a run over each begins at rest.
+        traces: Estimation traces.
         mapping: Which channels go in, which come out.
         network: The structure.
         training: How to train; 500 iterations of one start by default.
-        rest: Levels at rest, as for :class:`~sysid.models.Cascade`; by default the mean of the traces' first samples.
-        limits: Limits of outputs.
+        start: What stands before each record: the outputs at rest, the default, or for every other start their first
+            samples, held.
+        rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
         targets: For each output the error in its unit that counts as one; by default a hundredth of its range, so that
             all outputs count alike.
         selection: Traces that choose among starts and states.
-        initial: A model of the same structure whose parameters are the first start.
+        initial: A fit of the same structure whose parameters are the first start.
         on_progress: Called after every iteration.
 
     Returns:
-        The fit; its model is a cascade with the network as its one member.
+        The fit; its errors are mean squares over the outputs, in the targets.
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
         ConfigError: If the structure does not fit the mapping, or ``initial`` has another structure or mapping.
     """
-    training = training or JointTraining(max_iterations=500, patience=50)
-    template = _template(traces, mapping, network)
-    _check_initial(initial, template)
-    cascade = Cascade(models=(initial or template,), rest=rest or {}, limits=limits or {})
+    training = training or DEFAULT
+    template = _template(traces, mapping, network, rest_output or {})
+    begun = None if initial is None else initial.model
+    _check_initial(begun, template)
+    cascade = Cascade(models=(begun or template,))
     # Scaled to -1 to 1, a range is two scales wide.
     errors = targets or {
         name: 0.02 * scale for name, scale in zip(mapping.outputs, template.scaling.output_scale, strict=True)
     }
-    provider = training.provider(cascade, traces, errors)
+    held = start is not None and start.kind is not StartKind.REST
+    provider = training.provider(cascade, traces, errors, begins=lambda trace: _first(trace, mapping) if held else {})
     records = [{name: trace[name] for name in (*mapping.inputs, *mapping.outputs)} for trace in traces]
     layout = JointLayout.of(provider.members, records)
     starts: list[tuple[int | None, NDArray[np.float64]]] = []
-    if initial is not None:
+    if begun is not None:
         starts.append((None, layout.in_basis(provider.theta)))
     starts += [
         (seed, layout.draw(seed)) for seed in range(training.seed, training.seed + training.starts - len(starts))
     ]
     joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)
-    return joint.fit(starts)
+    return _result(joint.fit(starts), (HELD,) if held and start is not None and _unsaid(start) else ())
 
 
-def _check_initial(initial: VectorNARXModel | None, template: VectorNARXModel) -> None:
-    if initial is not None and (initial.network, initial.mapping) != (template.network, template.mapping):
-        raise ConfigError(
-            "the initial model has another structure",
-            where="initial",
-            expected=f"{template.mapping} {template.network.label}",
-            got=f"{initial.mapping} {initial.network.label}",
-            remedy="give a model with the same channels, delays and neurons, or leave initial out",
-        )
+def check_vector_initial(structure: AbstractStructure, initial: AbstractStructure, n_inputs: int) -> None:
+    """Refuse a fit that a network of several outputs cannot start from.
+
+    Args:
+        structure: What is to be fitted.
+        initial: What the initial fit is of.
+        n_inputs: Inputs of the mapping.
+
+    Raises:
+        ConfigError: If it has another structure.
+    """
+    del n_inputs
+    if structure != initial:
+        raise _other_structure(structure.label, initial.label)
 
 
-def _template(traces: Sequence[Trace], mapping: VectorMapping, network: VectorNARX) -> VectorNARXModel:
+def _unsaid(start: Start) -> bool:
+    return start.kind is not StartKind.FIRST_SAMPLE
+
+
+def _first(trace: Trace, mapping: Mapping) -> dict[str, float]:
+    """The outputs at the first sample that is not masked."""
+    usable = trace.usable_samples
+    row = int(np.argmax(usable)) if usable.any() else 0
+    return {name: float(trace[name][row]) for name in mapping.outputs}
+
+
+def _result(fit: CascadeFit, notes: tuple[str, ...]) -> FitResult:
+    """A fit of a cascade of one member as the fit of that member."""
+    history = dict(fit.history)
+    history["mse"] = history.pop("loss")
+    sizes = ", ".join(f"{name} {error:.3g}" for name, error in fit.errors.items())
+    return FitResult(
+        model=fit.model.models[0],
+        status=fit.status,
+        loop=Loop.CLOSED,
+        history=history,
+        train_time_s=fit.train_time_s,
+        seed=fit.seed,
+        evidence=fit.evidence,
+        attempts=fit.attempts,
+        notes=(*fit.notes, f"Errors that count as one: {sizes}.", *notes),
+    )
+
+
+def _check_initial(initial: object, template: VectorNARXModel) -> None:
+    if initial is None:
+        return
+    structure, mapping = getattr(initial, "structure", None), getattr(initial, "mapping", None)
+    if (structure, mapping) != (template.network, template.mapping):
+        label = getattr(structure, "label", type(initial).__name__)
+        raise _other_structure(f"{template.mapping} {template.network.label}", f"{mapping} {label}")
+
+
+def _other_structure(expected: str, got: str) -> ConfigError:
+    return ConfigError(
+        "the initial fit has another structure",
+        where="initial",
+        expected=expected,
+        got=got,
+        remedy="give a fit with the same channels, delays and neurons, or leave initial out",
+    )
+
+
+def _template(
+    traces: Sequence[Trace], mapping: Mapping, network: VectorNARX, rest: Dict[str, float]
+) -> VectorNARXModel:
     """The model that holds its outputs."""
     inputs = [trace.columns(mapping.inputs) for trace in traces]
     scalings = [Scaling.to_unit_range(inputs, [trace[name] for trace in traces]) for name in mapping.outputs]
     model = VectorNARXModel(
         network=network,
         theta=np.zeros(network.parameter_count(len(mapping.inputs), len(mapping.outputs))),
-        scaling=VectorScaling(
-            input_offset=scalings[0].input_offset,
-            input_scale=scalings[0].input_scale,
-            output_offset=tuple(scaling.output_offset for scaling in scalings),
-            output_scale=tuple(scaling.output_scale for scaling in scalings),
-        ),
+        scaling=VectorScaling.of(scalings),
         mapping=mapping,
         sample_time=traces[0].sample_time,
         input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
         output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
-        rest_outputs=tuple(float(np.mean([trace[name][0] for trace in traces])) for name in mapping.outputs),
+        rest_outputs=tuple(
+            rest[name] if name in rest else float(np.mean([trace[name][0] for trace in traces]))
+            for name in mapping.outputs
+        ),
     )
     part = Part.of(model)
     return model.with_theta(MemberLayout.of(model, part).centre()) if part else model

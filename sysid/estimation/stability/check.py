@@ -170,7 +170,7 @@ class FreeRunCheck(AbstractStabilityCheck):
     @classmethod
     def of(cls, options: StabilityOptions, mapping: Mapping, estimation: Sequence[Trace]) -> FreeRunCheck:
         """The check over the sequences that are given, or excursions of the estimation traces."""
-        inputs, outputs, given = mapping.inputs, (mapping.output,), options.sequences
+        inputs, outputs, given = mapping.inputs, mapping.outputs, options.sequences
         if options.count == 0:
             return cls(options=options, source=None)
         if not given:

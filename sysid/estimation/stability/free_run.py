@@ -126,7 +126,7 @@ def check_stability(
     """Run a model over random sequences and see whether it stays bounded and settles where it should.
 
     Args:
-        model: A model of the sequences' first and only output, or a function that runs anything over a sequence.
+        model: A model of the sequences' outputs, or a function that runs anything over a sequence.
         sequences: Where the sequences come from.
         count: How many.
         seed: Of the random numbers; the same seed gives the same sequences.
@@ -196,7 +196,12 @@ def _runs(
     if not isinstance(model, AbstractModel):
         yield from ((sequence, model(sequence)) for sequence in sequences)
         return
+    several = model.structure.several_outputs
+
+    def run(one: InputSequence) -> NDArray[np.float64]:
+        return model.simulate(one.inputs, one.history(several=several))
+
     waiting = iter(sequences)
     with ThreadPoolExecutor(2) as pool:
         while some := list(islice(waiting, AT_ONCE)):
-            yield from zip(some, pool.map(lambda one: model.simulate(one.inputs, one.history), some), strict=True)
+            yield from zip(some, pool.map(run, some), strict=True)

@@ -61,10 +61,17 @@ class InputSequence:
     targets: NDArray[np.float64]
     judged: NDArray[np.bool_]
 
-    @property
-    def history(self) -> History:
-        """Before the first sample, for a model of the first output: everything stands where it begins."""
-        return History.at_rest(inputs=self.inputs[0], output=float(self.targets[0, 0]))
+    def history(self, *, several: bool) -> History:
+        """Before the first sample everything stands where it begins.
+
+        Args:
+            several: For a model of all outputs; of the first one otherwise.
+
+        Returns:
+            The history.
+        """
+        output = self.targets[0] if several else float(self.targets[0, 0])
+        return History.at_rest(inputs=self.inputs[0], output=output)
 
 
 class AbstractSequences(ABC):

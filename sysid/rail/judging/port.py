@@ -192,7 +192,7 @@ def _members(part: Part) -> list[Part]:
     """The part itself, or the members of a cascade that stands on the reference's pipe."""
     if not isinstance(part.model, Cascade):
         return [part]
-    members = [model for model in part.model.models if isinstance(model, AbstractModel)]
+    members = [model for model in part.model.models if len(model.mapping.outputs) == 1]
     if part.model.limits or len(members) < len(part.model.models):
         raise ConfigError(
             "a cascade from the pipe on cannot hold outputs by limits, nor have models of several outputs",

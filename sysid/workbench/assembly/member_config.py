@@ -12,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training
 from sysid.models import NARX
 from sysid.workbench.fields import (
-    MappingField,
+    SingleMappingField,
     StructureField,
     TrainingConfig,
     as_field_error,
@@ -35,7 +35,7 @@ class StandingConfig(Words):
 
     OLD: ClassVar[Mapping[str, str]] = {"places": "instances"}
 
-    mapping: MappingField
+    mapping: SingleMappingField
     instances: Annotated[tuple[str, ...], Field(min_length=1)] = ("",)
     shared: tuple[str, ...] = ()
 

@@ -26,8 +26,8 @@ from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
     FormatField,
-    MappingField,
     OptionsConfig,
+    SingleMappingField,
     StartField,
     StructureField,
     as_field_error,
@@ -140,7 +140,7 @@ class PipelineConfig(BaseModel):
     description: str = ""
     data: str
     selection: str | None = None
-    mapping: MappingField
+    mapping: SingleMappingField
     start: StartField = Start(kind=StartKind.ESTIMATED)
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)

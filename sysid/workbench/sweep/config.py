@@ -10,7 +10,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import Start, StartKind
 from sysid.reporting.sweep_record import FIGURES
-from sysid.workbench.fields import MappingField, StartField, as_field_error
+from sysid.workbench.fields import SingleMappingField, StartField, as_field_error
 from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig, ReportConfig
 from sysid.workbench.old_words import STRICT, TRAINING, with_new_words
 from sysid.workbench.stability import StabilityConfig
@@ -145,7 +145,7 @@ class SweepConfig(BaseModel):
     description: str = ""
     data: str
     selection: str | None = None
-    mapping: MappingField
+    mapping: SingleMappingField
     start: StartField = Start(kind=StartKind.ESTIMATED)
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)

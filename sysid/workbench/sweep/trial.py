@@ -240,11 +240,11 @@ def _scores(bench: Bench, model: AbstractModel) -> dict[str, Any]:
 
 
 def _case(model: AbstractModel, trace: Trace, start: Start, repeats: int) -> dict[str, float]:
-    inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
+    inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
     begun = beginning(model, inputs, target, start, trace.usable_samples)
     history, n = begun.history, begun.first
     inputs, target, counted = inputs[n:], target[n:], trace.usable_samples[n:]
-    simulated, predicted = model.simulate(inputs, history), np.full(len(target), np.nan)
+    simulated, predicted = model.simulate(inputs, history), np.full(target.shape, np.nan)
     if model.recursion.predicts:
         predicted = model.predict(inputs, target, history)
     figures = {

@@ -1,0 +1,53 @@
+"""One member of a cascade as the compiled pass sees it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models.lags import Lags
+
+
+class _HasPart(Protocol):
+    @property
+    def part(self) -> Part | None: ...
+
+
+class _Lowered(Protocol):
+    @property
+    def recursion(self) -> _HasPart: ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part:
+    """A recursion over columns, its inputs' and then its outputs'.
+
+    Args:
+        lags: Lags of every column, as ``inputs``; ``output`` is empty.
+        neurons: Number of neurons.
+        theta: Flat parameters.
+        linear: Whether there is a linear part.
+        gated: Whether the neurons have gates.
+        offset: Of every column, in its unit.
+        scale: Of every column, in its unit.
+        low: Lower bound of the outputs in scaled numbers.
+        high: Upper bound of the outputs in scaled numbers.
+    """
+
+    lags: Lags
+    neurons: int
+    theta: NDArray[np.float64]
+    linear: bool
+    gated: bool
+    offset: tuple[float, ...]
+    scale: tuple[float, ...]
+    low: float
+    high: float
+
+    @staticmethod
+    def of(model: _Lowered) -> Part | None:
+        """A model as a part; ``None`` for one that is no recursion over lagged regressors."""
+        return model.recursion.part
