@@ -247,12 +247,21 @@ def _task(
             "training": str(replace(member.training, seed=0)),
             "samples": [len(trace) for trace in own],
         },
-        sample=_sample(member, estimation[: member.traces], selection[:1]),
+        sample=sample_fit(member, estimation[: member.traces], selection[:1]),
     )
 
 
-def _sample(member: Member, estimation: Sequence[Trace], selection: Sequence[Trace]) -> Sample:
-    """A fit of a member on a few of its traces."""
+def sample_fit(member: Member, estimation: Sequence[Trace], selection: Sequence[Trace]) -> Sample:
+    """A fit of a member on a few of its traces, by which the whole fit is timed.
+
+    Args:
+        member: The member.
+        estimation: All traces that it is fitted to.
+        selection: Traces that choose between its starts.
+
+    Returns:
+        The fit.
+    """
     some = estimation[:SAMPLED]
 
     def fit(training: Training, report: Report) -> FitResult:

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name, candidate_title
 from sysid.names import slug, task_slug
 from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.estimates import RoundEstimates
 from sysid.workbench.assembly.evaluation import EXPORT, INTERPOLATION, MEMBERS, MONTE_CARLO, SCORING, WHOLE
 from sysid.workbench.fits.data import unmade_data
 from sysid.workbench.runner.run import REPORT
 from sysid.workbench.runner.steps import Estimate, Outlined
 
 
-def outline(config: AssemblyConfig, beside: Path) -> list[Outlined]:
+def outline(config: AssemblyConfig, beside: Path, estimates: RoundEstimates) -> list[Outlined]:
     """All steps of an assembly, as far as its pipeline says.
 
     Args:
         config: The pipeline.
         beside: Folder of its file.
+        estimates: How long rounds take that were never trained.
 
     Returns:
         The steps in order; active learning may end before its last round.
     """
-    return [*_data(config, beside), *_training(config), *_proof(config, beside), REPORT]
+    return [*_data(config, beside), *_training(config, estimates), *_proof(config, beside), REPORT]
 
 
 def _data(config: AssemblyConfig, beside: Path) -> list[Outlined]:
@@ -39,23 +42,25 @@ def _loading(name: str, beside: Path) -> Outlined:
     return Outlined(name=f"data-{slug(name)}", title=f"Loading {name}", estimate=estimate)
 
 
-def _training(config: AssemblyConfig) -> Iterator[Outlined]:
+def _training(config: AssemblyConfig, estimates: RoundEstimates) -> Iterator[Outlined]:
     plan = config.plan
     if config.warm_start is None:
-        yield from _members(config)
+        yield from _members(config, estimates)
     for number in range(1, len(plan.rounds) + 1):
         name = "together" if number == 1 else f"together-{number}"
-        yield Outlined(name=name, title=f"Training end to end{'' if number == 1 else f', round {number}'}")
+        title = f"Training end to end{'' if number == 1 else f', round {number}'}"
+        yield Outlined(name=name, title=title, how_long=partial(estimates.of, name))
     if plan.active_learning is not None:
         parts = len(plan.active_learning.rounds)
         for number in range(1, len(plan.active_learning.additions) + 1):
             for part in range(1, parts + 1):
                 suffix = f".{part}" if parts > 1 else ""
                 name = f"active-learning-{number}{suffix.replace('.', '-')}"
-                yield Outlined(name=name, title=f"Active learning, round {number}{suffix} at most")
+                title = f"Active learning, round {number}{suffix} at most"
+                yield Outlined(name=name, title=title, how_long=partial(estimates.of, name))
 
 
-def _members(config: AssemblyConfig) -> Iterator[Outlined]:
+def _members(config: AssemblyConfig, estimates: RoundEstimates) -> Iterator[Outlined]:
     plan, many = config.plan, False
     swept = {member.mapping.output for member in config.members if member.sweep is not None}
     for member in config.composite.members:
@@ -73,7 +78,8 @@ def _members(config: AssemblyConfig) -> Iterator[Outlined]:
             for output in plan.retrain.members:
                 mapping = config.composite.member(output).mapping
                 title = f"Retraining {mapping} on what the others put out, round {number + 1}"
-                yield Outlined(name=f"fit-{task_slug(f'{mapping} retrained {number}')}", title=title)
+                name = f"fit-{task_slug(f'{mapping} retrained {number}')}"
+                yield Outlined(name=name, title=title, how_long=partial(estimates.of_retraining, output))
 
 
 def _proof(config: AssemblyConfig, beside: Path) -> Iterator[Outlined]:

@@ -14,6 +14,7 @@ from sysid.reporting.published.tables import read_published
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.data import AssemblyData
+from sysid.workbench.assembly.estimates import RoundEstimates
 from sysid.workbench.assembly.evaluation import ASSEMBLY, LINE, Evaluating
 from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.assembly.interpolation import StoredInterpolation
@@ -44,20 +45,21 @@ def program(request: RunRequest) -> Program[AssemblyResults]:
     """
     joined = read_joined(request.path)
     config = check(AssemblyConfig, joined.data, where=joined.origins)
+    estimates = RoundEstimates(config=config)
 
     def steps(run: Run) -> AssemblyResults:
-        return _run(Context(config=config, joined=joined, beside=request.path.parent, run=run))
+        return _run(Context(config=config, joined=joined, beside=request.path.parent, run=run), estimates)
 
     return Program(
         name=config.name,
         keep=joined.keep,
         steps=steps,
-        outline=lambda: outline(config, request.path.parent),
+        outline=lambda: outline(config, request.path.parent, estimates),
         closing=lambda results, folder: closing(headline(results), folder),
     )
 
 
-def _run(context: Context) -> AssemblyResults:
+def _run(context: Context, estimates: RoundEstimates) -> AssemblyResults:
     """Every step, in order."""
     config, notes = context.config, list[str]()
     if config.published_models is not None:
@@ -65,6 +67,7 @@ def _run(context: Context) -> AssemblyResults:
     cases = context.load(config.data)
     context.cases.append(cases)
     data, begin = AssemblyData.of(context), None
+    estimates.data.append(data.data)
     if config.warm_start is not None:
         begin, said = read_whole(context.beside / config.warm_start)
         notes.append(said)

@@ -202,7 +202,10 @@ class DryRun(Run):
 
     def _outlined(self, one: Outlined) -> PlannedStep:
         seconds = self.store.last_time(one.name)
-        found = one.estimate if seconds is None else Estimate(seconds=seconds, basis="as last time")
+        if seconds is not None:
+            found = Estimate(seconds=seconds, basis="as last time")
+        else:
+            found = one.how_long() if one.how_long is not None and not self.loads else one.estimate
         return PlannedStep(name=one.name, step=one.title, stored=False, seconds=found.seconds, basis=found.basis)
 
 

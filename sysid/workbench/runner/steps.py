@@ -168,12 +168,14 @@ class Outlined:
         title: For people.
         estimate: How long it takes where there was no last time.
         called: Name by which people ask for the model that comes of it.
+        how_long: Finds out how long, where there was no last time and no estimate.
     """
 
     name: str
     title: str
     estimate: Estimate = field(default=NOT_KNOWN)
     called: str = ""
+    how_long: Callable[[], Estimate] | None = None
 
 
 def iteration_detail(entry: FitProgress) -> str:

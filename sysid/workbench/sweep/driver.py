@@ -24,7 +24,7 @@ from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.store import Clock, TrialStore
-from sysid.workbench.sweep.trial import FAILED, Bench, Job, run_job
+from sysid.workbench.sweep.trial import FAILED, Bench, Job, forget_checkpoint, run_job
 from sysid.workbench.sweep.workers import AbstractWorkers
 
 FORMAT = 1
@@ -254,6 +254,7 @@ class Driver:
                 busy -= 1
                 # On disk before anybody hears of it.
                 self.store.write(outcome)
+                forget_checkpoint(self.bench, job.key)
                 self.clock.keep()
                 done[job.key] = self._note(job, outcome, fresh=True)
                 for follower in followers.pop(job.key, []):

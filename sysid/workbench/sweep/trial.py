@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -96,7 +95,8 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     began, cpu = time.perf_counter(), time.process_time()
     outcome: dict[str, Any] = {"key": job.key, "number": job.number, "structure": dict(job.structure)}
     try:
-        with threadpool_limits(1), _kept(bench, job) as watch:
+        with threadpool_limits(1):
+            watch = _watch(bench, job)
             fit, checkpoint = train(bench, job, before, watch)
             trained = watch.checkpoints.earlier_s + time.perf_counter() - began
             outcome |= {
@@ -117,22 +117,30 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     return outcome | {"seconds": trained, "cpu_s": time.process_time() - cpu}
 
 
-@contextmanager
-def _kept(bench: Bench, job: Job) -> Iterator[Watch]:
-    """Where a trial's training stands, kept until it has ended."""
+def _watch(bench: Bench, job: Job) -> Watch:
+    """Where a trial's training stands, kept until its result is stored."""
     if bench.folder is None:
-        yield Watch(report=lambda _: None, checkpoints=Checkpoints())
-        return
-    store, name = RunFolder(path=bench.folder), f"trial-{job.key[:16]}"
+        return Watch(report=lambda _: None, checkpoints=Checkpoints())
+    store, name = RunFolder(path=bench.folder), _checkpoint(job.key)
     checkpoints = Checkpoints(
         kept=store.checkpoint(name, job.key), save=lambda values: store.keep_checkpoint(name, job.key, values)
     )
-    try:
-        yield Watch(report=lambda _: None, checkpoints=checkpoints)
-    except (SysidError, ArithmeticError, np.linalg.LinAlgError):
-        store.drop_checkpoint(name)  # that is how it ends
-        raise
-    store.drop_checkpoint(name)
+    return Watch(report=lambda _: None, checkpoints=checkpoints)
+
+
+def forget_checkpoint(bench: Bench, key: str) -> None:
+    """A job's result is stored: where its training stood is of no use any more.
+
+    Args:
+        bench: Traces and conditions.
+        key: The job's key.
+    """
+    if bench.folder is not None:
+        RunFolder(path=bench.folder).drop_checkpoint(_checkpoint(key))
+
+
+def _checkpoint(key: str) -> str:
+    return f"trial-{key[:16]}"
 
 
 def train(

@@ -1,0 +1,115 @@
+"""How long rounds of training end to end will take, before there is a whole: timed with stand-ins for its members."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from sysid.composite.composite import Composite, Member
+from sysid.composite.fixed_members import fixed_model
+from sysid.composite.members import assembled
+from sysid.composite.plan import RoundPlan
+from sysid.composite.round import JointRound
+from sysid.composite.stages import fit_member, model_of, reading_more
+from sysid.estimation import Loop, Training
+from sysid.models import Cascade
+from sysid.traces import Trace
+
+SAMPLED = 2
+"""Traces on which a round is timed; its work is proportional to the samples."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoundTime:
+    """How long a round takes.
+
+    Args:
+        iteration_s: Seconds of one iteration, on all of its samples.
+        choosing_s: Seconds of one run over the traces that choose.
+        iterations: At most so many.
+        checkpoints: How often the traces that choose are run.
+        limit_s: At most so many seconds of training.
+    """
+
+    iteration_s: float
+    choosing_s: float
+    iterations: int
+    checkpoints: int
+    limit_s: float
+
+    @property
+    def seconds(self) -> float:
+        """At most so long: a round that converges ends early."""
+        return min(self.iterations * self.iteration_s + (self.checkpoints + 2) * self.choosing_s, self.limit_s)
+
+
+def stand_in(composite: Composite, estimation: Sequence[Trace], selection: Sequence[Trace]) -> Cascade:
+    """A whole of the right size, of members that were hardly trained.
+
+    Args:
+        composite: What is declared.
+        estimation: Traces of the whole to fit.
+        selection: Traces of the whole that choose.
+
+    Returns:
+        The whole; it is good for nothing but being timed.
+    """
+    models = {
+        one.output: model_of(fit_member(_hardly_trained(one), estimation[:1], selection[:1]))
+        for one in composite.members
+    }
+    fixed = {one.output: fixed_model(one, estimation[0]) for one in composite.fixed}
+    return assembled(composite, {**models, **fixed})
+
+
+def _hardly_trained(member: Member) -> Member:
+    # An ensemble has the neurons of all its members.
+    size = replace(member.structure, neurons=member.structure.neurons * member.training.ensemble)
+    training = Training(loop=Loop.OPEN, max_iterations=1, basis=member.training.basis, workers=1)
+    return replace(member.of_structure(size), training=training, traces=1, stability=None)
+
+
+def time_round(
+    composite: Composite, asked: RoundPlan, whole: Cascade, *, estimation: Sequence[Trace], selection: Sequence[Trace]
+) -> tuple[RoundTime, Cascade]:
+    """Time what a round does again and again.
+
+    Args:
+        composite: What is declared.
+        asked: The round.
+        whole: Where it starts, or a stand-in for it.
+        estimation: Traces of the whole to fit, all that the round has.
+        selection: Traces of the whole that choose.
+
+    Returns:
+        How long it takes, and the whole as the next round gets it.
+    """
+    used, some, few = estimation[: asked.traces], estimation[: asked.traces][:SAMPLED], selection[:SAMPLED]
+    started = reading_more(whole, asked.reads)
+    ready = JointRound.of(composite, asked, started, estimation=some, selection=few)
+    provider = ready.training.provider(ready.part, ready.estimation, ready.targets, ready.trained)
+    theta = provider.theta
+    # A step is tried, and linearised where it is taken.
+    step = _seconds(lambda: (provider.loss(theta), provider.linearise(theta)))
+    choosing = _seconds(lambda: ready.error(ready.part))
+    found = RoundTime(
+        iteration_s=step * _samples(used) / _samples(some),
+        choosing_s=choosing * _samples(selection) / _samples(few),
+        iterations=ready.training.max_iterations,
+        checkpoints=ready.training.checkpoints,
+        limit_s=ready.training.max_time_s,
+    )
+    return found, started
+
+
+def _seconds(run: Callable[[], object]) -> float:
+    """Seconds of a run, the first of which may compile."""
+    run()
+    began = time.perf_counter()
+    run()
+    return time.perf_counter() - began
+
+
+def _samples(traces: Sequence[Trace]) -> int:
+    return sum(len(trace) for trace in traces)

@@ -1,0 +1,108 @@
+"""A sweep that is killed in the middle of a trial goes on with that trial; what it found is exported by name."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sysid.estimation.least_squares.checkpoints import Checkpoints
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, State
+from sysid.export import read_bundle
+from sysid.workbench.cli import run_cli
+from sysid.workbench.runner.store import RunFolder
+from sysid.workbench.sweep import trial
+from sysid.workbench.sweep.config import SweepConfig
+from sysid.workbench.sweep.run import Swept, read_sweep_file, run_sweep
+from sysid.workbench.sweep.store import TrialStore
+from sysid.workbench.sweep.trial import Bench
+from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
+
+SWEEP = """\
+kind: sweep
+name: tries
+data: rig
+mapping: inlet+valve -> outlet
+rest: {outlet: 100}
+structure: {kind: NARX, input_delays: 1, output_delays: 1, neurons: {from: 1, to: 2}}
+training: {loop: closed, max_iterations: 5}
+pruning: [{iterations: 2, keep: 0.5}]
+beside: [{kind: ARX, na: 1, nb: 1, nk: 1}]
+stability: {choose: false}
+export: {formats: [onnx]}
+"""
+
+pytestmark = pytest.mark.usefixtures("quick_report")
+
+
+class KilledError(BaseException):
+    """Stands for ``kill -9``: nothing of the program sees it coming."""
+
+
+def here(bench: Bench, _: SweepConfig) -> AbstractWorkers:
+    return InThisProcess(bench)
+
+
+def run(workspace: Path, folder: str) -> Swept:
+    file = workspace / "pipelines" / "tries.yaml"
+    file.write_text(SWEEP, encoding="utf-8")
+    return run_sweep(read_sweep_file(file), workspace / "runs" / folder, command="sysid sweep tries", find_workers=here)
+
+
+def found(swept: Swept) -> str:
+    """All of the trials but how long they took."""
+    trials = [one.model_dump(exclude={"seconds", "cpu_s"}) for one in swept.record.trials]
+    return re.sub(r"'run_time_s': [^,}]+", "", repr(trials))
+
+
+def test_a_killed_sweep_does_no_iteration_and_no_trial_twice(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept, written, step = RunFolder.keep_checkpoint, TrialStore.write, LevenbergMarquardt._step
+    count = {"iterations": 0, "trials": 0, "left": 10**6}
+
+    def fall() -> None:
+        count["left"] -= 1
+        if count["left"] == 0:
+            raise KilledError
+
+    def keep(self: RunFolder, *values: Any) -> None:
+        kept(self, *values)
+        fall()
+
+    def iterate(self: LevenbergMarquardt, *given: Any) -> State:
+        count["iterations"] += 1
+        return step(self, *given)
+
+    def write(self: TrialStore, outcome: dict[str, Any]) -> None:
+        fall()  # a trial has ended, and its result is not yet on the disk
+        written(self, outcome)
+        count["trials"] += 1
+
+    monkeypatch.setattr(RunFolder, "keep_checkpoint", keep)
+    monkeypatch.setattr(LevenbergMarquardt, "_step", iterate)
+    monkeypatch.setattr(TrialStore, "write", write)
+    monkeypatch.setattr(trial, "Checkpoints", partial(Checkpoints, every_s=0.0))
+    whole = run(workspace, "whole")
+    undisturbed = {**count, "left": 0}
+    count |= {"iterations": 0, "trials": 0}
+    for kill in range(100):
+        count["left"] = 4 + kill
+        try:
+            swept = run(workspace, "tries")
+        except KilledError:
+            continue
+        break
+    assert found(swept) == found(whole)
+    assert kill > 1
+    assert {**count, "left": 0} == undisturbed
+    assert not list((workspace / "runs" / "tries").glob(".steps/checkpoints/trial-*")), "nothing is left over"
+
+    for name, label in (("sweep winner", swept.results.fits[0].label), ("ARX [1; 1 1; 1 1]", "ARX [1; 1 1; 1 1]")):
+        assert run_cli(["export", "tries", "--fit", name, "--out", f"out {label}"]) == 0
+        assert read_bundle(workspace / f"out {label}").model.structure.label == label
+    assert run_cli(["export", "tries", "--fit", "winner"]) == 2
+    assert "did you mean sweep winner?" in capsys.readouterr().err
