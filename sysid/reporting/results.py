@@ -149,6 +149,9 @@ class StabilityRecord(Record):
     seed: int = Field(description="Of the sequences.")
     sequences: int = Field(description="How many were run.")
     unbounded: int = Field(description="How many left the bounds.")
+    beyond: int = Field(
+        default=0, description="How many took a linear model of the records out of the bounds too; not judged."
+    )
     judged: int = Field(description="How many had a plateau to settle on.")
     unsettled: int = Field(description="How many of those settled elsewhere.")
     tolerance: Number = Field(

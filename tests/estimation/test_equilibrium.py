@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sysid.estimation import Training
+from sysid.estimation import StabilityOptions, Status, Training
 from sysid.estimation.equilibrium import equilibrium_notes
 from sysid.estimation.estimators import fit
 from sysid.models import (
@@ -93,3 +93,30 @@ def test_which_model_is_better_does_not_depend_on_the_start() -> None:
         small = errors.pop("too small")
         assert max(errors.values()) < 1.5 * 0.003**2  # noise, whatever the kind
         assert small > 10.0 * max(errors.values())
+
+
+def slow(lengths: tuple[int, ...], a: float) -> list[Trace]:
+    """Bursts of a plant that is slower than they are long, each beginning anywhere."""
+    rng = np.random.default_rng(202)
+    found = []
+    for i, n in enumerate(lengths):
+        u = np.repeat(rng.uniform(-1.0, 1.0, n // 5 + 1), 5)[:n]
+        y = np.full(n, rng.uniform(-3.0, 3.0))
+        for k in range(1, n):
+            y[k] = a * y[k - 1] + 0.1 * u[k - 1]
+        found.append(trace_of(u[:, None], y, name=f"burst{i}"))
+    return found
+
+
+@pytest.mark.parametrize("lengths", [(12, 15, 20), (25, 30, 45), (60, 60, 60)], ids=str)
+@pytest.mark.parametrize("structure", NETWORKS, ids=["NARX", "NSS"])
+def test_a_right_model_of_a_slow_plant_is_not_called_unstable(
+    structure: AbstractStructure, lengths: tuple[int, ...]
+) -> None:
+    """Excursions of such records go where the plant itself would leave what was recorded; that is no fault of a model."""
+    traces = slow(lengths, 0.999)
+    found = fit(traces, MAPPING, structure, QUICK, start=ESTIMATED, stability=StabilityOptions(count=40))
+    assert found.status is not Status.UNSTABLE
+    for trace in traces:
+        error = evaluate_case(found.model, trace, Role.ESTIMATION, ESTIMATED, 1).free_run.max_abs_error
+        assert error < 1e-4 * float(np.ptp(np.concatenate([t["y"] for t in traces])))

@@ -93,6 +93,11 @@ class NeuralProvider(AbstractProvider):
         )
 
     @property
+    def all_free(self) -> bool:
+        """Whether every record has an initial state of its own, so that nothing is known of the map to it."""
+        return all(record.free is not None for record in self._records)
+
+    @property
     def signals(self) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...]:
         """Scaled inputs and scaled output of each record, the history's samples included."""
         return tuple((record.u, record.target) for record in self._records)

@@ -124,19 +124,44 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
     """
     whole = provider.template
     s = Sizes(states=whole.sizes.states, inputs=whole.sizes.inputs, neurons=0, output_neurons=0)
+    # Without bounds of the output: a start that lies beyond them throughout would have no gradient to come back by.
     template = NeuralForm(
-        sizes=s, theta=np.zeros(s.count), scaling=whole.scaling, rectified=whole.rectified, bound=np.inf,
-        low=whole.low, high=whole.high,
-    )  # fmt: skip
+        sizes=s, theta=np.zeros(s.count), scaling=whole.scaling, rectified=whole.rectified, bound=np.inf
+    )
     linear = NeuralProvider(template=template, experiments=provider.experiments)
     with threadpool_limits(1, "blas"):  # more threads than one cost more than they give at these sizes
         fits = [_fitted(linear, _realised(linear, order)) for order in ARX_ORDERS]
-    theta = _unit_states(linear, min(fits, key=linear.loss))
+    theta = _levelled(linear, _unit_states(linear, min(fits, key=linear.loss)))
     base = np.zeros(provider.n_parameters)
     for to, of in ((whole.sizes.linear, s.linear), (whole.sizes.output_linear, s.output), (whole.sizes.start, s.start)):
         base[to] = theta[of]
     base[whole.sizes.count :] = theta[s.count :]
     return base
+
+
+def _levelled(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same model, whose map from one sample heeds the output where the records' own states leave the map free.
+
+    The map gives the equilibrium at some inputs. What is measured away from the output there moves the state as it does
+    over the records: by the regression of the states' distance from equilibrium on the output's.
+    """
+    s = provider.template.sizes
+    if not provider.all_free or provider.template.rectified:
+        return theta
+    E, L = theta[s.start].reshape(s.states, -1).copy(), theta[s.output]
+    paths, inputs = np.concatenate(provider.states(theta)), np.concatenate([u for u, _ in provider.signals])
+    apart = paths - np.column_stack([inputs, np.ones(len(inputs))]) @ E[:, [*range(s.inputs), -1]].T
+    level = apart @ L[: s.states]
+    slope = apart.T @ level / max(float(level @ level), np.finfo(np.float64).tiny)
+    if not np.isfinite(slope).all():
+        return theta
+    # The output in equilibrium, as a function of inputs and 1.
+    steady = np.concatenate([L[s.states : -1], [0.0, L[-1]]]) + L[: s.states] @ E
+    E += np.outer(slope, -steady)
+    E[:, s.inputs] += slope
+    changed = theta.copy()
+    changed[s.start] = E.ravel()
+    return changed
 
 
 def _realised(provider: NeuralProvider, order: int) -> NDArray[np.float64]:

@@ -5,13 +5,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from sysid.errors import ConfigError, TraceError
+from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Stability, check_stability
 from sysid.estimation.stability.sequences import AbstractSequences, Excursions, TraceSequences
-from sysid.models import AbstractModel, Mapping
+from sysid.models import ARX, AbstractModel, Mapping, Start, StartKind, beginning
 from sysid.traces import Trace
 
 STILL_S = 20.0
@@ -20,6 +24,9 @@ STILL_S = 20.0
 GROWTH = 1e-6
 """By how much a pole's magnitude may exceed 1: an integrator that is estimated has a pole at 1 but for rounding and
 noise, and a free run of 100,000 samples is then off by a tenth at most."""
+
+FOLLOWS = 0.1
+"""Share of an output that a linear model may leave and still say where the recorded system would go."""
 
 Vet = Callable[[AbstractModel], bool]
 """Whether a model's free run is stable."""
@@ -160,10 +167,14 @@ class FreeRunCheck(AbstractStabilityCheck):
     Args:
         options: What is asked.
         source: Where the sequences come from; ``None`` checks nothing.
+        mapping: Inputs and output of the fit.
+        estimation: The traces that excursions are made of; none for sequences that are given.
     """
 
     options: StabilityOptions
     source: AbstractSequences | None
+    mapping: Mapping | None = None
+    estimation: tuple[Trace, ...] = ()
     found: dict[int, tuple[AbstractModel, Stability]] = field(default_factory=dict)
     """What was found, by the model's identity; the model is kept so that no other takes its place."""
 
@@ -175,7 +186,8 @@ class FreeRunCheck(AbstractStabilityCheck):
             return cls(options=options, source=None)
         if not given:
             try:
-                return cls(options=options, source=Excursions.of(estimation, inputs, outputs))
+                source = Excursions.of(estimation, inputs, outputs)
+                return cls(options=options, source=source, mapping=mapping, estimation=tuple(estimation))
             except TraceError:  # too short to make sequences from, which is no reason not to fit
                 return cls(options=options, source=None)
         sequences = TraceSequences(
@@ -218,16 +230,44 @@ class FreeRunCheck(AbstractStabilityCheck):
         notes = (*fit.notes, found.sentence)
         return replace(fit, status=status, stability=found.to_dict(), attempts=attempts, notes=notes)
 
+    @cached_property
+    def reference(self) -> AbstractModel | None:
+        """A stable linear model that follows the estimation traces; ``None`` where there is none, or none is asked."""
+        if self.mapping is None:
+            return None
+        m = len(self.mapping.inputs)
+        start = Start(kind=StartKind.ESTIMATED)
+        try:
+            found = fit_arx(self.estimation, self.mapping, ARX(na=2, nb=(2,) * m, nk=(0,) * m), start=start).model
+        except TraceError:
+            return None
+        if found.pole_radius is None or found.pole_radius > 1.0 + GROWTH:
+            return None
+        return found if all(_follows(found, trace, start) for trace in self.estimation) else None
+
     def _of(self, model: AbstractModel) -> Stability | None:
         if self.source is None:
             return None
         if id(model) not in self.found:
             asked = self.options
             found = check_stability(
-                model, self.source, tolerance=asked.tolerance, count=asked.count, seed=asked.seed
+                model, self.source, tolerance=asked.tolerance, count=asked.count, seed=asked.seed,
+                reference=lambda: self.reference,
             )  # fmt: skip
             self.found[id(model)] = (model, found)
         return self.found[id(model)][1]
+
+
+def _follows(model: AbstractModel, trace: Trace, start: Start) -> bool:
+    """Whether the free run of a model leaves no more than :data:`FOLLOWS` of a record's output."""
+    inputs, output, usable = trace.columns(model.mapping.inputs), trace[model.mapping.output], trace.usable_samples
+    begun = beginning(model, inputs, output, start, usable)
+    run, counted = model.simulate(inputs[begun.first :], begun.history), usable[begun.first :]
+    if not counted.any():
+        return False
+    target = output[begun.first :][counted]
+    error = float(np.linalg.norm(run[counted] - target))
+    return error <= FOLLOWS * float(np.linalg.norm(target - target.mean()))
 
 
 def _unstable(status: Status) -> Status:
