@@ -113,7 +113,7 @@ def slow(lengths: tuple[int, ...], a: float) -> list[Trace]:
 def test_a_right_model_of_a_slow_plant_is_not_called_unstable(
     structure: AbstractStructure, lengths: tuple[int, ...]
 ) -> None:
-    """Excursions of such records go where the plant itself would leave what was recorded; that is no fault of a model."""
+    """Excursions of such records go where the plant itself would leave what was recorded."""
     traces = slow(lengths, 0.999)
     found = fit(traces, MAPPING, structure, QUICK, start=ESTIMATED, stability=StabilityOptions(count=40))
     assert found.status is not Status.UNSTABLE
