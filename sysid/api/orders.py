@@ -93,8 +93,8 @@ class OrderSearch:
             f"{name} = {found}"
             for name, found, largest in (
                 ("na", best.na, grid.max_na),
-                ("nb", max(best.nb), grid.max_nb),
-                ("nk", max(best.nk), grid.max_nk),
+                ("nb", max(best.nb, default=0), grid.max_nb),
+                ("nk", max(best.nk, default=0), grid.max_nk),
             )
             if found == largest > 0
         ]

@@ -279,11 +279,12 @@ def search_orders(
     dead_times = grid.dead_times(m)
     per_block = grid.size(m) // len(dead_times)
     n_leaves = (grid.max_nb - grid.min_nb + 1) ** m
-    least = np.full(m, grid.min_nb)
+    # A time series is to the kernel a system of one input that has no columns.
+    inputs, least = ((m, grid.max_nb), np.full(m, grid.min_nb)) if m else ((1, 0), np.zeros(1, dtype=np.int64))
 
     def block(dead: tuple[int, ...]) -> NDArray[np.float64]:
         first = [1 + i * reach + nk - grid.min_nk for i, nk in enumerate(dead)]
-        columns = np.array([np.arange(at, at + grid.max_nb) for at in first])
+        columns = np.array([np.arange(at, at + grid.max_nb) for at in first], dtype=np.int64).reshape(inputs)
         losses = np.empty((n_leaves, grid.max_na + 1))
         kernel.nested_losses(triangle, rank, columns, least, outputs, target, tolerance, losses)
         return losses[:, grid.min_na :]

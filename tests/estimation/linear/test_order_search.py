@@ -115,3 +115,13 @@ def test_a_record_too_short_is_refused() -> None:
 def test_an_empty_range_is_refused() -> None:
     with pytest.raises(ConfigError, match="range of nb"):
         OrderGrid(max_na=1, min_nb=3, max_nb=2, max_nk=0)
+
+
+def test_a_time_series_has_orders_too() -> None:
+    rng = np.random.default_rng(0)
+    y = arx_response(A, [], np.empty((600, 0)), rng.normal(size=600))
+    losses = search_orders(
+        [trace_of(np.empty((600, 0)), y)], Mapping.parse("-> y"), OrderGrid(max_na=5, max_nb=3, max_nk=2)
+    )
+    assert len(losses) == 5
+    assert losses.best().na == 2

@@ -1,0 +1,6 @@
+"""The look at data first: what is in a record, before anything is fitted to it."""
+
+from sysid.advice.advise import advise
+from sysid.advice.finding import Advice, Finding, Suggestion, Topic, Verdict
+
+__all__ = ["Advice", "Finding", "Suggestion", "Topic", "Verdict", "advise"]

@@ -1,0 +1,56 @@
+"""The look at data first: every check in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from sysid.advice.amount import check_amount
+from sysid.advice.channels import check_channels
+from sysid.advice.dynamics import check_dynamics, check_noise, check_sampling
+from sysid.advice.excitation import check_excitation
+from sysid.advice.feedback import check_feedback
+from sysid.advice.finding import Advice, Finding
+from sysid.advice.linearity import check_linearity
+from sysid.advice.record import Record
+from sysid.advice.structures import suggestions
+from sysid.models import Mapping
+from sysid.traces import Role, TraceSet
+
+CHECKS: Final[tuple[Callable[[Record], Iterator[Finding]], ...]] = (
+    check_amount,
+    check_channels,
+    check_excitation,
+    check_feedback,
+    check_dynamics,
+    check_sampling,
+    check_noise,
+    check_linearity,
+)
+"""In the order in which they are read."""
+
+
+def advise(traces: TraceSet, mapping: Mapping) -> Advice:
+    """Look at a data set: what is in it, what is wrong with it, what to try.
+
+    Args:
+        traces: The data set; its estimation and selection traces are looked at, all where there are none.
+        mapping: Inputs and output.
+
+    Returns:
+        What was found; nothing in it is random.
+
+    Raises:
+        ChannelError: If a channel of the mapping is missing.
+    """
+    chosen = traces.with_role(Role.ESTIMATION, Role.SELECTION) or traces.traces
+    record = Record(traces=chosen, mapping=mapping)
+    findings = tuple(finding for check in CHECKS for finding in check(record))
+    return Advice(
+        data=traces.name,
+        mapping=mapping,
+        sample_time=traces.sample_time,
+        units={name: traces.traces[0].channel(name).unit for name in (*mapping.inputs, mapping.output)},
+        findings=findings,
+        suggestions=suggestions(record, findings),
+    )

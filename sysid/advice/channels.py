@@ -1,0 +1,192 @@
+"""Are the channels sound: constants, coarse resolution, clipping, spikes, drift and jumps of level."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.advice.finding import Finding, Topic, Verdict
+from sysid.advice.record import Record, stacked
+
+COARSE = 0.1
+"""Of a channel's standard deviation: a step of its converter that is larger is coarse."""
+FEW_LEVELS = 20
+"""A channel with fewer different values is a command and has no resolution of its own."""
+SPIKE_FACTOR, MOST_SPIKES = 4.0, 0.005
+AT_END, LONG_STAY = 0.002, 3
+"""Part of a channel's span that counts as its end, and samples in a row there that are a stay."""
+TRENDS_FROM, TREND_SHARE = 60, 0.25
+"""Samples from which a trend is looked for, and part of the output's standard deviation from which it is told."""
+
+
+def check_channels(record: Record) -> Iterator[Finding]:
+    """Look at each channel by itself.
+
+    Args:
+        record: The record.
+
+    Yields:
+        What is wrong with them, or that nothing is.
+    """
+    found = []
+    for name in (*record.mapping.inputs, record.mapping.output):
+        found += list(_channel(record, name))
+    found += list(_trends(record))
+    if not any(one.verdict is Verdict.LOOK for one in found):
+        yield Finding(topic=Topic.CHANNELS, code="channels.sound", verdict=Verdict.FINE)
+    yield from found
+
+
+def _channel(record: Record, name: str) -> Iterator[Finding]:
+    parts = record.values(name)
+    x = stacked(parts)
+    if not len(x) or np.ptp(x) <= 1e-12 * np.abs(x).max(initial=0.0):
+        output = name == record.mapping.output
+        code = "channel.constant_output" if output else "channel.constant_input"
+        yield Finding(
+            topic=Topic.CHANNELS, code=code, verdict=Verdict.LOOK, subject=(name,),
+            figures={"value": float(x[0]) if len(x) else float("nan")},
+        )  # fmt: skip
+        return
+    levels = np.unique(x)
+    if len(levels) <= FEW_LEVELS and name != record.mapping.output:
+        return
+    yield from _resolution(name, x, levels)
+    yield from _ends(name, parts, x)
+    yield from _spikes(name, parts, x, levels)
+
+
+def _resolution(name: str, x: NDArray[np.float64], levels: NDArray[np.float64]) -> Iterator[Finding]:
+    """The step of a converter, where all values are multiples of one."""
+    if len(x) < 20 or len(levels) < 2 or len(levels) > 0.7 * len(x):
+        return
+    step = float(np.diff(levels).min())
+    count = np.diff(levels) / step
+    even = float(np.mean(np.abs(count - np.round(count)) < 0.05))
+    size = float(x.std())
+    if even > 0.95 and size > 0.0 and step > 0.002 * size:
+        yield Finding(
+            topic=Topic.CHANNELS,
+            code="channel.resolution",
+            verdict=Verdict.LOOK if step > COARSE * size else Verdict.NOTE,
+            subject=(name,),
+            figures={"step": step, "share": step / size, "levels": len(levels)},
+        )
+
+
+def _ends(name: str, parts: list[NDArray[np.float64]], x: NDArray[np.float64]) -> Iterator[Finding]:
+    """Stays at an end of the range that begin abruptly: a limit, and not a level that was settled at."""
+    span = float(np.ptp(x))
+    for end, sign, code in (
+        (float(x.max()), 1.0, "channel.clipped_above"),
+        (float(x.min()), -1.0, "channel.clipped_below"),
+    ):
+        stays, samples, abrupt = 0, 0, []
+        moves = [np.abs(np.diff(part)) for part in parts if len(part) > 1]
+        usual = float(np.sqrt(np.mean(np.concatenate(moves) ** 2))) if moves else 0.0
+        for part in parts:
+            near = sign * (end - part) <= AT_END * span
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(np.int8), [0]])))
+            for a, b in zip(edges[::2], edges[1::2], strict=True):
+                if b - a >= LONG_STAY:
+                    stays, samples = stays + 1, samples + int(b - a)
+                    # How fast it still was when it arrived: where it had settled, hardly at all.
+                    abrupt += [abs(float(part[a] - part[a - 2])) / 2.0] if a >= 2 else []
+        share = samples / len(x)
+        if stays >= 1 and abrupt and share > 0.005 and usual > 0.0 and float(np.median(abrupt)) > 0.5 * usual:
+            yield Finding(
+                topic=Topic.CHANNELS,
+                code=code,
+                verdict=Verdict.LOOK,
+                subject=(name,),
+                figures={"share": share, "stays": stays, "value": end},
+            )
+
+
+def _spikes(
+    name: str, parts: list[NDArray[np.float64]], x: NDArray[np.float64], levels: NDArray[np.float64]
+) -> Iterator[Finding]:
+    """Single samples that jump away and back, further than any other does."""
+    heights = []
+    for part in parts:
+        if len(part) >= 3:
+            before, after = part[1:-1] - part[:-2], part[1:-1] - part[2:]
+            heights.append(np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0))
+    height = stacked(heights)
+    if len(height) < 20:
+        return
+    # Spikes must not set the scale that they are measured by.
+    core = np.quantile(x, [0.01, 0.99])
+    floor = max(0.1 * float(core[1] - core[0]), 2.0 * float(np.diff(levels).min()))
+    bound = max(SPIKE_FACTOR * float(np.quantile(height, 1.0 - MOST_SPIKES)), floor)
+    count = int(np.count_nonzero(height > bound))
+    if 0 < count <= max(1, MOST_SPIKES * len(height)):
+        yield Finding(
+            topic=Topic.CHANNELS,
+            code="channel.spikes",
+            verdict=Verdict.LOOK,
+            subject=(name,),
+            figures={"count": count, "largest": float(height.max()), "usual": float(np.quantile(height, 0.995))},
+        )
+
+
+def _trends(record: Record) -> Iterator[Finding]:
+    """What moves the output slowly or at once and is no input."""
+    size = float(stacked(record.values(record.mapping.output)).std()) if record.segments else 0.0
+    if size == 0.0:
+        return
+    if record.moving:
+        known = record.slowed[0].impulse
+        parts = [(one.left, one) for one in record.residuals] if not isinstance(known, str) and known.settled else []
+        factor = record.slowed[1]
+        for left, one in parts:
+            yield from _trend(record, left, (one.segment.trace, one.first, factor), size)
+    else:
+        for segment in record.segments:
+            yield from _trend(record, segment.output, (segment.trace, segment.first, 1), size)
+
+
+def _trend(record: Record, part: NDArray[np.float64], place: tuple[str, int, int], size: float) -> Iterator[Finding]:
+    trace, first, factor = place
+    n = len(part)
+    if n < TRENDS_FROM:
+        return
+    t = np.linspace(-0.5, 0.5, n)
+    centred = part - part.mean()
+    slope = float(t @ centred / (t @ t))
+    line = float(np.sum((centred - slope * t) ** 2))
+    at, jump, rest = _jump(centred)
+    step = np.where(np.arange(n) < at, 0.0, jump)
+    spread = np.sqrt(line / n / _effective(centred - slope * t))
+    jump_spread = np.sqrt(rest / n / _effective(centred - step + step.mean()))
+    if abs(jump) > max(TREND_SHARE * size, 8.0 * jump_spread) and rest < 0.7 * line:
+        seconds = (first + at * factor) * record.sample_time
+        figures = {"size": jump, "share": abs(jump) / size, "seconds": seconds}
+        code = "output.jump"
+    elif abs(slope) > max(TREND_SHARE * size, 8.0 * spread * np.sqrt(12.0)):
+        figures, code = {"size": slope, "share": abs(slope) / size}, "output.drift"
+    else:
+        return
+    yield Finding(
+        topic=Topic.CHANNELS, code=code, verdict=Verdict.LOOK, subject=(record.mapping.output, trace), figures=figures
+    )
+
+
+def _effective(x: NDArray[np.float64]) -> float:
+    """How many independent samples a coloured one is worth, by its first correlation."""
+    r = float(x[1:] @ x[:-1] / max(float(x @ x), 1e-300))
+    r = min(max(r, 0.0), 0.999)
+    return max(len(x) * (1.0 - r) / (1.0 + r), 2.0)
+
+
+def _jump(x: NDArray[np.float64]) -> tuple[int, float, float]:
+    """Where a change of level explains most, how large it is, and what it leaves."""
+    n, margin = len(x), max(len(x) // 20, 5)
+    k = np.arange(margin, n - margin)
+    before = np.cumsum(x)[k - 1]
+    gain = before**2 * n / (k * (n - k))
+    best = int(k[np.argmax(gain)])
+    low, high = float(x[:best].mean()), float(x[best:].mean())
+    return best, high - low, float(x @ x - gain.max())

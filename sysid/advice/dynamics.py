@@ -1,0 +1,178 @@
+"""How fast, how late, how strong, how noisy: what the regularised impulse response says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.advice.finding import Finding, Topic, Verdict
+from sysid.advice.record import Record
+from sysid.estimation.nonparametric.impulse import ImpulseResponse
+
+TOO_FAST, FAR_TOO_FAST, TOO_SLOW, GOOD = 30.0, 100.0, 1.5, 8.0
+"""Samples from 10 to 90 % of a step response: above and below which the rate is not good, and what it should be."""
+VISIBLE = 0.05
+"""Part of its peak from which a response is seen with the naked eye."""
+BARELY = 0.3
+"""Share of the output that a linear response explains, below which nothing is built on it."""
+QUIET, LOUD = 20.0, 5.0
+"""Signal-to-noise ratios in decibel from which a record is quiet, and below which it is loud."""
+
+
+def check_dynamics(record: Record) -> Iterator[Finding]:
+    """Dead times, settling and gains.
+
+    Args:
+        record: The record.
+
+    Yields:
+        What each input does.
+    """
+    found = record.impulse
+    if isinstance(found, str):
+        if record.mapping.inputs:
+            yield Finding(topic=Topic.DYNAMICS, code="dynamics.unknown", verdict=Verdict.UNKNOWN, reason=found)
+        return
+    whole = record.slowed[0].impulse
+    assert isinstance(whole, ImpulseResponse)  # noqa: S101 - it is slowed only where there is one
+    for j, name in enumerate(found.mapping.inputs):
+        dead = found.dead_times[j]
+        if not dead.acts and not whole.dead_times[j].acts:
+            figures = {"odds": dead.odds}
+            yield Finding(
+                topic=Topic.DYNAMICS, code="effect.none", verdict=Verdict.LOOK, subject=(name,), figures=figures
+            )
+            continue
+        yield _dead_time(found, j, name)
+        yield _settling(record, whole, j, name)
+
+
+def _dead_time(found: ImpulseResponse, j: int, name: str) -> Finding:
+    dead, T = found.dead_times[j], found.sample_time
+    peak = np.abs(found.values[j])
+    visible = int(np.argmax(peak >= VISIBLE * peak.max()))
+    figures = {"best": dead.best, "low": dead.low, "high": dead.high, "seconds": dead.best * T, "visible": visible}
+    if not dead.acts or found.explained < BARELY:
+        code, verdict = "dead_time.unknown", Verdict.UNKNOWN
+    elif figures["high"] - dead.low > 2:
+        code, verdict = "dead_time.vague", Verdict.NOTE
+    else:
+        code, verdict = "dead_time", Verdict.FINE
+    return Finding(topic=Topic.DYNAMICS, code=code, verdict=verdict, subject=(name,), figures=figures)
+
+
+def _settling(record: Record, whole: ImpulseResponse, j: int, name: str) -> Finding:
+    step, deviation = whole.step()
+    settled = whole.settling()[j]
+    seconds = settled * whole.sample_time
+    total = sum(map(len, record.segments)) * record.sample_time
+    figures = {
+        "samples": seconds / record.sample_time,
+        "seconds": seconds,
+        "gain": float(step[j, -1]),
+        "gain_deviation": float(deviation[j, -1]),
+        "length": total / seconds if seconds > 0.0 else np.inf,
+        "lags_seconds": float(whole.time[-1]),
+    }
+    if whole.explained < BARELY:
+        code, verdict = "settling.unknown", Verdict.UNKNOWN
+    elif not whole.settled:
+        code, verdict = "settling.never", Verdict.LOOK
+    elif figures["length"] < 10.0:
+        code, verdict = "settling.short_record", Verdict.LOOK
+    else:
+        code, verdict = "settling", Verdict.FINE
+    return Finding(topic=Topic.DYNAMICS, code=code, verdict=verdict, subject=(name,), figures=figures)
+
+
+def rise(response: NDArray[np.float64]) -> float:
+    """Samples from 10 to 90 % of the way of a step response, between samples by a line.
+
+    Args:
+        response: Shape ``(n,)``.
+
+    Returns:
+        The number; 0 where it jumps.
+    """
+    x = np.concatenate([[0.0], response]) / (response[np.argmax(np.abs(response))] or 1.0)
+    places = []
+    for level in (0.1, 0.9):
+        k = int(np.argmax(x >= level))
+        step = x[k] - x[k - 1] if k else 0.0
+        places.append(k - (x[k] - level) / step if step > 0.0 else float(k))
+    return float(places[1] - places[0])
+
+
+def check_sampling(record: Record) -> Iterator[Finding]:
+    """Samples within the rise of the step response, of the input that moves the output most.
+
+    Args:
+        record: The record.
+
+    Yields:
+        Whether the rate is good.
+    """
+    slow, factor = record.slowed
+    found = slow.impulse
+    if isinstance(found, str) or found.explained < BARELY:
+        if record.moving:
+            reason = found if isinstance(found, str) else "a linear response explains too little of the output"
+            yield Finding(topic=Topic.SAMPLING, code="sampling.unknown", verdict=Verdict.UNKNOWN, reason=reason)
+        return
+    spread = [np.sqrt(np.mean([np.var(s.inputs[:, j]) for s in slow.some.segments])) for j in range(len(found.values))]
+    acting = [s * float(np.abs(g).max()) * one.acts for s, g, one in
+              zip(spread, found.values, found.dead_times, strict=True)]  # fmt: skip
+    j = int(np.argmax(acting))
+    samples = rise(found.step()[0][j]) * factor
+    subject = (found.mapping.inputs[j],)
+    figures = {"rise": samples, "sample_time": record.sample_time, "factor": factor}
+    if samples > TOO_FAST:
+        code, verdict = "sampling.fast", Verdict.LOOK if samples > FAR_TOO_FAST else Verdict.NOTE
+        figures["proposed"] = record.sample_time * max(int(samples / GOOD), 2)
+    elif samples < TOO_SLOW and found.settling()[j] - found.dead_times[j].best <= 3:
+        code, verdict = "sampling.slow", Verdict.LOOK
+        figures["proposed"] = record.sample_time / 5.0
+    else:
+        code, verdict = "sampling.good", Verdict.FINE
+    yield Finding(topic=Topic.SAMPLING, code=code, verdict=verdict, subject=subject, figures=figures)
+
+
+def check_noise(record: Record) -> Iterator[Finding]:
+    """What a linear response leaves of the output.
+
+    Args:
+        record: The record.
+
+    Yields:
+        How much, and of what colour.
+    """
+    slow, factor = record.slowed
+    found = slow.impulse
+    if isinstance(found, str) or not record.residuals:
+        reason = found if isinstance(found, str) else "the stretches are shorter than the response"
+        if record.moving:
+            yield Finding(topic=Topic.NOISE, code="noise.unknown", verdict=Verdict.UNKNOWN, reason=reason)
+        return
+    rest = max(1.0 - found.explained, 1e-16)
+    ratio = 10.0 * np.log10(max(found.explained, 1e-16) / rest)
+    figures = {
+        "explained": found.explained,
+        "decibel": float(ratio),
+        "deviation": float(np.sqrt(np.mean([np.var(one.left) for one in record.residuals]))),
+        "order": len(found.noise_ar),
+        "factor": factor,
+    }
+    if ratio < LOUD:
+        code, verdict = "noise.loud", Verdict.LOOK
+    elif ratio < QUIET:
+        code, verdict = "noise.some", Verdict.NOTE
+    else:
+        code, verdict = "noise.quiet", Verdict.FINE
+    yield Finding(topic=Topic.NOISE, code=code, verdict=verdict, subject=(record.mapping.output,), figures=figures)
+    if found.noise_ar and ratio < 30.0:
+        yield Finding(
+            topic=Topic.NOISE, code="noise.coloured", verdict=Verdict.NOTE, subject=(record.mapping.output,),
+            figures={"order": len(found.noise_ar)},
+        )  # fmt: skip

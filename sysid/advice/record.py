@@ -1,0 +1,180 @@
+"""A data set as the checks see it: its stretches, and the models of it that several of them share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import UserError
+from sysid.estimation.nonparametric.impulse import ImpulseResponse, estimate_impulse_response
+from sysid.estimation.nonparametric.segments import Segment, segments_of
+from sysid.models import Mapping
+from sysid.traces import Trace
+
+SEEN = 20_000
+"""Samples that dynamics are judged by; of longer records the first ones."""
+LONGEST_RESPONSE = 128
+SLOWER, FEWEST_BLOCKS = (4, 16, 64, 256), 200
+"""How many times slower a record with a longer response is looked at, and how many samples that must leave."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """Experiments for one mapping.
+
+    Args:
+        traces: The experiments.
+        mapping: Inputs and output.
+    """
+
+    traces: tuple[Trace, ...]
+    mapping: Mapping
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds."""
+        return self.traces[0].sample_time
+
+    @cached_property
+    def moving(self) -> tuple[str, ...]:
+        """Inputs that change within a stretch."""
+        found = []
+        for j, name in enumerate(self.mapping.inputs):
+            if any(np.ptp(segment.inputs[:, j]) > 0.0 for segment in self.segments):
+                found.append(name)
+        return tuple(found)
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """All stretches of samples that count."""
+        return segments_of(self.traces, self.mapping)
+
+    @cached_property
+    def some(self) -> Record:
+        """As much of it as dynamics are judged by, with the inputs that move."""
+        left, kept = SEEN, []
+        for trace in self.traces:
+            if left > 0:
+                kept.append(_head(trace, left))
+                left -= len(kept[-1])
+        return Record(traces=tuple(kept), mapping=Mapping(inputs=self.moving, output=self.mapping.output))
+
+    def values(self, channel: str) -> list[NDArray[np.float64]]:
+        """A channel, stretch by stretch."""
+        if channel == self.mapping.output:
+            return [segment.output for segment in self.segments]
+        j = self.mapping.inputs.index(channel)
+        return [segment.inputs[:, j] for segment in self.segments]
+
+    @cached_property
+    def impulse(self) -> ImpulseResponse | str:
+        """Its impulse response, or why there is none."""
+        if not self.moving:
+            return "no input moves"
+        if all(np.ptp(y) == 0.0 for y in self.values(self.mapping.output)):
+            return "the output never changes"
+        try:
+            return estimate_impulse_response(self.some.traces, self.some.mapping, longest=LONGEST_RESPONSE)
+        except UserError as error:
+            return error.what
+
+    @cached_property
+    def slowed(self) -> tuple[Record, int]:
+        """The record at a rate at which its response settles within the lags that are looked at, and how much slower.
+
+        Means over blocks of samples; as it is where it settles, or where no rate helps.
+        """
+        found = self.impulse
+        if isinstance(found, str) or found.settled:
+            return self.some, 1
+        for factor in SLOWER:
+            slow = _blocks(self.traces, factor)
+            if sum(map(len, slow)) < FEWEST_BLOCKS:
+                break
+            other = Record(traces=slow, mapping=self.some.mapping)
+            slowly = other.impulse
+            if not isinstance(slowly, str) and slowly.settled:
+                # What is fast is gone from means over blocks: they are no view of a record that lives of it.
+                return (other, factor) if slowly.explained > found.explained - 0.02 else (self.some, 1)
+        return self.some, 1
+
+    @cached_property
+    def residuals(self) -> list[Residual]:
+        """What the impulse response leaves at the rate at which it settles, where it has a past to know it by."""
+        record, factor = self.slowed
+        found = record.impulse
+        if isinstance(found, str):
+            return []
+        deepest = int(found.lags[-1])
+        made = []
+        for segment in record.some.segments:
+            if len(segment) > deepest + 8:
+                simulated = found.simulate(segment.inputs)
+                made.append(
+                    Residual(
+                        segment=segment,
+                        simulated=simulated[deepest:],
+                        left=(segment.output - simulated)[deepest:],
+                        first=(segment.first + deepest) * factor,
+                    )
+                )
+        return made
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Residual:
+    """What a response leaves of a stretch.
+
+    Args:
+        segment: The stretch.
+        simulated: Response to the inputs, without the samples whose past is not known, shape ``(n,)``.
+        left: What it leaves of the output, its level among it, shape ``(n,)``.
+        first: The first of them in its trace, in samples of the trace.
+    """
+
+    segment: Segment
+    simulated: NDArray[np.float64]
+    left: NDArray[np.float64]
+    first: int
+
+
+def _blocks(traces: Sequence[Trace], factor: int) -> tuple[Trace, ...]:
+    """Means over blocks; a block with a sample that does not count does not count."""
+    slow = []
+    for trace in traces:
+        n = len(trace) // factor
+        if n < 2:
+            continue
+        whole = slice(0, n * factor)
+        usable = trace.usable_samples if trace.weights is None else trace.usable_samples & (trace.weights > 0.0)
+        slow.append(
+            Trace(
+                name=trace.name,
+                sample_time=trace.sample_time * factor,
+                channels=trace.channels,
+                values=trace.values[whole].reshape(n, factor, -1).mean(axis=1),
+                start_time=trace.start_time,
+                usable=np.asarray(usable[whole].reshape(n, factor).all(axis=1)),
+            )
+        )
+    return tuple(slow)
+
+
+def _head(trace: Trace, count: int) -> Trace:
+    if len(trace) <= count:
+        return trace
+    return replace(
+        trace,
+        values=trace.values[:count],
+        usable=None if trace.usable is None else trace.usable[:count],
+        weights=None if trace.weights is None else trace.weights[:count],
+    )
+
+
+def stacked(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Stretches one after the other, for statistics that look at one sample at a time."""
+    return np.concatenate(parts) if parts else np.empty(0)

@@ -1,0 +1,159 @@
+r"""The evidence of a regularised regression, from one triangular factor of the data (Chen and Ljung 2013).
+
+For :math:`y = \Phi g + v` with :math:`g \sim N(0, \sigma^2 L L^T)` and white :math:`v` of variance
+:math:`\sigma^2`, everything that depends on the data is in the triangular factor :math:`[R\; z]` of
+:math:`[\Phi\; y]`, however many samples there are. The noise variance, which the prior is counted in, is eliminated:
+at its maximum the logarithm of the marginal likelihood is
+
+.. math:: -\tfrac12\Bigl(N\ln\frac{r^2}{N} + 2\ln|\det R_a| + N(1 + \ln 2\pi)\Bigr),
+
+where :math:`R_a` is the triangular factor of :math:`[R L;\, I]` and :math:`r^2` what is left of :math:`[z;\, 0]`
+("Implementation of algorithms for tuning parameters in regularized least squares problems in system identification",
+Automatica 49).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+CHUNK = 2048
+"""Rows that are taken into the factor at a time: memory does not grow with the record."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Triangle:
+    """A regression as its triangular factor.
+
+    Args:
+        R: Of the columns, shape ``(n_rows, n_columns)``, no more rows than columns and one.
+        z: Of the target, shape ``(n_rows,)``.
+        samples: Rows of the regression, less those that unregularised columns have used up.
+    """
+
+    R: NDArray[np.float64]
+    z: NDArray[np.float64]
+    samples: int
+
+    def columns(self, kept: NDArray[np.bool_]) -> Triangle:
+        """The regression with some of its columns.
+
+        Args:
+            kept: Which, shape ``(n_columns,)``.
+
+        Returns:
+            The regression.
+        """
+        return Triangle(R=self.R[:, kept], z=self.z, samples=self.samples)
+
+
+def triangle(blocks: Iterable[NDArray[np.float64]], *, free: int) -> Triangle:
+    """The triangular factor of a regression whose rows come in blocks.
+
+    Args:
+        blocks: Columns that are not regularised (levels), those that are, and the target, side by side.
+        free: How many come first that are not regularised; what they explain is taken out.
+
+    Returns:
+        The factor of what is left.
+    """
+    R: NDArray[np.float64] | None = None
+    samples = 0
+    for block in blocks:
+        samples += len(block)
+        for first in range(0, len(block), CHUNK):
+            part = block[first : first + CHUNK]
+            stacked = part if R is None else np.concatenate([R, part])
+            R = linalg.qr(stacked, mode="r", check_finite=False)[0][: stacked.shape[1]]
+    assert R is not None  # noqa: S101 - callers have rows
+    return Triangle(R=R[free:, free:-1], z=R[free:, -1], samples=samples - free)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Posterior:
+    """What data and prior say together.
+
+    Args:
+        mean: Shape ``(n_columns,)``.
+        covariance: Shape ``(n_columns, n_columns)``.
+        noise_variance: Of the target's noise.
+        log_evidence: Logarithm of the marginal likelihood.
+        effective: Number of parameters that the data determine.
+    """
+
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    noise_variance: float
+    log_evidence: float
+    effective: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Factored:
+    """Data and prior in one triangular factor.
+
+    Args:
+        R: :math:`R_a`, shape ``(n_columns, n_columns)``.
+        z: Its target, shape ``(n_columns,)``.
+        rest: What is left of the target, squared; never less than rounding leaves of it.
+        samples: As in the data.
+    """
+
+    R: NDArray[np.float64]
+    z: NDArray[np.float64]
+    rest: float
+    samples: int
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the marginal likelihood at the best noise variance."""
+        N = self.samples
+        determinant = 2.0 * float(np.sum(np.log(np.abs(np.diag(self.R)))))
+        return float(-0.5 * (N * np.log(self.rest / N) + determinant + N * (1.0 + np.log(2.0 * np.pi))))
+
+
+def factored(data: Triangle, L: NDArray[np.float64]) -> Factored:
+    """Take the prior into the factor of the data.
+
+    Args:
+        data: The regression.
+        L: Factor of the prior's covariance in units of the noise variance, shape ``(n_columns, n_columns)``.
+
+    Returns:
+        The factor.
+    """
+    n = L.shape[1]
+    top = np.column_stack([data.R @ L, data.z])
+    stacked = np.concatenate([top, np.eye(n, n + 1)])
+    R = linalg.qr(stacked, mode="r", check_finite=False, overwrite_a=True)[0]
+    # Of noise-free data the rest is rounding: it must not become an infinite reward.
+    floor = np.finfo(np.float64).eps ** 2 * max(float(data.z @ data.z), np.finfo(np.float64).tiny)
+    return Factored(R=R[:n, :n], z=R[:n, n], rest=max(float(np.sum(R[n:, n] ** 2)), floor), samples=data.samples)
+
+
+def posterior(data: Triangle, L: NDArray[np.float64]) -> Posterior:
+    """Mean and covariance under a prior.
+
+    Args:
+        data: The regression.
+        L: As for :func:`factored`.
+
+    Returns:
+        The posterior.
+    """
+    whole = factored(data, L)
+    Ra, n = whole.R, len(whole.R)
+    variance = whole.rest / data.samples
+    half = linalg.solve_triangular(Ra, L.T, trans="T", check_finite=False)  # Ra^-T L^T
+    inverse = linalg.solve_triangular(Ra, np.eye(n), check_finite=False)
+    return Posterior(
+        mean=L @ linalg.solve_triangular(Ra, whole.z, check_finite=False),
+        covariance=variance * half.T @ half,
+        noise_variance=variance,
+        log_evidence=whole.log_evidence,
+        effective=float(n - np.sum(inverse**2)),
+    )

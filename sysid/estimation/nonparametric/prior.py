@@ -1,0 +1,230 @@
+"""The priors of all inputs together, and their hyperparameters of largest evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.estimation.nonparametric.evidence import Triangle, factored
+from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
+
+SCALES = (0.0, 4.0, 8.0)
+"""Natural logarithms of the variances, in units of the noise's, that a search begins with."""
+CONSTANTS = (0.05, 0.15, 0.4)
+"""Time constants that it begins with, as parts of the length."""
+
+
+DOUBT = 3.0
+"""Natural logarithm of the ratio of evidences up to which two answers are both possible: a factor of 20."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prior:
+    """Of every input: log variance, log time constant in samples and, for DC, log correlation length in samples.
+
+    Args:
+        kernel: Which.
+        length: Lags of each input.
+        dead: Dead times, shape ``(n_inputs,)``.
+        theta: Shape ``(n_inputs * kernel.size,)``.
+    """
+
+    kernel: Kernel
+    length: int
+    dead: NDArray[np.int64]
+    theta: NDArray[np.float64]
+    kept: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        lags = np.arange(self.length)
+        object.__setattr__(self, "kept", np.concatenate([lags >= k for k in self.dead]))
+
+    @property
+    def hyperparameters(self) -> tuple[Hyperparameters, ...]:
+        """In units of the noise variance, counted from each dead time."""
+        found = []
+        for row in self.theta.reshape(len(self.dead), -1):
+            decay = float(np.exp(-2.0 * np.exp(-row[1])))
+            correlation = np.sqrt(decay) if self.kernel is Kernel.TC else float(np.exp(-np.exp(-row[2])))
+            found.append(Hyperparameters(scale=float(np.exp(row[0])), decay=decay, correlation=float(correlation)))
+        return tuple(found)
+
+    def in_units(self, noise_variance: float, inputs: NDArray[np.float64]) -> tuple[Hyperparameters, ...]:
+        """The hyperparameters in output units squared by input unit squared."""
+        return tuple(
+            Hyperparameters(scale=h.scale * noise_variance / float(u) ** 2, decay=h.decay, correlation=h.correlation)
+            for h, u in zip(self.hyperparameters, inputs, strict=True)
+        )
+
+    def shifted(self, j: int, dead: int) -> Prior:
+        """The same prior, the dead time of one input being another; that of the length leaves the input out."""
+        return replace(self, dead=np.where(np.arange(len(self.dead)) == j, dead, self.dead))
+
+    def factor(self) -> NDArray[np.float64]:
+        """The Cholesky factor of the covariance of the lags that are kept."""
+        parts = [h.factor(self.length - int(k)) for h, k in zip(self.hyperparameters, self.dead, strict=True)]
+        return np.asarray(linalg.block_diag(*parts))
+
+
+def tuned(
+    data: Triangle,
+    length: int,
+    dead: NDArray[np.int64],
+    kernels: Sequence[Kernel],
+    *,
+    start: Prior | None = None,
+) -> Prior:
+    """The prior of largest evidence.
+
+    Args:
+        data: The regression on all lags of every input.
+        length: Lags of each input.
+        dead: Dead times.
+        kernels: Those that are tried.
+        start: Where to begin; at some places of a grid by default.
+
+    Returns:
+        The prior.
+    """
+    from scipy.optimize import minimize
+
+    best: tuple[float, Prior] | None = None
+    for kernel in kernels:
+        search = _Search(data=data, kernel=kernel, length=length, dead=dead)
+        known = start or (best[1] if best else None)
+        starts = search.grid() if known is None else [search.like(known)]
+        theta = max(starts, key=search.value)
+        found = minimize(
+            search.descent, theta, jac=True, method="L-BFGS-B", bounds=search.bounds,
+            options={"maxiter": 50, "ftol": 1e-8, "gtol": 1e-3},
+        )  # fmt: skip
+        if best is None or -float(found.fun) > best[0]:
+            best = -float(found.fun), search.prior(np.asarray(found.x))
+    assert best is not None  # noqa: S101 - there is a kernel
+    return best[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeadTime:
+    """When an input begins to act, in samples.
+
+    Args:
+        best: Where the evidence is largest.
+        low: The earliest that the data allow, to a factor of 20 of the evidence.
+        high: The latest.
+        odds: Natural logarithm of the evidence for a response against none at all.
+    """
+
+    best: int
+    low: int
+    high: int
+    odds: float
+
+    @property
+    def acts(self) -> bool:
+        """Whether the output answers to the input at all, to a factor of 20 of the evidence."""
+        return self.odds > DOUBT
+
+
+def dead_times(data: Triangle, prior: Prior, *, most: int, rounds: int = 2) -> tuple[tuple[DeadTime, ...], Prior]:
+    """The dead times of largest evidence, one input after the other.
+
+    Args:
+        data: The regression on all lags of every input.
+        prior: With any dead times; its kernel is kept.
+        most: The longest dead time that is looked for.
+        rounds: How often all inputs are gone through.
+
+    Returns:
+        The dead times, and the prior that begins at the earliest ones that the data allow.
+    """
+    found: list[DeadTime] = []
+    for _ in range(rounds):
+        found = []
+        for j in range(len(prior.dead)):
+            values = np.array([_value(data, prior.shifted(j, k)) for k in range(most + 1)])
+            near = np.flatnonzero(values >= values.max() - DOUBT)
+            odds = float(values.max()) - _value(data, prior.shifted(j, prior.length))
+            found.append(DeadTime(best=int(values.argmax()), low=int(near[0]), high=int(near[-1]), odds=float(odds)))
+            prior = prior.shifted(j, found[-1].best)
+        prior = tuned(data, prior.length, prior.dead, (prior.kernel,), start=prior)
+    for j, one in enumerate(found):
+        prior = prior.shifted(j, one.low)
+    return tuple(found), prior
+
+
+def _value(data: Triangle, prior: Prior) -> float:
+    return factored(data.columns(prior.kept), prior.factor()).log_evidence if prior.kept.any() else _nothing(data)
+
+
+def _nothing(data: Triangle) -> float:
+    return factored(data.columns(np.arange(data.R.shape[1]) == 0), np.zeros((1, 1))).log_evidence
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Search:
+    data: Triangle
+    kernel: Kernel
+    length: int
+    dead: NDArray[np.int64]
+
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        one = [(-12.0, 60.0), (np.log(0.2), np.log(20.0 * self.length)), (np.log(0.1), np.log(1e3))]
+        return one[: self.kernel.size] * len(self.dead)
+
+    def prior(self, theta: NDArray[np.float64]) -> Prior:
+        return Prior(kernel=self.kernel, length=self.length, dead=self.dead, theta=theta)
+
+    def grid(self) -> list[NDArray[np.float64]]:
+        """The same prior for every input."""
+        m = len(self.dead)
+        rows = [
+            (scale, np.log(max(constant * self.length, 0.5)), np.log(max(constant * self.length, 0.5)))
+            for scale in SCALES
+            for constant in CONSTANTS
+        ]
+        return [np.tile(row[: self.kernel.size], m) for row in rows]
+
+    def like(self, prior: Prior) -> NDArray[np.float64]:
+        """Another prior in the words of this kernel."""
+        rows = prior.theta.reshape(len(prior.dead), -1)
+        rows = np.column_stack([rows[:, :2], rows[:, 1]]) if rows.shape[1] == 2 else rows
+        low, high = np.array(self.bounds).T
+        return np.clip(rows[:, : self.kernel.size].ravel(), low, high)
+
+    def value(self, theta: NDArray[np.float64]) -> float:
+        prior = self.prior(theta)
+        return factored(self.data.columns(prior.kept), prior.factor()).log_evidence
+
+    def descent(self, theta: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        """Minus the logarithm of the evidence and its gradient."""
+        prior = self.prior(theta)
+        data, L = self.data.columns(prior.kept), prior.factor()
+        whole = factored(data, L)
+        mean = L @ linalg.solve_triangular(whole.R, whole.z, check_finite=False)
+        w = data.R.T @ (data.z - data.R @ mean)
+        half = linalg.solve_triangular(whole.R, L.T, trans="T", check_finite=False) @ data.R.T
+        S = data.R.T @ data.R - (half @ data.R).T @ (half @ data.R)
+        G = 0.5 * (S - np.outer(w, w) * (data.samples / whole.rest))
+        return -whole.log_evidence, self._gradient(prior, L, G)
+
+    def _gradient(self, prior: Prior, L: NDArray[np.float64], G: NDArray[np.float64]) -> NDArray[np.float64]:
+        slopes, at = [], 0
+        for row, k in zip(prior.theta.reshape(len(self.dead), -1), self.dead, strict=True):
+            n = self.length - int(k)
+            block = slice(at, at + n)
+            P = (L[block, block] @ L[block, block].T) * G[block, block]
+            i = np.arange(n, dtype=np.float64)
+            both, apart = float(P.sum(axis=1) @ i), float(np.sum(P * np.abs(i[:, None] - i[None, :])))
+            of_decay = both * 2.0 * np.exp(-row[1])  # both = sum P (i + j) / 2
+            if self.kernel is Kernel.TC:
+                slopes += [float(P.sum()), of_decay + apart * np.exp(-row[1])]
+            else:
+                slopes += [float(P.sum()), of_decay, apart * np.exp(-row[2])]
+            at += n
+        return np.array(slopes)
