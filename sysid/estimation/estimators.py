@@ -24,7 +24,7 @@ from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.narx import fit_narx
-from sysid.estimation.networks.neural_state_space import check_training, fit_neural_state_space
+from sysid.estimation.networks.neural_state_space import STARTS, check_training, fit_neural_state_space
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial
@@ -71,6 +71,7 @@ class Estimator:
         stability: How the stability of its fits is checked.
         joins: Whether its models can be members of a whole that are trained together.
         of_residuals: What a reader of its residuals should know; empty for nothing.
+        starts: Starts of a network's fit that asks for none.
     """
 
     structure: type[AbstractStructure]
@@ -83,6 +84,7 @@ class Estimator:
     stability: type[AbstractStabilityCheck] = FreeRunCheck
     joins: bool = False
     of_residuals: str = ""
+    starts: int = 1
 
     @cached_property
     def knows(self) -> frozenset[str]:
@@ -98,6 +100,17 @@ class Estimator:
     def selects(self) -> bool:
         """Whether selection traces have a say in the fit."""
         return "selection" in self.knows
+
+    def chooses(self, training: Options | None) -> bool:
+        """Whether its fit chooses between several starts.
+
+        Args:
+            training: The options that are asked for.
+
+        Returns:
+            Whether it does.
+        """
+        return (getattr(training, "starts", None) or self.starts) > 1
 
     @property
     def resumes(self) -> bool:
@@ -237,6 +250,7 @@ ESTIMATORS: dict[str, Estimator] = {
             training=Training,
             check_training=check_training,
             begins="a neural state space begins at the best linear one",
+            starts=STARTS,
         ),
         Estimator(
             structure=TransferFunction,

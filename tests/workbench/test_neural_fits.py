@@ -26,7 +26,7 @@ def test_a_neural_state_space_is_fitted_by_its_estimator(workspace: Path) -> Non
     fit = config.fits[0]
     result = steps.fit_traces(fit, config, data, None, lambda _: None)
     assert result.model.structure == NeuralStateSpace(states=1, neurons=3)
-    assert result.seed == config.seed
+    assert result.attempts[0].seed == config.seed
     evaluation = steps.score(result, data, config).evaluation
     assert min(case.free_run.nrmse_fit for case in evaluation.cases.values()) > 25.0
 

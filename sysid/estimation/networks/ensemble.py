@@ -135,8 +135,8 @@ def selected(
         multistart.on_progress(
             FitProgress(
                 stage=f"pick {pick} of {training.ensemble}",
-                start=training.starts,
-                starts=training.starts,
+                start=training.n_starts,
+                starts=training.n_starts,
                 iteration=training.max_iterations,
                 max_iterations=training.max_iterations,
                 mse=2.0 * min(c.loss for c in usable) / multistart.provider.n_samples * scale,
@@ -195,7 +195,7 @@ def as_candidate(
     )
     state = replace(lead.state, theta=theta, at=at, prior=prior, evidence=evidence, curve=(*lead.curve, entry))
     return starts.Candidate(
-        number=multistart.training.starts,
+        number=multistart.training.n_starts,
         seed=None,
         solution=Solution(state=state, status=lead.status),
         model=ensemble.model,

@@ -48,6 +48,24 @@ class AbstractLayout(ABC):
             Flat parameters.
         """
 
+    def start(
+        self,
+        number: int,  # noqa: ARG002 - all starts of lagged regressors are alike
+        rng: np.random.Generator,
+        centre: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where one of several starts begins, and what the prior draws it to.
+
+        Args:
+            number: Which start, from 0 on.
+            rng: Source of randomness.
+            centre: What the prior draws all of them to, shape ``(n_parameters,)``, where they do not differ in it.
+
+        Returns:
+            Flat parameters, and what they are drawn to.
+        """
+        return self.draw(rng, centre), centre
+
 
 @dataclass(frozen=True, kw_only=True)
 class Layout(AbstractLayout):

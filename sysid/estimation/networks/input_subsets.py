@@ -52,11 +52,11 @@ class View:
         Returns:
             The callback.
         """
-        if self.training.starts == self.starts:
+        if self.training.n_starts == self.starts:
             return on_progress
 
         def report(entry: FitProgress) -> None:
-            done = self.first + entry.fraction * self.training.starts
+            done = self.first + entry.fraction * self.training.n_starts
             on_progress(replace(entry, start=self.first + entry.start, starts=self.starts, fraction=done / self.starts))
 
         return report
@@ -78,7 +78,7 @@ def views(training: Training, mapping: Mapping) -> list[View]:
 
     Example:
         >>> training = Training(starts=5, input_subsets=[["u"]])
-        >>> [(view.without, view.first, view.training.starts) for view in views(training, Mapping.parse("u+w -> y"))]
+        >>> [(view.without, view.first, view.training.n_starts) for view in views(training, Mapping.parse("u+w -> y"))]
         [((), 0, 3), (('u',), 3, 2)]
     """
     sets = ((), *training.input_subsets)
@@ -94,13 +94,13 @@ def views(training: Training, mapping: Mapping) -> list[View]:
                 got=", ".join(without),
                 remedy="keep at least one input",
             )
-    share, more = divmod(training.starts, len(sets))
+    share, more = divmod(training.n_starts, len(sets))
     found, first = list[View](), 0
     for number, without in enumerate(sets):
         starts = share + (number < more)
-        seconds = training.max_time_s * starts / training.starts
+        seconds = training.max_time_s * starts / training.n_starts
         own = replace(training, starts=starts, seed=training.seed + first, max_time_s=seconds, input_subsets=())
-        found.append(View(without=without, first=first, training=own, starts=training.starts))
+        found.append(View(without=without, first=first, training=own, starts=training.n_starts))
         first += starts
     return found
 

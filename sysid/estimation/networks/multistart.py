@@ -160,10 +160,10 @@ def run(multistart: Multistart) -> list[Candidate]:
     check_samples(multistart.provider)
     training = multistart.training
     rungs = _rungs(training)
-    numbers = list(range(training.starts))
+    numbers = list(range(training.n_starts))
     latest: dict[int, Candidate] = {}
     seen: list[Candidate] = []
-    total = _work(training.starts, rungs)
+    total = _work(training.n_starts, rungs)
     # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
     with threadpool_limits(1, "blas"):
         for rung, share in enumerate(rungs):
@@ -206,7 +206,7 @@ def _rung(
 
 
 def _rungs(training: Training) -> tuple[float, ...]:
-    return RUNGS if training.starts > 1 else RUNGS[-1:]
+    return RUNGS if training.n_starts > 1 else RUNGS[-1:]
 
 
 def planned_iterations(training: Training) -> float:
@@ -224,7 +224,7 @@ def planned_iterations(training: Training) -> float:
         >>> round(planned_iterations(Training(max_iterations=100, starts=8)))
         176
     """
-    return training.max_iterations * _work(training.starts, _rungs(training))
+    return training.max_iterations * _work(training.n_starts, _rungs(training))
 
 
 def _work(starts: int, rungs: Sequence[float]) -> float:
@@ -273,7 +273,7 @@ def _pretraining(
             FitProgress(
                 stage=f"pretraining {entry.iteration} of {training.pretraining_iterations}",
                 start=number + 1,
-                starts=training.starts,
+                starts=training.n_starts,
                 iteration=0,  # the free run's, which have not begun
                 max_iterations=training.max_iterations,
                 mse=entry.mse * scale,
@@ -330,7 +330,7 @@ def _begin(multistart: Multistart, number: int) -> tuple[int | None, NDArray[np.
     if number == 0 and multistart.initial is not None:
         return None, _in_basis(multistart, multistart.initial), centre
     seed = multistart.training.seed + number
-    return seed, multistart.layout.draw(np.random.default_rng(seed), centre), centre
+    return seed, *multistart.layout.start(number, np.random.default_rng(seed), centre)
 
 
 def _in_basis(multistart: Multistart, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -342,7 +342,7 @@ def _in_basis(multistart: Multistart, theta: NDArray[np.float64]) -> NDArray[np.
 def _engine(multistart: Multistart, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
     training = multistart.training
     scale = multistart.template.scaling.output_scale**2
-    work = training.max_iterations * _work(training.starts, _rungs(training))
+    work = training.max_iterations * _work(training.n_starts, _rungs(training))
 
     def report(entry: Iteration) -> None:
         multistart.iterations[number] = entry.iteration
@@ -350,7 +350,7 @@ def _engine(multistart: Multistart, number: int, iterations: int, seconds: float
             FitProgress(
                 stage="free run" if training.loop is Loop.CLOSED else "one step ahead",
                 start=number + 1,
-                starts=training.starts,
+                starts=training.n_starts,
                 iteration=entry.iteration,
                 max_iterations=training.max_iterations,
                 mse=entry.mse * scale,

@@ -22,6 +22,10 @@ from sysid.estimation.result import FitResult, Loop
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start
 from sysid.traces import Trace
 
+STARTS = 6
+"""Starts of a fit that asks for none: the linear model's, and five that differ (:class:`NeuralLayout`). Halved at each
+look, all of them take some 1.6 times the iterations of one."""
+
 LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_subsets")
 """Options of a training that concern lagged regressors."""
 
@@ -63,7 +67,7 @@ def fit_neural_state_space(
             for lagged regressors alone.
     """
     began = time.perf_counter()
-    training, start = training or Training(), start or Start()
+    training, start = (training or Training()).with_starts(STARTS), start or Start()
     check_training(training)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = experiments_of(traces, mapping, start, rest)
@@ -72,7 +76,9 @@ def fit_neural_state_space(
     starts.check_samples(provider)
     multistart = starts.Multistart(
         training=training,
-        layout=NeuralLayout(sizes=template.recursion.sizes, base=linear_start(provider)),
+        layout=NeuralLayout(
+            sizes=template.recursion.sizes, base=linear_start(provider), longest=max(len(e.output) for e in experiments)
+        ),
         provider=provider,
         to_plain=np.eye(template.n_parameters, provider.n_parameters),
         template=template,

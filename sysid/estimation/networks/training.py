@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.damping import DAMPINGS
@@ -49,7 +49,8 @@ class Training:
             repeated exactly; leave it out where that matters.
         tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
         patience: Iterations over which improvement is judged.
-        starts: Random starts; successive halving: half of them dropped at each of four checkpoints.
+        starts: Starts; successive halving: half of them dropped at each of four checkpoints. By default as many as the
+            structure needs: one for lagged regressors, several for hidden states.
         seed: Seed of the first start; the others count up from it.
         choose_by: What chooses in the end: ``selection`` (least error on traces that are used for nothing else) or
             ``evidence``.
@@ -81,7 +82,7 @@ class Training:
     max_time_s: float = float("inf")
     tolerance: float = 1e-3
     patience: int = 50
-    starts: int = 1
+    starts: int | None = None
     seed: int = 0
     choose_by: str = "selection"
     workers: int = 2
@@ -110,14 +111,15 @@ class Training:
             "stride",
             "ensemble",
         ):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        if self.input_subsets and self.starts <= len(self.input_subsets):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=value)
+        if self.input_subsets and self.n_starts <= len(self.input_subsets):
             raise ConfigError(
                 "not every set of inputs has a start",
                 where="input_subsets",
                 expected=f"{1 + len(self.input_subsets)} starts or more",
-                got=f"{self.starts} starts",
+                got=f"{self.n_starts} starts",
                 remedy="raise starts, or leave out fewer sets",
             )
         if self.pretraining < 0:
@@ -131,6 +133,22 @@ class Training:
                 expected="a number from 0 on, or nothing for the evidence's",
                 got=self.regularisation,
             )
+
+    @property
+    def n_starts(self) -> int:
+        """Starts that are asked for; one where none are."""
+        return self.starts or 1
+
+    def with_starts(self, n: int) -> Training:
+        """The same training, with so many starts where none are asked for.
+
+        Args:
+            n: Starts that the structure needs.
+
+        Returns:
+            The training.
+        """
+        return self if self.starts is not None else replace(self, starts=n)
 
 
 @dataclass(frozen=True, kw_only=True)

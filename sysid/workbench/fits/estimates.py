@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, Training
+from sysid.estimation.estimators import estimator_of
 from sysid.estimation.networks.multistart import planned_iterations
 from sysid.traces import Trace, TraceSet
 from sysid.workbench.fields import TrainingConfig, given_options
@@ -50,7 +51,10 @@ def how_long(fit: FitConfig, config: PipelineConfig, data: Data) -> Estimate:
     training = fit.training_options(config.seed)
     if not isinstance(training, Training):
         return Estimate(seconds=_linear(fit, config, data), basis=f"measured now on 1/{SHARE} of the samples")
-    return network_time(training, lambda few, note: _fitted(fit, config, data, few, note))
+    return network_time(
+        training.with_starts(estimator_of(fit.structure).starts),
+        lambda few, note: _fitted(fit, config, data, few, note),
+    )
 
 
 def network_time(
@@ -84,8 +88,11 @@ def network_time(
     each = {main: _median([when for stage, when in moments if (stage == last) is main]) for main in (True, False)}
     iteration, earlier = (each[True] or total) / share, each[False] or 0.0
     around = max(total - sum((each[stage == last] or 0.0) for stage, _ in moments), 0.0)
-    iterations, side_by_side = planned_iterations(training), min(training.workers, training.starts, os.cpu_count() or 1)
-    before = earlier * training.pretraining_iterations * training.starts if training.pretraining else 0.0
+    iterations, side_by_side = (
+        planned_iterations(training),
+        min(training.workers, training.n_starts, os.cpu_count() or 1),
+    )
+    before = earlier * training.pretraining_iterations * training.n_starts if training.pretraining else 0.0
     seconds = around + min((before + iterations * iteration) / side_by_side, training.max_time_s)
     trained = f"{iterations:.0f} iterations of {1e3 * iteration:.1f} ms, {side_by_side} at a time"
     ahead = f", {duration(before / side_by_side)} one step ahead" if before else ""

@@ -188,7 +188,7 @@ def train(
 
 def _checked(bench: Bench, row: Estimator, training: Options | None) -> StabilityOptions | None:
     """How a trial is checked: where it costs nothing, or chooses between starts; else it is done for the best alone."""
-    return bench.stability if row.stability.by_poles or getattr(training, "starts", 1) > 1 else None
+    return bench.stability if row.stability.by_poles or row.chooses(training) else None
 
 
 def _options(job: Job) -> dict[str, Any] | None:
