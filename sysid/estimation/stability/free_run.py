@@ -215,7 +215,7 @@ def _asks_too_much(
     """Whether a linear model of the records leaves the bounds too."""
     if reference is None:
         return False
-    return _lost(reference.simulate(sequence.inputs, sequence.history).reshape(-1, 1), low, high)
+    return _lost(reference.simulate(sequence.inputs, sequence.history(several=False)).reshape(-1, 1), low, high)
 
 
 def _runs(
