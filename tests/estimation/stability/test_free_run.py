@@ -80,7 +80,7 @@ def test_the_worst_sequence_is_kept_to_the_digits_that_repeat_it():
     assert rows[0] == ["time [s]", "a", "b", "y target", "y free run", "judged"]
     values = np.array(rows[1:], dtype=np.float64)
     assert values[1, 0] == 0.5
-    assert_allclose(model(0.97).simulate(values[:, 1:3], found.worst.history), values[:, 4], atol=1e-7)
+    assert_allclose(model(0.97).simulate(values[:, 1:3], found.worst.history(several=False)), values[:, 4], atol=1e-7)
 
 
 def test_the_seed_decides_and_a_sequence_does_not_depend_on_how_many_are_drawn():
