@@ -92,6 +92,7 @@ def _digest(addresses: tuple[str, ...], without: tuple[str, ...], files: tuple[s
 def look_again() -> None:
     """Forget what was taken, so that code that was written meanwhile counts."""
     _digest.cache_clear()
+    _sources.cache_clear()
 
 
 def _home(package: str) -> Path:
@@ -131,7 +132,7 @@ def _labels(addresses: Sequence[str], without: Sequence[str]) -> list[str]:
 
 def _closure(addresses: Sequence[str], without: Sequence[str]) -> tuple[_Sources, list[_Unit]]:
     """Every definition that is reached, and where they were found."""
-    sources = _Sources(ours=frozenset({"sysid", *(address.split(":")[0].split(".")[0] for address in addresses)}))
+    sources = _sources(frozenset({"sysid", *(address.split(":")[0].split(".")[0] for address in addresses)}))
     found: dict[_Unit, None] = {}
     asked: set[str] = set()
     unasked: defaultdict[str, list[_Unit]] = defaultdict(list)
@@ -151,6 +152,12 @@ def _closure(addresses: Sequence[str], without: Sequence[str]) -> tuple[_Sources
         for name, method in sources.methods(unit).items():
             (waiting if name in asked else unasked[name]).append(method)
     return sources, list(found)
+
+
+@cache
+def _sources(ours: frozenset[str]) -> _Sources:
+    """The modules of some packages; what their names mean is worked out once for all digests of a process."""
+    return _Sources(ours=ours)
 
 
 def _label(labels: dict[_Unit, str], names: dict[str, list[_Unit | str]], own: str) -> str:

@@ -19,6 +19,7 @@ data: tanks
 training: tanks
 outputs: [upper, lower]
 seed: 3
+stability: {count: 60, choose: false}
 limits:
   lower: {low: 0}
 definitions:
@@ -69,6 +70,17 @@ def write_tanks(folder: Path, seed: int = 0) -> None:
     channels = "\n".join(f"  - {{name: {name}, unit: cm}}" for name in ("pump", "upper", "lower"))
     text = f"name: tanks\nsample_time: 1\nchannels:\n{channels}\nsource: {{files: {{}}}}\ncases:\n" + "\n".join(cases)
     (folder / "dataset.yaml").write_text(text + "\n", encoding="utf-8")
+
+
+@pytest.fixture
+def drawn() -> None:
+    """For tests of the pictures: pages of the others have empty ones, as drawing takes longer than all else."""
+
+
+@pytest.fixture(autouse=True)
+def _not_drawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    if "drawn" not in request.fixturenames:
+        monkeypatch.setattr("sysid.reporting.parts.svg", lambda *_, **__: '<svg role="img" viewBox="0 0 1 1"></svg>')
 
 
 @pytest.fixture

@@ -164,11 +164,11 @@ def test_the_rounds_of_active_learning_are_the_last_one_before_but_for_what_they
     text = LEAN.replace("train: [{max_iterations: 2}]", "train: [{max_iterations: 2}, {targets: {lower: 0.3}}]")
     asked = config(text)
     last = asked.joint[-1]
-    first, second = asked.growing
+    first, second = asked.learning_rounds
     assert (first.targets, second.targets) == (last.targets, {"lower": 0.3})
     assert [one.training.max_iterations for one in (last, first, second)] == [4, 2, 2]
     assert first.traces == second.traces == 1
-    assert config(LEAN.replace(", train: [{max_iterations: 2}]", "")).growing == (last,)
+    assert config(LEAN.replace(", train: [{max_iterations: 2}]", "")).learning_rounds == (last,)
 
 
 def test_a_share_of_none_is_nothing_to_aim_at():

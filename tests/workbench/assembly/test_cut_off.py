@@ -33,9 +33,7 @@ def run(workspace: Path, name: str, *, told: list[str], until: tuple[str, int] |
     carry_out(program(request), workspace / "runs" / name, command="sysid run tanks", watchers=[watch])
 
 
-def test_members_and_rounds_go_on_where_they_were_cut_off(
-    workspace: Path, quick_report: None, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_members_and_rounds_go_on_where_they_were_cut_off(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole, parts = list[str](), list[str]()
     run(workspace, "whole", told=whole)
     for until in [("Fitting upper -> lower", 12), ("Training end to end", 3)]:

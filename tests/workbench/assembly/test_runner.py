@@ -31,7 +31,7 @@ def run(workspace: Path, *, fresh: bool = False, tracking: bool = False) -> int:
     return run_request(RunRequest(path=file, typed="tanks", fresh=fresh, tracking=tracking))
 
 
-def test_an_assembly_from_a_yaml(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_assembly_from_a_yaml(workspace: Path, drawn: None, capsys: pytest.CaptureFixture[str]) -> None:
     assert kind_of(workspace / "pipelines" / "tanks.yaml") == "assembly"
     assert run(workspace) == 0
     folder = workspace / "runs" / "tanks"
