@@ -8,14 +8,14 @@ export OMP_NUM_THREADS = 1
 SIDE_BY_SIDE := --numprocesses=auto --maxprocesses=4 --dist=loadfile
 export MLFLOW_DISABLE_TELEMETRY = true
 
-.PHONY: run test check lint types setup bench docs clean
+.PHONY: run test check lint types setup bench docs wheel-check clean
 
 setup: $(VENV)/.ready  ## environment with the tested versions
 
 $(VENV)/.ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --group dev --editable ".[excel,mdf,tdms]"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --group dev --editable ".[all,torch,mdf,tdms]"
 	touch $@
 
 run: setup  ## the main job: traces, fits, export, report
@@ -36,6 +36,9 @@ bench: setup  ## the benchmarks, not part of the tests
 
 docs: setup  ## the documentation site; every notebook of its gallery is run
 	$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doctrees docs build/docs
+
+wheel-check: setup  ## a wheel in a clean environment: its size, and the first hour
+	$(BIN)/python -m tests.benchmarks.wheel_check
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache

@@ -24,13 +24,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
-from sklearn.metrics import r2_score
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from sysid.api import ARX, SystemFit, data, fit
 from sysid.estimation import Training
+from sysid.extras import need
 from sysid.models import AbstractStructure
+
+need("sklearn", "sysid.sklearn")
+
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin  # noqa: E402 - after it was looked for
+from sklearn.metrics import r2_score  # noqa: E402 - as above
+from sklearn.utils.validation import check_is_fitted, validate_data  # noqa: E402 - as above
 
 EXPECTED_FAILED_CHECKS = {
     "check_methods_sample_order_invariance": "rows are samples in time: their order is the record",

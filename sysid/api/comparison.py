@@ -10,6 +10,7 @@ import numpy as np
 
 from sysid.api.several import Several
 from sysid.estimation import FitResult
+from sysid.extras import need
 from sysid.models import Start, StartKind
 from sysid.traces import TraceSet
 from sysid.validation import Evaluation, evaluate_outputs
@@ -62,6 +63,7 @@ class Comparison:
             Columns ``model``, ``output``, ``case``, ``role``, ``fit`` (percent), ``mse``, ``rmse``, ``max_abs_error``,
             ``r``, ``one_step_mse`` and ``unit``; all but the one-step figure are of the free run.
         """
+        need("pandas", "a frame")
         import pandas as pd
 
         rows = [

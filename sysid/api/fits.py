@@ -130,7 +130,7 @@ class Fit(FitResult):
         """
         return compare(traces or self.traces, self, start=self.start).plot()
 
-    def save(self, folder: str | Path, *, formats: tuple[str, ...] = ("onnx", "torchscript")) -> Bundle:
+    def save(self, folder: str | Path, *, formats: tuple[str, ...] | None = None) -> Bundle:
         """Write it as files that run elsewhere; see :func:`sysid.save`."""
         return save(self, self.traces, folder, formats=formats, start=self.start)
 
@@ -251,7 +251,7 @@ class SystemFit:
         """The free run of each output over its measurement, case by case."""
         return compare(traces or self.traces, self, start=self.start).plot()
 
-    def save(self, folder: str | Path, *, formats: tuple[str, ...] = ("onnx", "torchscript")) -> Bundle:
+    def save(self, folder: str | Path, *, formats: tuple[str, ...] | None = None) -> Bundle:
         """Write it as files of several outputs that run elsewhere; see :func:`sysid.save`."""
         return save(self, self.traces, folder, formats=formats)
 

@@ -14,6 +14,7 @@ from sysid.api.fits import Fit
 from sysid.errors import ConfigError
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
+from sysid.extras import need
 from sysid.models import ARX, Mapping, Start
 from sysid.traces import Role, TraceSet
 from sysid.validation.metrics import percent
@@ -109,6 +110,7 @@ class OrderSearch:
             Columns ``structure``, ``parameters``, ``one_step_mse``, ``AIC``, ``AICc``, ``BIC``, ``fit`` (mean over the
             cases that chose, percent) and ``stable``.
         """
+        need("pandas", "a frame")
         import pandas as pd
 
         criteria = (Criterion.AIC, Criterion.AICC, Criterion.BIC)

@@ -19,7 +19,7 @@ def save(
     traces: TraceSet,
     folder: str | Path,
     *,
-    formats: tuple[str, ...] = ("onnx", "torchscript"),
+    formats: tuple[str, ...] | None = None,
     start: Start | None = None,
 ) -> Bundle:
     """Write a fit as files that run elsewhere, each checked against its model on every case before it is published.
@@ -28,7 +28,8 @@ def save(
         fit: The fit; one of several outputs becomes one file of several outputs.
         traces: The cases that the files are run on.
         folder: Where the bundle goes: new, empty, or an earlier bundle.
-        formats: Among ``onnx``, ``torchscript``, ``c``, ``fmi2`` and ``fmi3``.
+        formats: Among ``onnx``, ``c``, ``fmi2``, ``fmi3`` and ``torchscript``; by default ONNX and C, as far as
+            they can be written here.
         start: How each free run begins; as the fit was made by default, and at rest for several outputs.
 
     Returns:

@@ -18,7 +18,7 @@ from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.result import FitResult
 from sysid.export.archive import write_archive
 from sysid.export.card import model_card
-from sysid.export.exporters import exporter
+from sysid.export.exporters import exporter, usual_formats
 from sysid.export.manifest import (
     CARD,
     MANIFEST,
@@ -133,7 +133,7 @@ def export_bundle(
     *,
     start: Start | None = None,
     outputs: Sequence[str] | None = None,
-    formats: Sequence[str] = ("onnx", "torchscript"),
+    formats: Sequence[str] | None = None,
     tolerance: float = 1e-9,
     tolerance_float32: float = 1e-3,
     metrics: Metrics | CascadeMetrics | None = None,
@@ -156,7 +156,8 @@ def export_bundle(
         start: How the free run over each case begins; at rest by default, and always for a cascade.
         outputs: Which outputs of a cascade leave it, in this order; all by default. What lies between them is
             computed, and nobody is told that it is at a limit.
-        formats: Names of exporters.
+        formats: Names of exporters; by default ONNX and C, as far as they can be written here. What is left out is
+            said in a warning.
         tolerance: Largest difference from the model allowed, in the outputs' unit.
         tolerance_float32: The same for files that compute in float32.
         metrics: The figures on the cases, as :func:`sysid.validation.evaluate` or ``evaluate_cascade`` give them.
@@ -171,10 +172,11 @@ def export_bundle(
     Raises:
         ConfigError: If a format or an output is unknown, a parameter is not finite, or the folder holds something that
             is not a bundle.
+        MissingExtraError: If a package that a format needs is not installed.
         ChannelError: If a trace lacks a channel of the mapping.
         ParityError: If a file differs from the model by more than the tolerance; nothing is published then.
     """
-    writers = [exporter(name) for name in dict.fromkeys(formats)]
+    writers = [exporter(name) for name in usual_formats(formats)]
     source = fit if isinstance(fit, Cascade) else fit.model
     known = dict(fits or {}) if isinstance(fit, Cascade) else {str(fit.model.mapping): fit}
     start = Start() if start is None or isinstance(fit, Cascade) else start

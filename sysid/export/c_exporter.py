@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.compiler import build_library
+from sysid.export.compiler import build_library, compiler
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, with_remainders
 from sysid.export.surrogate import Surrogate
 
@@ -27,6 +27,10 @@ class CExporter(AbstractExporter):
 
     name: str = "c"
     dtype: str = "float64"
+
+    def check(self) -> None:
+        """Look for a compiler: what is written is built and run before it is published."""
+        compiler()
 
     def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
         """Write both files."""

@@ -7,12 +7,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import UserError
 from sysid.export.surrogate import Surrogate
+from sysid.extras import need
 
 
 class Kind(enum.Enum):
@@ -68,6 +70,26 @@ class AbstractExporter(ABC):
 
     name: str
     """Name in the table, in pipelines and in ``model.json``."""
+
+    packages: ClassVar[tuple[str, ...]] = ()
+    """Optional packages that write or run its files, by the names that are imported."""
+
+    def check(self) -> None:
+        """Make sure that files of this format can be written and run here.
+
+        Raises:
+            UserError: If something is missing, such as a package; the remedy is the command that installs it.
+        """
+        for package in self.packages:
+            need(package, f"the format {self.name}")
+
+    def lacks(self) -> UserError | None:
+        """What is missing here, as :meth:`check` says it; ``None`` where nothing is."""
+        try:
+            self.check()
+        except UserError as error:
+            return error
+        return None
 
     @abstractmethod
     def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:

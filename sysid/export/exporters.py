@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 from sysid.errors import ConfigError
 from sysid.export.c_exporter import CExporter
 from sysid.export.exporter import AbstractExporter
@@ -24,6 +28,76 @@ EXPORTERS: dict[str, AbstractExporter] = {
     )
 }
 """Every format by name."""
+
+USUAL = ("onnx", "c")
+"""What is written where nobody names a format, as far as it can be written here."""
+
+
+class FormatLeftOutWarning(UserWarning):
+    """A format that is usually written, and for which something is missing here."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Formats:
+    """What is written.
+
+    Args:
+        names: The formats, in order.
+        left_out: What is usually written too and cannot be here, each with the command that changes it.
+    """
+
+    names: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return "; ".join([", ".join(self.names), *self.left_out])
+
+
+def wanted_formats(asked: Sequence[str] | None) -> Formats:
+    """The formats that are written, known before anything is computed.
+
+    Args:
+        asked: Their names; ``None`` for the usual ones that can be written here.
+
+    Returns:
+        The formats, and what was left out of the usual ones.
+
+    Raises:
+        UserError: If a format that was asked for cannot be written here, or none of the usual ones can.
+
+    Example:
+        >>> wanted_formats(["c", "onnx"]).names
+        ('c', 'onnx')
+    """
+    if asked is not None:
+        for name in asked:
+            exporter(name).check()
+        return Formats(names=tuple(dict.fromkeys(asked)))
+    missing = {name: problem for name in USUAL if (problem := EXPORTERS[name].lacks())}
+    if len(missing) == len(USUAL):
+        raise missing[USUAL[0]]
+    return Formats(
+        names=tuple(name for name in USUAL if name not in missing),
+        left_out=tuple(f"{name} left out: {problem.remedy}" for name, problem in missing.items()),
+    )
+
+
+def usual_formats(asked: Sequence[str] | None) -> tuple[str, ...]:
+    """As :func:`wanted_formats`, with a warning of what is left out.
+
+    Args:
+        asked: Names of formats; ``None`` for the usual ones.
+
+    Returns:
+        What is written.
+
+    Raises:
+        UserError: If a format that was asked for cannot be written here, or none of the usual ones can.
+    """
+    found = wanted_formats(asked)
+    for text in found.left_out:
+        warnings.warn(text, FormatLeftOutWarning, stacklevel=4)
+    return found.names
 
 
 def exporter(name: str) -> AbstractExporter:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import SysidError
+from sysid.export.compiler import compiler
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner
 from sysid.export.surrogate import Surrogate
 
@@ -29,6 +30,10 @@ class FmuExporter(AbstractExporter):
 
     name: str
     version: int
+
+    def check(self) -> None:
+        """Look for a compiler: an FMU holds a binary."""
+        compiler()
 
     def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
         """Write the sources, build the binary for this machine, and pack both with the description."""

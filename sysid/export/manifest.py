@@ -19,6 +19,7 @@ from sysid.export.layout import SpaceState
 from sysid.export.parity import Parity, ParityCase
 from sysid.export.stage import Port, Range, Stage
 from sysid.export.surrogate import Surrogate
+from sysid.extras import has
 from sysid.models import Cascade, Start
 from sysid.traces import Role, Trace, TraceSet
 from sysid.units import Reference
@@ -345,7 +346,7 @@ def _data(traces: TraceSet) -> dict[str, Any]:
 
 
 def _software() -> dict[str, str]:
-    packages = {name: metadata.version(name) for name in PACKAGES}
+    packages = {name: metadata.version(name) for name in PACKAGES if has(name)}
     return {"sysid-workbench": sysid.__version__, "python": platform.python_version(), **packages}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ class OnnxExporter(AbstractExporter):
         dtype: ``"float64"`` or ``"float32"``, of inputs, outputs and arithmetic; it stands in the file name if
             it is not the first.
     """
+
+    packages: ClassVar[tuple[str, ...]] = ("onnx", "onnxruntime")
 
     name: str = "onnx"
     dtype: str = "float64"
@@ -45,6 +47,7 @@ class OnnxExporter(AbstractExporter):
 
     def load(self, file: ExportedFile, folder: Path) -> Runner:
         """Open the file in onnxruntime on one thread: the graph is a chain of small steps."""
+        self.check()
         import onnxruntime
 
         options = onnxruntime.SessionOptions()

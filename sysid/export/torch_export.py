@@ -10,7 +10,7 @@ import io
 import json
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ class TorchExportExporter(AbstractExporter):
     """Writes ``step.pt2``."""
 
     name = "torch-export"
+    packages: ClassVar[tuple[str, ...]] = ("torch",)
 
     def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
         """Export the step for any number of cars."""
@@ -49,6 +50,7 @@ class TorchExportExporter(AbstractExporter):
 
     def load(self, file: ExportedFile, folder: Path) -> Runner:
         """Load the program on the CPU. Its graph can compute, but not reach the file system or network."""
+        self.check()
         import torch
 
         module = torch.export.load(folder / file.name).module()

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ def _forget_scripted_classes() -> None:
 class TorchScriptExporter(AbstractExporter):
     """Writes ``step.torchscript.pt`` and ``sequence.torchscript.pt``, zip files of code and tensors."""
 
+    packages: ClassVar[tuple[str, ...]] = ("torch",)
+
     name: str = "torchscript"
 
     def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
@@ -66,6 +68,7 @@ class TorchScriptExporter(AbstractExporter):
 
     def load(self, file: ExportedFile, folder: Path) -> Runner:
         """Load the file on the CPU. TorchScript code can compute, but not reach the file system or network."""
+        self.check()
         import torch
 
         with _deprecation_known():

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, UserError
+from sysid.extras import need
 from sysid.ingest.headers import parse_header
 from sysid.names import csv_cell
 from sysid.traces import Channel, Trace
@@ -88,11 +89,13 @@ def write_parquet(trace: Trace, path: str | Path) -> Path:
 
     Raises:
         UserError: If the file cannot be written.
+        MissingExtraError: If pyarrow is not installed.
     """
+    path = Path(path)
+    need("pyarrow", f"writing {path.name}")
     import pyarrow as pa
     from pyarrow import parquet
 
-    path = Path(path)
     described = [Channel(name="time", unit="s"), *trace.channels]
     arrays = [values for _, values in _columns(trace)]
     if trace.usable is not None:

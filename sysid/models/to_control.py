@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.extras import need
 from sysid.models.mapping import Mapping
 from sysid.names import distinct, signal_name
 
@@ -49,6 +50,7 @@ def transfer_function(ratios: Sequence[Polynomials], mapping: Mapping, sample_ti
     Returns:
         One row, one column per input. The polynomials of many poles carry fewer digits than :func:`state_space`.
     """
+    need("control", "an object of python-control")
     import control
 
     return control.TransferFunction(
@@ -68,6 +70,7 @@ def state_space(model: Linear) -> Any:
     Returns:
         The state space, with the model's sample time.
     """
+    need("control", "an object of python-control")
     import control
 
     A, B, C, D = model.matrices
@@ -91,6 +94,7 @@ def delayed(ratio: Polynomials, seconds: float, order: int) -> Polynomials:
     Returns:
         The two as one.
     """
+    need("control", "an object of python-control")
     import control
 
     if not seconds:

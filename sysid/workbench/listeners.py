@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from sysid.extras import has
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.dry_run import PlannedStep
 from sysid.workbench.runner.events import Warned, Watcher
@@ -21,6 +22,8 @@ from sysid.workbench.tracking.listener import Tracker
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
+
+UNTRACKED = 'Not tracked in MLflow, which is not installed: pip install "sysid-workbench[mlflow]"'
 
 
 def typed_command(verb: str, pipeline: str, out: Path | None) -> str:
@@ -50,12 +53,14 @@ class Listeners:
         screen: Its steps and their progress.
         log: Writes the steps down in the run folder.
         tracker: MLflow; ``None`` where the run is not tracked.
+        untracked: Why it is not tracked, where that was not asked for.
     """
 
     target: Console
     screen: Screen
     log: LogFile
     tracker: Tracker | None
+    untracked: str = ""
 
     @classmethod
     def of(cls, *, tracking: bool) -> Listeners:
@@ -74,8 +79,10 @@ class Listeners:
             for watch in (screen, log):
                 watch(Warned(text=text))
 
-        tracker = Tracker.of_workspace(Path.cwd(), warn) if tracking else None
-        return cls(target=target, screen=screen, log=log, tracker=tracker)
+        there = has("mlflow")
+        tracker = Tracker.of_workspace(Path.cwd(), warn) if tracking and there else None
+        untracked = UNTRACKED if tracking and not there else ""
+        return cls(target=target, screen=screen, log=log, tracker=tracker, untracked=untracked)
 
     @property
     def watchers(self) -> list[Watcher]:
@@ -102,6 +109,8 @@ class Listeners:
                 "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
             )
             return 1
+        if self.untracked:
+            self.target.print(self.untracked, soft_wrap=True, markup=False)
         if self.tracker is not None and closing.compare:
             self.target.print(f"{'Compare:':<9}sysid ui")
         return 0

@@ -38,7 +38,13 @@ def metrics(fit, traces, start):
 def bundle(fit, traces, start, metrics, tmp_path_factory):
     folder = tmp_path_factory.mktemp("workspace") / "bundle"
     return export_bundle(
-        fit, traces, folder, start=start, metrics=metrics, provenance={"pipeline": "synthetic", "command": "sysid run"}
+        fit,
+        traces,
+        folder,
+        start=start,
+        metrics=metrics,
+        formats=["onnx", "torchscript"],
+        provenance={"pipeline": "synthetic", "command": "sysid run"},
     )
 
 
@@ -135,7 +141,15 @@ def test_card_names_every_trace_with_its_hash_and_every_figure(bundle, traces, m
 
 def test_same_fit_gives_the_same_bytes(*, bundle, fit, traces, start, metrics, tmp_path):
     provenance = {"pipeline": "synthetic", "command": "sysid run"}
-    again = export_bundle(fit, traces, tmp_path / "again", start=start, metrics=metrics, provenance=provenance)
+    again = export_bundle(
+        fit,
+        traces,
+        tmp_path / "again",
+        start=start,
+        metrics=metrics,
+        formats=["onnx", "torchscript"],
+        provenance=provenance,
+    )
     assert content(again.folder) == content(bundle.folder)
 
 

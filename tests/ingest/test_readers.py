@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import gc
 from collections.abc import Callable
 from pathlib import Path
@@ -123,39 +122,26 @@ def test_a_file_that_breaks_off_is_refused_or_read_as_far_as_it_goes(
 
 
 @pytest.mark.parametrize(
-    ("package", "extra", "name"),
-    [("asammdf", "mdf", "run.mf4"), ("nptdms", "tdms", "run.tdms")],
-    ids=["mdf", "tdms"],
+    ("package", "extra", "record"),
+    [
+        pytest.param("asammdf", "mdf", ("run.mf4", b"anything"), id="mdf"),
+        pytest.param("nptdms", "tdms", ("run.tdms", b"anything"), id="tdms"),
+        pytest.param("matio", "matlab", ("run.mat", b"MATLAB 5.0 MAT-file".ljust(200)), id="matlab"),
+        pytest.param("h5py", "hdf5", ("run.h5", b"\x89HDF\r\n\x1a\n"), id="hdf5"),
+        pytest.param("pyarrow", "parquet", ("run.parquet", b"PAR1"), id="parquet"),
+        pytest.param("pyarrow", "parquet", ("run.feather", b"ARROW1"), id="feather"),
+        pytest.param("openpyxl", "excel", ("run.xlsx", b"PK\x03\x04"), id="xlsx"),
+        pytest.param("xlrd", "excel", ("run.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"), id="xls"),
+    ],
 )
 def test_a_missing_extra_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str, extra: str, name: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str, extra: str, record: tuple[str, bytes]
 ) -> None:
-    (tmp_path / name).write_bytes(b"anything")
-    real = builtins.__import__
-
-    def without(module: str, *args: object, **kwargs: object) -> object:
-        if module.split(".", maxsplit=1)[0] == package:
-            raise ImportError(module)
-        return real(module, *args, **kwargs)  # type: ignore[arg-type]  # passed on unchanged
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(MissingExtraError, match=rf"sysid-workbench\[{extra}\]"):
+    name, content = record
+    (tmp_path / name).write_bytes(content)
+    monkeypatch.setattr("sysid.extras.has", lambda asked: asked != package)
+    with pytest.raises(MissingExtraError, match=rf"(?s){package}.*sysid-workbench\[{extra}\]"):
         read_table(tmp_path / name)
-
-
-@pytest.mark.parametrize(
-    ("package", "content"), [("openpyxl", b"PK\x03\x04"), ("xlrd", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")]
-)
-def test_a_missing_reader_of_workbooks_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str, content: bytes
-) -> None:
-    import importlib.util
-
-    (tmp_path / "run.xls").write_bytes(content)
-    real = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else real(name))
-    with pytest.raises(MissingExtraError, match=rf"(?s){package}.*sysid-workbench\[excel\]"):
-        read_table(tmp_path / "run.xls")
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.extras import need
 from sysid.ingest.headers import Header, parse_header
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_claim
@@ -48,6 +49,7 @@ def _ipc(path: Path) -> tuple[Any, int, Iterator[Any]]:
 
 def _reads(kind: str, opened: Callable[[Path], tuple[Any, int, Iterator[Any]]]) -> Callable[..., RawTable]:
     def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
+        need("pyarrow", f"reading {path.name}")
         import pyarrow as pa
 
         try:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
+from sysid.extras import has
 from sysid.ingest.calendar import Calendar
 from sysid.ingest.numbers import MISSING, NumberFormat
 from sysid.ingest.options import RepairOptions
@@ -217,7 +218,7 @@ class Body:
     def _plain(self, block: Block) -> bool:
         """Read a block by Arrow, if every one of its lines is a row and every cell is what its column holds."""
         numbers = self.layout.numbers
-        if len(block.data) < _PLAIN_FROM or numbers.thousands is not None or numbers.states:
+        if len(block.data) < _PLAIN_FROM or numbers.thousands is not None or numbers.states or not has("pyarrow"):
             return False
         import pyarrow as pa
         from pyarrow import csv as arrow_csv

@@ -6,7 +6,6 @@ In each sheet the header is the last row before the numbers, with a row of units
 from __future__ import annotations
 
 import datetime
-import importlib.util
 import io
 import warnings
 from collections.abc import Sequence
@@ -17,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import MissingExtraError, ReaderError
+from sysid.errors import ReaderError
+from sysid.extras import need
 from sysid.ingest.headers import Header, is_unit, parse_header, split_reference
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_zip, too_large
@@ -33,8 +33,7 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     with path.open("rb") as file:
         modern = file.read(4) == _ZIP
     engine = "openpyxl" if modern else "xlrd"
-    if importlib.util.find_spec(engine) is None:
-        raise MissingExtraError(engine, "excel", f"reading {path.name}")
+    need(engine, f"reading {path.name}")
     sheets = _sheets(path, engine)
     tables: dict[str, RawTable] = {}
     problem: ReaderError | None = None

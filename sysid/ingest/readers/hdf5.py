@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
+from sysid.extras import need
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.leaves import Leaf, step_in
@@ -66,6 +67,7 @@ def check_claims(path: Path) -> None:
     Raises:
         ReaderError: If they do, or it is no whole HDF5 file.
     """
+    need("h5py", f"reading {path.name}")
     import h5py
 
     shapes: list[tuple[str, tuple[int, ...]]] = []
@@ -91,6 +93,7 @@ def is_of_matlab(path: Path) -> bool:
     Returns:
         True if all of its variables say so.
     """
+    need("h5py", f"reading {path.name}")
     import h5py
 
     try:
@@ -102,6 +105,7 @@ def is_of_matlab(path: Path) -> bool:
 
 
 def _hdf5_tree(path: Path) -> tuple[dict[str, Any], dict[str, str], list[str]]:
+    need("h5py", f"reading {path.name}")
     import h5py
 
     check_claims(path)

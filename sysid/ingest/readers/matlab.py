@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import ReaderError
+from sysid.extras import need
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers import hdf5
 from sysid.ingest.readers.bounds import check_claim
@@ -79,6 +80,7 @@ def _is_hdf5(path: Path) -> bool:
 
 
 def _load(path: Path) -> dict[str, Any]:
+    need("matio", f"reading {path.name}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it sets an option of pandas that is on its way out
         from matio import load_from_mat, whosmat

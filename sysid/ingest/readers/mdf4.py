@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import MissingExtraError, ReaderError
+from sysid.errors import ReaderError
+from sysid.extras import need
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.joining import Signal, joined_signals
 from sysid.ingest.readers.reader import Reader, damaged, silent
@@ -18,10 +19,8 @@ _MARKS = (b"MDF     ", b"UnFinMF ")
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
-    try:
-        from asammdf import MDF
-    except ImportError as error:
-        raise MissingExtraError("asammdf", "mdf", f"reading {path.name}") from error
+    need("asammdf", f"reading {path.name}")
+    from asammdf import MDF
 
     with path.open("rb") as raw:
         mark = raw.read(8)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import MissingExtraError, ReaderError
+from sysid.errors import ReaderError
+from sysid.extras import need
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.joining import Signal, joined_signals
 from sysid.ingest.readers.leaves import Leaf
@@ -18,10 +19,8 @@ from sysid.ingest.table import RawTable
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
-    try:
-        from nptdms import TdmsFile
-    except ImportError as error:
-        raise MissingExtraError("npTDMS", "tdms", f"reading {path.name}") from error
+    need("nptdms", f"reading {path.name}")
+    from nptdms import TdmsFile
 
     try:
         with silent():

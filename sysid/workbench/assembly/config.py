@@ -105,7 +105,7 @@ class AssemblyConfig(Words):
     published_whole: str | None = None
     ablation: AblationConfig = AblationConfig()
     seed: int = Field(default=0, ge=0)
-    export: ExportConfig | None = ExportConfig(formats=("onnx", "c"))
+    export: ExportConfig | None = ExportConfig()
 
     @property
     def composite(self) -> Composite:

@@ -12,6 +12,7 @@ from sysid.composite.keeper import Decision
 from sysid.composite.limits_held import holding
 from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
 from sysid.composite.training import TrainedComposite
+from sysid.export.exporters import wanted_formats
 from sysid.models import Cascade
 from sysid.reporting.assembly.results import AssemblyResults
 from sysid.traces import Trace, TraceSet
@@ -29,6 +30,7 @@ from sysid.workbench.runner.store import digest, strict, write_json
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
+    from sysid.workbench.fits.config import ExportConfig
 
 ASSEMBLY, LINE = "assembly.json", "line.json"
 """In the run folder: the chosen whole, and its line."""
@@ -37,8 +39,22 @@ SCORING = Outlined(name="scoring", title="Scoring every stage")
 WHOLE = Outlined(name="assembly", title="Choosing the stage that does best", called="assembly")
 MONTE_CARLO = Outlined(name="monte_carlo", title="Running the whole on random sequences")
 INTERPOLATION = Outlined(name="interpolation", title="Running every position of the line")
-EXPORT = Outlined(name="export", title="Exporting the assembly")
 MEMBERS = Outlined(name="member-scores", title="Scoring the members alone")
+
+
+def export_step(asked: ExportConfig) -> Outlined:
+    """The step that exports the whole.
+
+    Args:
+        asked: What leaves the workbench.
+
+    Returns:
+        Its title names the formats.
+
+    Raises:
+        UserError: If a format cannot be written here.
+    """
+    return Outlined(name="export", title=f"Exporting the assembly as {wanted_formats(asked.formats)}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -195,6 +211,7 @@ class Evaluating:
         asked = self.context.config.export
         if asked is None:
             return None
+        formats = wanted_formats(asked.formats).names
         provenance = {
             "pipeline": self.context.config.name,
             "command": self.context.run.command,
@@ -208,14 +225,14 @@ class Evaluating:
         def make(_: Work) -> Bundle:
             return export_bundle(
                 whole, cases, self.context.store.path / "bundle", outputs=self.context.config.outputs,
-                formats=asked.formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
+                formats=formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
             )  # fmt: skip
 
         def outcome(bundle: Bundle) -> str:
             worst = max((entry.largest_difference for entry in bundle.files), default=0.0)
             return f"{len(bundle.files)} files, at most {worst:.1e} off"
 
-        return self.context.compute(EXPORT, make, outcome=outcome)
+        return self.context.compute(export_step(asked), make, outcome=outcome)
 
     def _data(self, name: str) -> dict[str, str]:
         return {"name": name, "sha256": self.context.digests[name]}

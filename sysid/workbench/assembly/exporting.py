@@ -40,9 +40,14 @@ def export_model(
         ParityError: If a file differs from the model by more than the tolerance.
     """
     from sysid.export import export_bundle
+    from sysid.export.exporters import wanted_formats
 
     asked = config.export or ExportConfig()
-    shared: dict[str, Any] = {"formats": asked.formats, "tolerance": asked.tolerance, "provenance": provenance}
+    shared: dict[str, Any] = {
+        "formats": wanted_formats(asked.formats).names,
+        "tolerance": asked.tolerance,
+        "provenance": provenance,
+    }
     if isinstance(found, FitResult):
         # A member may read what is declared beside it.
         seen = TraceSet(

@@ -10,7 +10,7 @@ from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name,
 from sysid.names import slug, task_slug
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.estimates import RoundEstimates
-from sysid.workbench.assembly.evaluation import EXPORT, INTERPOLATION, MEMBERS, MONTE_CARLO, SCORING, WHOLE
+from sysid.workbench.assembly.evaluation import INTERPOLATION, MEMBERS, MONTE_CARLO, SCORING, WHOLE, export_step
 from sysid.workbench.fits.data import unmade_data
 from sysid.workbench.runner.run import REPORT
 from sysid.workbench.runner.steps import Estimate, Outlined
@@ -90,6 +90,6 @@ def _proof(config: AssemblyConfig, beside: Path) -> Iterator[Outlined]:
     if config.interpolation is not None:
         yield from (_loading(config.interpolation.data, beside), INTERPOLATION)
     if config.export is not None:
-        yield EXPORT
+        yield export_step(config.export)
     if config.warm_start is None:
         yield MEMBERS

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from sysid.composite import train
 from sysid.errors import ConfigError
+from sysid.export.exporters import wanted_formats
 from sysid.models import Cascade, cascade_from_dict
 from sysid.reporting.assembly.document import headline
 from sysid.reporting.assembly.results import AssemblyResults
@@ -64,6 +65,8 @@ def _run(context: Context, estimates: RoundEstimates) -> AssemblyResults:
     config, notes = context.config, list[str]()
     if config.published_models is not None:
         read_published(config.published_models)  # a wrong name is said now, not when all is trained
+    if config.export is not None:
+        wanted_formats(config.export.formats)  # nor a format that cannot be written here
     cases = context.load(config.data)
     context.cases.append(cases)
     data, begin = AssemblyData.of(context), None

@@ -84,7 +84,7 @@ class ExportConfig(BaseModel):
 
     Args:
         fit: Name of a fit, or ``best``: least free-run error on the selection traces.
-        formats: File formats.
+        formats: File formats; by default ONNX and C, as far as they can be written here.
         tolerance: Largest difference allowed between a file and its model, in the output's unit.
         run_times: Whether every file is timed beside the model's own free run; some seconds a format.
     """
@@ -92,7 +92,7 @@ class ExportConfig(BaseModel):
     model_config = STRICT
 
     fit: str = "best"
-    formats: tuple[FormatField, ...] = ("onnx", "torchscript")
+    formats: tuple[FormatField, ...] | None = None
     tolerance: float = Field(default=1e-9, gt=0.0)
     run_times: bool = False
 

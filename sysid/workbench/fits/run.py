@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import seedless
+from sysid.export.exporters import wanted_formats
 from sysid.reporting.published.tables import read_published
 from sysid.reporting.results import Results, parse_results
 from sysid.reporting.sweep_record import has_sweep, read_sweep
@@ -222,6 +223,8 @@ class FitSteps:
         Returns:
             The contents of ``results.json``.
         """
+        if self.config.export is not None:
+            wanted_formats(self.config.export.formats)  # what cannot be written is said now, not when all is fitted
         return self._run(run, loaded or run.do(self.loading()))
 
     def _run(self, run: Run, loaded: Done[Data]) -> Results:
@@ -336,7 +339,9 @@ class FitSteps:
 
         def outcome(exports: Sequence[Mapping[str, Any]]) -> str:
             worst = max((float(entry["largest_difference"]) for entry in exports), default=0.0)
-            return f"{len(exports)} files, at most {worst:.1e} {unit} from the model"
+            return (
+                f"{len(exports)} {'file' if len(exports) == 1 else 'files'}, at most {worst:.1e} {unit} from the model"
+            )
 
         return Step(
             name="export",
@@ -352,8 +357,8 @@ class FitSteps:
         )
 
     def _exporting(self, name: str) -> str:
-        formats = self.config.export.formats if self.config.export else ()
-        return f"Exporting {name} as {', '.join(formats)}"
+        asked = self.config.export or ExportConfig()
+        return f"Exporting {name} as {wanted_formats(asked.formats)}"
 
     def _announce(self, run: Run, loaded: Done[Data], fitted: Mapping[str, _Fitted], name: str) -> None:
         """Tell of a fit; a killed run leaves results.json with what is finished, not with what an older run had."""

@@ -19,6 +19,7 @@ from sysid.code_digest import code_digest
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
 from sysid.estimation.estimators import estimator_of
+from sysid.export.exporters import wanted_formats
 from sysid.models import AbstractStructure
 from sysid.traces import Role
 from sysid.validation import Evaluation, evaluate, evaluate_case
@@ -239,6 +240,8 @@ def export_key(scores: str, config: PipelineConfig) -> str:
         64 hexadecimal digits.
     """
     export = None if config.export is None else config.export.model_dump(mode="json", exclude={"fit"})
+    if export is not None and config.export is not None:
+        export["formats"] = list(wanted_formats(config.export.formats).names)
     files = ("sysid/export/templates", "sysid/export/fmi_headers", "sysid/export/schemas")
     code = code_digest("sysid.export:export_bundle", "sysid.models:model_from_dict", files=files)
     return digest({"scores": scores, "export": export, "code": code})
@@ -273,7 +276,7 @@ def export(
         data.traces,
         folder,
         start=config.start,
-        formats=config.export.formats,
+        formats=wanted_formats(config.export.formats).names,
         tolerance=config.export.tolerance,
         metrics=scores.evaluation,
         provenance=provenance,

@@ -17,14 +17,23 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-import optuna
-from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
-from optuna.trial import TrialState, create_trial
 
 from sysid.errors import ConfigError
+from sysid.extras import need
 from sysid.reporting.sweep_record import FIGURES, SweepRecord, Trial
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.search_space import Point, Space
+
+need("optuna", "a sweep")
+
+import optuna  # noqa: E402 - after it was looked for
+from optuna.distributions import (  # noqa: E402 - as above
+    BaseDistribution,
+    CategoricalDistribution,
+    FloatDistribution,
+    IntDistribution,
+)
+from optuna.trial import TrialState, create_trial  # noqa: E402 - as above
 
 KEY = "sysid.key"
 """Attribute of an Optuna trial that holds the trial's digest."""

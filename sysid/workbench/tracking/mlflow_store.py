@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.extras import need
 from sysid.names import read_sides, slug, told_apart, tracking_text
 from sysid.traces import TraceSet
 from sysid.workbench.runner.events import FitReady
@@ -61,9 +62,13 @@ def connect(uri: str) -> Any:
 
     Returns:
         An ``MlflowClient``.
+
+    Raises:
+        MissingExtraError: If MLflow is not installed.
     """
     for name, value in QUIET.items():
         os.environ.setdefault(name, value)
+    need("mlflow", "tracking, and what is done with tracked models,")
     with no_deprecations():
         from mlflow import MlflowClient
 
