@@ -24,7 +24,7 @@ BAD_PIPELINES = {
     "a missing order": ("na: 2, ", ""),
     "a misspelt option": ("max_iterations", "max_iteration"),
     "an unknown kind": ("name: tank", "kind: dance\nname: tank"),
-    "an unknown format": ("torchscript", "exe"),
+    "an unknown format": ("{fit: best}", "{formats: [exe]}"),
 }
 
 
