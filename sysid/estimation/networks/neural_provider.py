@@ -134,6 +134,11 @@ class NeuralProvider(AbstractProvider):
 
     def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
+        # A random start whose free run explodes has none; it is not told as a warning, the engine sees it.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._linearised(theta)
+
+    def _linearised(self, theta: NDArray[np.float64]) -> Linearisation:
         gradient, matrix = np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
         loss, correlated = 0.0, 0.0
         for record in self._records:
