@@ -17,8 +17,10 @@ __version__ = "0.1.0"
 
 WORDS = (
     *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
-    *("OrderSearch", "ARX", "NARX", "NeuralStateSpace", "TransferFunction", "VectorNARX"),
-    *("Training", "JointTraining", "TransferFunctionTraining", "StabilityOptions", "Start", "Role"),
+    *("OrderSearch", "ARX", "ARMAX", "OE", "BJ", "LinearStateSpace", "TransferFunction"),
+    *("NARX", "NeuralStateSpace", "VectorNARX"),
+    *("Training", "JointTraining", "TransferFunctionTraining", "StateSpaceTraining", "PolynomialTraining"),
+    *("StabilityOptions", "Start", "Role"),
 )
 """What is imported when it is first used: ``sysid --help`` loads none of it."""
 

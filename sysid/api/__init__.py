@@ -22,11 +22,30 @@ from sysid.api.fits import Fit, SystemFit
 from sysid.api.fitting import fit, load
 from sysid.api.orders import OrderSearch, search_orders
 from sysid.api.saving import read_bundle, save
-from sysid.estimation import JointTraining, StabilityOptions, Training, TransferFunctionTraining
+from sysid.estimation import (
+    JointTraining,
+    PolynomialTraining,
+    StabilityOptions,
+    StateSpaceTraining,
+    Training,
+    TransferFunctionTraining,
+)
 from sysid.ingest.arrays import data
-from sysid.models import ARX, NARX, NeuralStateSpace, Start, TransferFunction, VectorNARX
+from sysid.models import (
+    ARMAX,
+    ARX,
+    BJ,
+    NARX,
+    OE,
+    LinearStateSpace,
+    NeuralStateSpace,
+    Start,
+    TransferFunction,
+    VectorNARX,
+)
 from sysid.traces import Role
 
 __all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "OrderSearch", "Role", "StabilityOptions", "Start"]
+__all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining"]
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
 __all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]

@@ -4,6 +4,9 @@ from sysid.estimation.attempts import Attempt
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
 from sysid.estimation.linear.instrumental import fit_iv4
+from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
+from sysid.estimation.linear.state_space.fit import fit_state_space
+from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
 from sysid.estimation.networks.joint import CascadeFit, JointTraining
@@ -27,9 +30,11 @@ __all__ = [
     "JointTraining",
     "Loop",
     "OperatingPoint",
+    "PolynomialTraining",
     "Posterior",
     "Spectrum",
     "StabilityOptions",
+    "StateSpaceTraining",
     "Status",
     "Training",
     "TransferFunctionTraining",
@@ -39,7 +44,9 @@ __all__ = [
     "fit_iv4",
     "fit_narx",
     "fit_neural_state_space",
+    "fit_polynomial",
     "fit_spectra",
+    "fit_state_space",
     "fit_transfer_function",
     "fit_vector_narx",
     "with_upstream_outputs",

@@ -20,6 +20,9 @@ from sysid.errors import ConfigError
 from sysid.estimation.equilibrium import equilibrium_notes
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
+from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
+from sysid.estimation.linear.state_space.fit import fit_state_space
+from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
 from sysid.estimation.networks.joint import JointTraining
@@ -37,10 +40,14 @@ from sysid.estimation.stability.check import (
     StabilityOptions,
 )
 from sysid.models import (
+    ARMAX,
     ARX,
+    BJ,
     NARX,
+    OE,
     AbstractModel,
     AbstractStructure,
+    LinearStateSpace,
     Mapping,
     NeuralStateSpace,
     Start,
@@ -49,7 +56,7 @@ from sysid.models import (
 )
 from sysid.traces import Trace
 
-Options = Training | JointTraining | TransferFunctionTraining
+Options = Training | JointTraining | TransferFunctionTraining | StateSpaceTraining | PolynomialTraining
 """What some estimator takes."""
 
 
@@ -261,6 +268,25 @@ ESTIMATORS: dict[str, Estimator] = {
             "free run, and its residuals need not be white, only independent of the inputs.",
             begins=LINEAR_START,
             stability=PoleCheck,
+        ),
+        Estimator(
+            structure=LinearStateSpace,
+            name="a linear state space",
+            fit=fit_state_space,
+            training=StateSpaceTraining,
+            begins=LINEAR_START,
+            stability=PoleCheck,
+        ),
+        *(
+            Estimator(
+                structure=structure,
+                name=name,
+                fit=fit_polynomial,
+                training=PolynomialTraining,
+                begins=LINEAR_START,
+                stability=PoleCheck,
+            )
+            for structure, name in ((OE, "an OE model"), (BJ, "a Box-Jenkins model"), (ARMAX, "an ARMAX model"))
         ),
         Estimator(
             structure=VectorNARX,

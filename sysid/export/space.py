@@ -72,6 +72,11 @@ class SpaceCell:
     def linear(cls, form: StateSpace, ends: Ends) -> SpaceCell:
         """A linear state space: no neurons, no bound."""
         n, row = form.n_state, form.n_state + form.n_inputs
+        units, none = np.eye(form.n_inputs), np.zeros(form.n_inputs)
+        gain, rest = [form.equilibrium(unit) for unit in units], np.zeros(n)
+        if form.K is not None:
+            rest = form.standing(none, 0.0)
+            gain = [*(form.standing(unit, 0.0) - rest for unit in units), form.standing(none, 1.0) - rest]
         return cls(
             ends=ends,
             form=form,
@@ -84,8 +89,8 @@ class SpaceCell:
             cubic=False,
             rectified=False,
             bound=np.inf,
-            gain=np.column_stack([form.equilibrium(unit) for unit in np.eye(form.n_inputs)]),
-            rest=np.zeros(n),
+            gain=np.column_stack(gain) if gain else np.zeros((n, 0)),
+            rest=rest,
         )
 
     @classmethod

@@ -10,13 +10,16 @@ from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.ends import Ends
 from sysid.models.form import AbstractForm
 from sysid.models.history import History, Start, StartKind
+from sysid.models.innovations import Innovations
 from sysid.models.interpolation import Line
 from sysid.models.lags import Lagged, Lags
+from sysid.models.linear_state_space import LinearStateSpace, LinearStateSpaceModel
 from sysid.models.mapping import Mapping
 from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_form import NeuralForm
 from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
 from sysid.models.orthonormal_basis import Domain
+from sysid.models.polynomial import ARMAX, BJ, OE, PolynomialModel
 from sysid.models.recursion import Recursion, parameter_count
 from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_space import StateSpace
@@ -27,8 +30,11 @@ from sysid.models.vector_recursion import VectorRecursion
 from sysid.models.wiring import Member, Wiring
 
 __all__ = [
+    "ARMAX",
     "ARX",
+    "BJ",
     "NARX",
+    "OE",
     "ARXModel",
     "AbstractForm",
     "AbstractModel",
@@ -40,16 +46,20 @@ __all__ = [
     "Domain",
     "Ends",
     "History",
+    "Innovations",
     "Lagged",
     "Lags",
     "Limit",
     "Line",
+    "LinearStateSpace",
+    "LinearStateSpaceModel",
     "Mapping",
     "Member",
     "NARXModel",
     "NeuralForm",
     "NeuralStateSpace",
     "NeuralStateSpaceModel",
+    "PolynomialModel",
     "Recursion",
     "Scaling",
     "SeveralOutputs",

@@ -1,4 +1,4 @@
-"""The form that transfer functions lower to: a linear state space, run by the compiled kernel."""
+"""The form that linear models with hidden states lower to: a state space, run by the compiled kernel."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import TraceError
+from sysid.kernels import innovations
 from sysid.kernels import linear as kernel
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
@@ -46,6 +47,8 @@ class StateSpace(AbstractForm):
         C: Shape ``(n_state,)``.
         D: Shape ``(n_inputs,)``.
         constant: Output without inputs.
+        K: Gain from the innovation ``y - yhat`` to the state, shape ``(n_state,)``, with which the output one step
+            ahead is predicted; ``None`` where the noise is added to the output and predicts nothing.
         scaling: Between units and scaled numbers.
         low: Lower bound of the output in scaled numbers; ``-inf`` for none.
         high: Upper bound of the output in scaled numbers; ``inf`` for none.
@@ -59,7 +62,11 @@ class StateSpace(AbstractForm):
     scaling: Scaling
     low: float = -np.inf
     high: float = np.inf
+    K: NDArray[np.float64] | None = None
     predicts: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "predicts", self.K is not None)
 
     @property
     def n_state(self) -> int:
@@ -74,7 +81,8 @@ class StateSpace(AbstractForm):
     @property
     def numbers(self) -> NDArray[np.float64]:
         """All matrices and the constant, flat."""
-        return np.concatenate([self.A.ravel(), self.B.ravel(), self.C, self.D, [self.constant]])
+        gain = np.zeros(0) if self.K is None else self.K
+        return np.concatenate([self.A.ravel(), self.B.ravel(), self.C, self.D, [self.constant], gain])
 
     def state(self, history: History) -> NDArray[np.float64]:
         """The state after some samples.
@@ -115,7 +123,13 @@ class StateSpace(AbstractForm):
         return float(np.abs(linalg.eigvals(self.A)).max(initial=0.0)) if self.n_state else 0.0
 
     def _resting(self, inputs: NDArray[np.float64], output: float) -> NDArray[np.float64]:
-        """Equilibrium at scaled inputs, with the output where the model leaves it open."""
+        """Equilibrium at scaled inputs, with the output where the model leaves it open.
+
+        With a model of the noise it is the filter's state after that output and these inputs stood for ever: like a
+        recursion over past outputs, the free run then begins at the output that is declared.
+        """
+        if self.K is not None:
+            return self.standing(inputs, output)
         x = self.equilibrium(inputs)
         if abs(self._radius - 1.0) > AT_ONE:
             return x
@@ -137,6 +151,20 @@ class StateSpace(AbstractForm):
             return np.zeros(0)
         return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A, self.B @ inputs, cond=AT_ONE)[0])
 
+    def standing(self, inputs: NDArray[np.float64], output: float) -> NDArray[np.float64]:
+        """The filter's state after scaled inputs and a scaled output that have stood for ever.
+
+        Args:
+            inputs: Shape ``(n_inputs,)``.
+            output: The output.
+
+        Returns:
+            Shape ``(n_state,)``.
+        """
+        K = np.zeros(self.n_state) if self.K is None else self.K
+        drive = self.B @ inputs + K * (output - float(self.D @ inputs) - self.constant)
+        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A + np.outer(K, self.C), drive, cond=AT_ONE)[0])
+
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""
         scaled = self._checked(inputs)
@@ -144,14 +172,46 @@ class StateSpace(AbstractForm):
         return self.scaling.unscale_output(np.clip(y, self.low, self.high))
 
     def predict(
-        self,
-        inputs: NDArray[np.float64],  # noqa: ARG002 - nothing is predicted from any of them
-        output: NDArray[np.float64],  # noqa: ARG002
-        history: History,  # noqa: ARG002
-        steps: int,  # noqa: ARG002
+        self, inputs: NDArray[np.float64], output: NDArray[np.float64], history: History, steps: int
     ) -> NDArray[np.float64]:
-        """None: the noise is added to the output, and says nothing about the next; see the base class."""
-        raise no_prediction("a transfer function")
+        """Prediction by the Kalman filter; see the base class. An output that is not a number moves nothing.
+
+        With the state ``x(t + 1 | t)`` that the filter has, ``x(t + k | t)`` follows by the free run over ``k - 1``
+        steps. Of the first ``k`` samples nothing is measured in time: they are the free run from the history.
+        """
+        if self.K is None:
+            raise no_prediction("a linear model without a model of its noise")
+        scaled, n = self._checked(inputs), len(inputs)
+        measured = self.scaling.scale_output(np.asarray(output, dtype=np.float64))
+        x = self._filtered(history)
+        start = x.copy()
+        X, _ = self._tracked(scaled, measured, x)
+        moved = scaled @ self.B.T
+        for _ in range(min(steps, n) - 1):
+            X[1:] = X[:-1] @ self.A.T + moved[:-1]
+            X[0] = start
+        y = X @ self.C + scaled @ self.D + self.constant
+        return self.scaling.unscale_output(np.clip(y, self.low, self.high))
+
+    def _filtered(self, history: History) -> NDArray[np.float64]:
+        """The state after some samples by the Kalman filter, from the one that fits them best."""
+        x = self._begun(history)
+        if len(history.output) > 1:
+            measured = np.where(history.known, self.scaling.scale_output(history.output), np.nan)
+            self._tracked(self._checked(history.inputs), measured, x)
+        return x
+
+    def _tracked(
+        self, scaled: NDArray[np.float64], output: NDArray[np.float64], x: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The filter's states and predictions over some scaled samples; ``x`` becomes the state after them."""
+        gain = np.zeros(self.n_state) if self.K is None else self.K
+        states, predicted = np.empty((len(scaled), self.n_state)), np.empty((len(scaled), 1))
+        innovations.predict(
+            self.A, self.B, self.C[np.newaxis], self.D[np.newaxis], np.ascontiguousarray(gain[:, np.newaxis]),
+            np.array([self.constant]), scaled, np.ascontiguousarray(output[:, np.newaxis]), x, states, predicted,
+        )  # fmt: skip
+        return states, predicted[:, 0]
 
     def _run(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled output over some scaled inputs; ``x`` becomes the state after them."""

@@ -10,21 +10,24 @@ from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_program import Limit
+from sysid.models.linear_state_space import LinearStateSpace, LinearStateSpaceModel
 from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
+from sysid.models.polynomial import POLYNOMIALS, PolynomialModel
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
 from sysid.models.vector_narx import VectorNARX, VectorNARXModel
 
-_KINDS: dict[str, tuple[type[AbstractStructure], type[AbstractModel]]] = {
-    structure.kind: (structure, model)
-    for structure, model in (
-        (ARX, ARXModel),
-        (NARX, NARXModel),
-        (NeuralStateSpace, NeuralStateSpaceModel),
-        (TransferFunction, TransferFunctionModel),
-        (VectorNARX, VectorNARXModel),
-    )
-}
+_PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
+    (ARX, ARXModel),
+    (NARX, NARXModel),
+    (NeuralStateSpace, NeuralStateSpaceModel),
+    (TransferFunction, TransferFunctionModel),
+    (LinearStateSpace, LinearStateSpaceModel),
+    *((structure, PolynomialModel) for structure in POLYNOMIALS.values()),
+    (VectorNARX, VectorNARXModel),
+)
+
+_KINDS = {structure.kind: (structure, model) for structure, model in _PAIRS}
 """By kind the structure and its models."""
 
 

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 from pydantic import BaseModel, Field, PlainSerializer, PlainValidator, WithJsonSchema, create_model
 
 from sysid.errors import ConfigError, shortened
-from sysid.estimation import JointTraining, Training, TransferFunctionTraining
+from sysid.estimation import (
+    JointTraining,
+    PolynomialTraining,
+    StateSpaceTraining,
+    Training,
+    TransferFunctionTraining,
+)
 from sysid.estimation.estimators import ESTIMATORS, Estimator, estimator_of
 from sysid.export.exporters import EXPORTERS
 from sysid.models import AbstractStructure, Mapping, Start, StartKind, structure_from_dict
@@ -251,6 +257,12 @@ if TYPE_CHECKING:
     class TransferFunctionConfig(BaseModel):
         """Those of :class:`sysid.estimation.TransferFunctionTraining`."""
 
+    class StateSpaceConfig(BaseModel):
+        """Those of :class:`sysid.estimation.StateSpaceTraining`."""
+
+    class PolynomialConfig(BaseModel):
+        """Those of :class:`sysid.estimation.PolynomialTraining`."""
+
     class JointConfig(BaseModel):
         """Options of a cascade's training, field by field those of :class:`sysid.estimation.JointTraining`."""
 
@@ -267,14 +279,18 @@ else:
     TransferFunctionConfig = create_model(
         "TransferFunctionConfig", __config__=STRICT, **_fields_of(TransferFunctionTraining)
     )
+    StateSpaceConfig = create_model("StateSpaceConfig", __config__=STRICT, **_fields_of(StateSpaceTraining))
+    PolynomialConfig = create_model("PolynomialConfig", __config__=STRICT, **_fields_of(PolynomialTraining))
     JointConfig = create_model("JointConfig", __base__=_JointWords, **_fields_of(JointTraining))
 
-OptionsConfig = TrainingConfig | TransferFunctionConfig | JointConfig
+OptionsConfig = TrainingConfig | TransferFunctionConfig | StateSpaceConfig | PolynomialConfig | JointConfig
 """Options that some structure takes, as the YAML has them."""
 
 _OPTIONS: dict[type, type[BaseModel]] = {
     Training: TrainingConfig,
     TransferFunctionTraining: TransferFunctionConfig,
+    StateSpaceTraining: StateSpaceConfig,
+    PolynomialTraining: PolynomialConfig,
     JointTraining: JointConfig,
 }
 

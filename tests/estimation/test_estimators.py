@@ -45,7 +45,14 @@ def test_a_row_says_what_its_function_knows() -> None:
         "VectorNARX",
     }
     assert {kind for kind, row in ESTIMATORS.items() if row.resumes} == {"NARX"} == set(JOINING)
-    assert {kind for kind, row in ESTIMATORS.items() if row.linear} == {"ARX", "TransferFunction"}
+    assert {kind for kind, row in ESTIMATORS.items() if row.linear} == {
+        "ARX",
+        "TransferFunction",
+        "SS",
+        "OE",
+        "BJ",
+        "ARMAX",
+    }
 
 
 @pytest.mark.parametrize(("pole", "status"), [(0.9, Status.EXACT), (1.05, Status.UNSTABLE)])

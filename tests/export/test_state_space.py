@@ -15,18 +15,24 @@ from sysid.export import EXPORTERS, Surrogate, expected_flags, export_bundle, re
 from sysid.export.layout import layout_of
 from sysid.export.parity import largest_difference
 from sysid.models import (
+    BJ,
     NARX,
     AbstractModel,
     Cascade,
     Domain,
     History,
+    Innovations,
+    LinearStateSpace,
+    LinearStateSpaceModel,
     Mapping,
     NeuralStateSpace,
     NeuralStateSpaceModel,
+    PolynomialModel,
     Scaling,
     Start,
     TransferFunction,
 )
+from sysid.models.polynomial import AbstractPolynomial
 from sysid.models.transfer_function import TransferFunctionModel
 
 FORMATS = ("onnx", "torchscript", "torch-export", "c", "fmi2", "fmi3")
@@ -81,7 +87,33 @@ def build_neural(*, slowest: float = 0.97, **options) -> NeuralStateSpaceModel:
     )
 
 
+def build_innovations() -> LinearStateSpaceModel:
+    """Two slow states and a model of the noise, so that the state at rest depends on the output."""
+    rng = np.random.default_rng(7)
+    system = Innovations(
+        A=np.array([[0.97, 0.1], [-0.1, 0.97]]), B=0.1 * rng.normal(size=(2, 2)), C=rng.normal(size=(1, 2)),
+        D=0.1 * rng.normal(size=(1, 2)), K=np.array([[0.3], [0.1]]), constant=np.array([0.2]),
+    )  # fmt: skip
+    model = build()
+    return LinearStateSpaceModel(
+        orders=LinearStateSpace(states=2, feedthrough=True),
+        system=system,
+        **{name: getattr(model, name) for name in TERMS},
+    )
+
+
+def build_polynomial(orders: AbstractPolynomial, theta: list[float]) -> PolynomialModel:
+    model = build()
+    return PolynomialModel(orders=orders, theta=np.array(theta), **{name: getattr(model, name) for name in TERMS})
+
+
+TERMS = ("scaling", "mapping", "sample_time", "input_units", "output_unit", "rest_output")
+
 MODELS = {
+    "innovations": build_innovations,
+    "Box-Jenkins": lambda: build_polynomial(
+        BJ(nb=(1, 2), nc=1, nd=1, nf=(2, 1), nk=(3, 0)), [0.1, 0.2, -0.1, -1.8, 0.85, -0.9, 0.4, -0.9, 0.1]
+    ),
     "neural": lambda: build_neural(neurons=6),
     "neural, cubes, output neurons, absolute": lambda: build_neural(
         neurons=4, output_neurons=3, activation="cubic", output="absolute"

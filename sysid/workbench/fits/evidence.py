@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from sysid.errors import TraceError
 from sysid.estimation import FitResult
-from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
+from sysid.estimation.estimators import estimator_of
 from sysid.traces import Role
 from sysid.validation import analyse_residuals, judge_linearity
 from sysid.workbench.fits.config import PipelineConfig
@@ -55,7 +55,11 @@ def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:
     """
     usable = [ready for ready in fits if ready.fit.status.comparable]
     linear, networks = (
-        {ready.config.name: ready.evaluation for ready in usable if isinstance(ready.fit.model.structure, kinds)}
-        for kinds in ((ARX, TransferFunction), (NARX, NeuralStateSpace))
+        {
+            ready.config.name: ready.evaluation
+            for ready in usable
+            if estimator_of(ready.fit.model.structure).linear is asked
+        }
+        for asked in (True, False)
     )
     return judge_linearity(linear, networks).to_dict() if linear and networks else None

@@ -1,0 +1,1 @@
+"""Polynomial models: OE, Box-Jenkins, ARMAX, by the prediction error."""

@@ -1,0 +1,225 @@
+"""Polynomial models of traces, by the least prediction error."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from threadpoolctl import threadpool_limits
+
+from sysid.errors import ConfigError, FitDivergedError, TraceError
+from sysid.estimation.experiment import Experiment, experiments_of, unit_range
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.polynomial.chart import PolynomialChart
+from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start
+from sysid.estimation.linear.segments import Segment, segments_of
+from sysid.estimation.linear.state_space.provider import PredictionErrors
+from sysid.estimation.linear.state_space.search import flat_prior
+from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.uncertainty import Uncertainty
+from sysid.models import Mapping, Start
+from sysid.models.polynomial import AbstractPolynomial, PolynomialModel
+from sysid.traces import Trace
+
+Array = NDArray[np.float64]
+
+SHORT = 8
+"""Steps from every start, before the best one goes on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolynomialTraining:
+    """How a polynomial model is fitted.
+
+    Args:
+        max_iterations: Steps from the best start.
+        max_time_s: Wall time in seconds.
+        stable: Keep all poles inside the unit circle; ``None`` does so where the noise is not modelled, since the free
+            run of an unstable plant is then lost.
+        seed: Nothing is random; here so that all training has one.
+
+    Raises:
+        ConfigError: If a number is negative.
+    """
+
+    max_iterations: int = 100
+    max_time_s: float = float("inf")
+    stable: bool | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.max_iterations < 0:
+            raise ConfigError(
+                "max_iterations is negative", expected="0 or more", got=self.max_iterations, remedy="correct it"
+            )
+
+
+def fit_polynomial(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    orders: AbstractPolynomial,
+    training: PolynomialTraining | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+) -> FitResult:
+    """Fit OE, Box-Jenkins or ARMAX.
+
+    Args:
+        traces: Estimation traces; never concatenated, each with an initial state of its own.
+        mapping: Which channels go in, which comes out.
+        orders: The structure.
+        training: How to fit.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+
+    Returns:
+        The fit, with the uncertainty of its coefficients.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If there are fewer samples than parameters, or the orders do not fit the inputs.
+        FitDivergedError: If no start gives a finite prediction.
+    """
+    began, training = time.perf_counter(), training or PolynomialTraining()
+    orders.check_inputs(len(mapping.inputs))
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    experiments = experiments_of(traces, mapping, start or Start(), rest)
+    _check(orders, experiments)
+    scaling = unit_range(experiments)
+    segments = segments_of(experiments, scaling)
+    with threadpool_limits(1, "blas"):  # threads that wake for such small matrices cost more than they give
+        errors, solution = _search(segments, orders, training)
+        at = errors.linearise(solution.theta)
+        system = errors.chart.system(solution.theta)
+        variance = float(errors.covariance(system)[0, 0])
+    model = PolynomialModel(
+        orders=orders,
+        theta=solution.theta,
+        scaling=scaling,
+        mapping=mapping,
+        sample_time=traces[0].sample_time,
+        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
+        output_unit=traces[0].channel(mapping.output).unit,
+        rest_output=rest,
+    )
+    unit = scaling.output_scale**2
+    return FitResult(
+        model=model,
+        status=Status.CONVERGED if solution.status in {Status.STALLED, Status.NOT_IMPROVED} else solution.status,
+        loop=Loop.OPEN if orders.noise else Loop.CLOSED,
+        history={
+            "iteration": np.array([one.iteration for one in solution.curve], dtype=np.float64),
+            "mse": unit * np.array([one.mse for one in solution.curve]),
+        },
+        train_time_s=time.perf_counter() - began,
+        uncertainty=_uncertainty(model, at.gauss_newton, 2.0 * at.loss, errors.n_samples, variance * unit),
+        notes=(_stability(model),),
+    )
+
+
+def _search(
+    segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining
+) -> tuple[PredictionErrors, Solution]:
+    """Short runs from every start, and a long one from the best."""
+    pieces = [piece for segment in segments for piece in segment.pieces()]
+    stable = not orders.noise if training.stable is None else training.stable
+    errors = PredictionErrors(
+        chart=PolynomialChart(orders=orders),
+        segments=tuple(pieces) if orders.noise else tuple(segments),
+        whitening=np.eye(1),
+        stable=stable and not orders.drifts,
+    )
+    short = replace(training, max_iterations=min(SHORT, training.max_iterations))
+    found: list[tuple[float, int, Solution]] = []
+    for theta in _starts(pieces, orders):
+        if np.isfinite(theta).all() and np.isfinite(errors.loss(theta)):
+            solution = _run(errors, theta, short)
+            found.append((solution.at.loss, len(found), solution))
+    if not found:
+        raise FitDivergedError(
+            f"no start of {orders.label} gives a finite prediction",
+            remedy="lower the orders, or fit an ARX model or a state space first to see what the records ask for",
+        )
+    best = min(found, key=lambda entry: entry[:2])[2]
+    if training.max_iterations <= SHORT:
+        return errors, best
+    engine = LevenbergMarquardt(termination=_limits(training), evidence_after=None)
+    return errors, engine.resume(errors, best.state)
+
+
+def _run(errors: PredictionErrors, theta: Array, training: PolynomialTraining) -> Solution:
+    engine = LevenbergMarquardt(termination=_limits(training), evidence_after=None)
+    return engine.minimise(errors, theta, flat_prior(len(theta)))
+
+
+def _limits(training: PolynomialTraining) -> Termination:
+    return Termination(
+        max_iterations=training.max_iterations, max_time_s=training.max_time_s, tolerance=1e-7, patience=3
+    )
+
+
+def _starts(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
+    """Coefficients from long ARX models."""
+    reach = [orders.order("na"), *(nb + nk for nb, nk in zip(orders.nb, orders.nk, strict=True))]
+    least = max(*reach, *orders.denominators, 1) if len(reach) + len(orders.denominators) > 0 else 1
+    looked = [_differenced(piece) for piece in pieces] if orders.drifts else list(pieces)
+    looked = [piece for piece in looked if len(piece) > 3]
+    longs = [LongARX.of(looked, least), LongARX.of(looked, least, more=2.0)]
+    if orders.order("na") or not orders.nb:
+        return [armax_start(looked, orders, long) for long in longs]
+    return [box_jenkins_start(looked, orders, long, whitened=whitened) for long in longs for whitened in (False, True)]
+
+
+def _differenced(piece: Segment) -> Segment:
+    """Changes from sample to sample, of which an integrated noise is an ordinary one."""
+    return replace(
+        piece,
+        inputs=np.diff(piece.inputs, axis=0),
+        outputs=np.diff(piece.outputs, axis=0),
+        root_weights=piece.root_weights[1:],
+    )
+
+
+def _uncertainty(model: PolynomialModel, H: Array, squares: float, n: int, noise_variance: float) -> Uncertainty:
+    """What the prediction errors say about the coefficients, in the channels' units."""
+    names, P = model.orders.names(model.mapping.inputs), len(model.theta)
+    gains = np.ones(P)
+    at = 0
+    for j, nb in enumerate(model.orders.nb):
+        gains[at : at + nb] = model.scaling.output_scale / model.scaling.input_scale[j]
+        at += nb
+    gains[P - model.orders.level :] = model.scaling.output_scale
+    values = gains * model.theta
+    values[P - model.orders.level :] += model.scaling.output_offset
+    root = np.sqrt(np.diag(H))
+    sizes, vectors = linalg.eigh(H / np.outer(root, root))
+    covariance = np.full((P, P), np.nan)
+    if sizes[0] > 1e-14 * sizes[-1]:
+        half = gains[:, np.newaxis] * (vectors / np.sqrt(sizes)) / root[:, np.newaxis]
+        covariance = squares / max(n - P, 1) * (half @ half.T)
+    return Uncertainty(names=names, values=values, covariance=covariance, noise_variance=noise_variance)
+
+
+def _stability(model: PolynomialModel) -> str:
+    """Whether the free run is stable, as a sentence."""
+    verdict = "stable" if model.pole_radius < 1.0 else "not stable"
+    return f"The free run is {verdict}: the largest pole has magnitude {model.pole_radius:.6f}."
+
+
+def _check(orders: AbstractPolynomial, experiments: Sequence[Experiment]) -> None:
+    counted = sum(e.n_counted for e in experiments)
+    needed = orders.n_parameters + max(4, sum(orders.denominators)) * len(experiments)
+    if counted < needed:
+        raise TraceError(
+            "fewer samples than parameters and initial states",
+            expected=f"at least {needed} samples that count",
+            got=counted,
+            remedy="lower the orders, or use longer traces",
+        )

@@ -1,0 +1,213 @@
+r"""Starts of polynomial models from a long ARX model.
+
+A long ARX model :math:`\hat A y = \hat B u + \hat e` tells both what the inputs do and what the innovations were,
+however coloured the noise. With :math:`\hat e` known, ARMAX is a linear regression (Hannan and Rissanen 1982,
+"Recursive
+estimation of mixed autoregressive-moving average order"). What each input does,
+:math:`\hat w_j = \hat B_j/\hat A\,u_j`, has next to no noise, and :math:`F_j \hat w_j = B_j u_j` is solved by
+iterated filtering with :math:`\hat A/F_j` or
+:math:`1/F_j` (Steiglitz and McBride 1965; Zhu 2001, "Multivariable system identification for process control",
+chapter 6). What is left is the noise, an ARMA series.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from sysid.estimation.linear.segments import Segment
+from sysid.estimation.linear.subspace.projections import arx_orders, regress
+from sysid.estimation.linear.subspace.windows import Windows
+from sysid.models.polynomial import AbstractPolynomial
+
+Array = NDArray[np.float64]
+
+LONGEST, ROUNDS, INSIDE = 40, 12, 0.98
+"""Lags of a long ARX model at most; filtering rounds; and how far inside the unit circle a root is put."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LongARX:
+    """A long ARX model of some pieces.
+
+    Args:
+        A: Of the output, from 1 on, shape ``(order + 1,)``.
+        B: Of each input, from lag 0 on.
+        constant: On the right side.
+    """
+
+    A: Array
+    B: tuple[Array, ...]
+    constant: float
+
+    @classmethod
+    def of(cls, pieces: Sequence[Segment], least: int, *, more: float = 1.0) -> LongARX:
+        """The model whose order Akaike's criterion chooses, or longer by a factor.
+
+        Args:
+            pieces: Unbroken records, in scaled numbers.
+            least: Lags at least.
+            more: The factor.
+
+        Returns:
+            The model.
+        """
+        m = pieces[0].inputs.shape[1]
+        total, longest = sum(map(len, pieces)), max(map(len, pieces))
+        most = max(min(LONGEST, total // (4 * (m + 1)), longest // 2), 1)
+        windows = Windows.of(pieces, max(min(max(most, least), longest - 1), 1), 1)
+        chosen = 1 + int(np.argmin(arx_orders(windows)))
+        order = min(max(round(chosen * more), least), windows.past)
+        columns = [windows.constant, windows.at(-order, 0), windows.inputs(0, 1)]
+        theta = regress(np.concatenate(columns, axis=1), windows.outputs(0, 1))[:, 0]
+        lagged = theta[1 : 1 + order * (m + 1)].reshape(order, m + 1)[::-1]  # newest lag first
+        now = theta[1 + order * (m + 1) :]
+        A = np.concatenate([[1.0], -lagged[:, m]])
+        B = tuple(np.concatenate([[now[j]], lagged[:, j]]) for j in range(m))
+        return cls(A=A, B=B, constant=float(theta[0]))
+
+    def innovations(self, piece: Segment) -> Array:
+        """What the model does not explain; its first samples, which it cannot tell, are zero."""
+        e = lfilter(self.A, [1.0], piece.outputs[:, 0]) - self.constant
+        for j, b in enumerate(self.B):
+            e = e - lfilter(b, [1.0], piece.inputs[:, j])
+        e[: len(self.A) - 1] = 0.0
+        return np.asarray(e)
+
+
+def armax_start(pieces: Sequence[Segment], orders: AbstractPolynomial, long: LongARX) -> Array:
+    """Coefficients of an ARMAX model by one regression with the innovations of a long ARX model.
+
+    Args:
+        pieces: Unbroken records.
+        orders: The structure.
+        long: The long ARX model of the pieces, or of their differences where the noise is integrated.
+
+    Returns:
+        The flat vector.
+    """
+    na, nc, m = orders.order("na"), orders.order("nc"), len(orders.nb)
+    skipped = len(long.A) - 1 + nc
+    reach = max([na, skipped, *(nb + nk for nb, nk in zip(orders.nb, orders.nk, strict=True))])
+    tables, targets = [], []
+    for piece in pieces:
+        y, e = piece.outputs[:, 0], long.innovations(piece)
+        columns = [_back(piece.inputs[:, j], k) for j in range(m) for k in _lags(orders, j)]
+        columns += [-_back(y, k) for k in range(1, na + 1)] + [_back(e, k) for k in range(1, nc + 1)]
+        tables.append(np.column_stack([*columns, np.ones(len(y))])[reach:])
+        targets.append(y[reach:])
+    theta = regress(np.concatenate(tables), np.concatenate(targets)[:, np.newaxis])[:, 0]
+    n_b = sum(orders.nb)
+    A, C = theta[n_b : n_b + na], theta[n_b + na : n_b + na + nc]
+    level = theta[-1] / max(float(1.0 + A.sum()), 1e-3)
+    return np.concatenate([theta[:n_b], A, inside(C), [level] * orders.level])
+
+
+def box_jenkins_start(pieces: Sequence[Segment], orders: AbstractPolynomial, long: LongARX, *, whitened: bool) -> Array:
+    """Coefficients of OE and Box-Jenkins models: each input's part first, then the noise that is left.
+
+    Args:
+        pieces: Unbroken records.
+        orders: The structure.
+        long: Their long ARX model.
+        whitened: Whether what an input does is fitted through the filter that whitens the noise.
+
+    Returns:
+        The flat vector.
+    """
+    A = np.concatenate([[1.0], inside(long.A[1:])])
+    B, F, left = [], [], [piece.outputs[:, 0].copy() for piece in pieces]
+    for j in range(len(orders.nb)):
+        inputs = [piece.inputs[:, j] for piece in pieces]
+        driven = [lfilter(long.B[j], A, u) for u in inputs]
+        b, f = _rational(inputs, driven, orders, j, A if whitened else np.ones(1))
+        B.append(b)
+        F.append(f)
+        delayed = np.concatenate([np.zeros(orders.nk[j]), b])
+        left = [v - lfilter(delayed, np.concatenate([[1.0], f]), u) for v, u in zip(left, inputs, strict=True)]
+    level = float(np.mean(np.concatenate(left)))
+    noise = _noise([v - level for v in left], orders.order("nc"), orders.order("nd"))
+    return np.concatenate([*B, *F, *noise, [level] * orders.level])
+
+
+def inside(coefficients: Array) -> Array:
+    """The monic polynomial with these coefficients, its roots mirrored into the unit circle.
+
+    Args:
+        coefficients: Of lags 1, 2, and so on.
+
+    Returns:
+        Likewise.
+
+    Example:
+        >>> inside(np.array([-2.0])).tolist()
+        [-0.5]
+    """
+    if not len(coefficients) or not np.isfinite(coefficients).all():
+        return np.zeros(len(coefficients))
+    roots = np.roots(np.concatenate([[1.0], coefficients]))
+    size = np.maximum(np.abs(roots), np.finfo(np.float64).tiny)
+    mirrored = np.where(size > INSIDE, roots / size * np.minimum(1.0 / size, INSIDE), roots)
+    found = np.real(np.poly(mirrored))[1:]
+    return np.concatenate([found, np.zeros(len(coefficients) - len(found))])
+
+
+def _rational(
+    inputs: Sequence[Array], driven: Sequence[Array], orders: AbstractPolynomial, j: int, through: Array
+) -> tuple[Array, Array]:
+    """``B`` and ``F`` of one input by iterated filtering."""
+    nf, lags = orders.denominators[j], _lags(orders, j)
+    f = np.zeros(nf)
+    b = np.zeros(len(lags))
+    best = np.inf
+    for _ in range(ROUNDS):
+        prefilter = np.concatenate([[1.0], f])
+        tables, targets = [], []
+        for u, w in zip(inputs, driven, strict=True):
+            uf, wf = lfilter(through, prefilter, u), lfilter(through, prefilter, w)
+            columns = [_back(uf, k) for k in lags] + [-_back(wf, k) for k in range(1, nf + 1)]
+            tables.append(np.column_stack(columns))
+            targets.append(wf)
+        theta = regress(np.concatenate(tables), np.concatenate(targets)[:, np.newaxis])[:, 0]
+        found = inside(theta[len(lags) :])
+        delayed = np.concatenate([np.zeros(lags[0]), theta[: len(lags)]])
+        error = sum(
+            float(np.sum(lfilter(through, [1.0], lfilter(delayed, np.concatenate([[1.0], found]), u) - w) ** 2))
+            for u, w in zip(inputs, driven, strict=True)
+        )
+        if error < best:
+            best, b, f_best = error, theta[: len(lags)], found
+        f = found
+    return (b, f_best) if np.isfinite(best) else (b, np.zeros(nf))
+
+
+def _noise(series: Sequence[Array], nc: int, nd: int) -> tuple[Array, Array]:
+    """``C`` and ``D`` of what is left: innovations by a long AR model, then one regression."""
+    if nc + nd == 0:
+        return np.zeros(0), np.zeros(0)
+    order = max(min(20, min(map(len, series)) // 4), 1)
+    tables = [np.column_stack([_back(v, k) for k in range(1, order + 1)])[order:] for v in series]
+    targets = np.concatenate([v[order:] for v in series])
+    long = regress(np.concatenate(tables), targets[:, np.newaxis])[:, 0]
+    innovations = [lfilter(np.concatenate([[1.0], -long]), [1.0], v) for v in series]
+    reach = order + max(nc, nd)
+    tables = [
+        np.column_stack([*[_back(e, k) for k in range(1, nc + 1)], *[-_back(v, k) for k in range(1, nd + 1)]])[reach:]
+        for v, e in zip(series, innovations, strict=True)
+    ]
+    theta = regress(np.concatenate(tables), np.concatenate([v[reach:] for v in series])[:, np.newaxis])[:, 0]
+    return inside(theta[:nc]), inside(theta[nc:])
+
+
+def _lags(orders: AbstractPolynomial, j: int) -> range:
+    return range(orders.nk[j], orders.nk[j] + orders.nb[j])
+
+
+def _back(signal: Array, k: int) -> Array:
+    """A signal some samples ago, zero before it begins."""
+    k = min(k, len(signal))
+    return np.concatenate([np.zeros(k), signal[: len(signal) - k]])

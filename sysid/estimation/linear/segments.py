@@ -1,0 +1,94 @@
+"""Records as linear estimators with hidden states see them: scaled, with what is known of their beginning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.experiment import Experiment
+from sysid.models import Scaling
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Segment:
+    """An unbroken piece of a record, in scaled numbers.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``.
+        outputs: Shape ``(n_samples, n_outputs)``.
+        root_weights: Square root of each sample's weight, shape ``(n_samples,)``.
+        rest: Inputs and outputs that stood before the first sample, shapes ``(n_inputs,)`` and ``(n_outputs,)``;
+            ``None`` where nothing is known of what came before, so that the initial state is estimated.
+    """
+
+    inputs: Array
+    outputs: Array
+    root_weights: Array
+    rest: tuple[Array, Array] | None = None
+
+    def __len__(self) -> int:
+        """Samples."""
+        return len(self.outputs)
+
+    def first(self, n: int) -> Segment:
+        """Its first samples."""
+        at = slice(0, n)
+        return replace(
+            self, inputs=self.inputs[at], outputs=self.outputs[at], root_weights=self.root_weights[at]
+        )  # fmt: skip
+
+    @property
+    def whole(self) -> bool:
+        """Whether every sample counts."""
+        return bool((self.root_weights > 0.0).all())
+
+    def pieces(self) -> list[Segment]:
+        """The stretches between samples that do not count, each with a state of its own where it begins after one."""
+        if self.whole:
+            return [self]
+        counts = np.concatenate([[False], self.root_weights > 0.0, [False]])
+        edges = np.flatnonzero(counts[1:] != counts[:-1])
+        found = []
+        for first, last in edges.reshape(-1, 2):
+            at = slice(int(first), int(last))
+            rest = self.rest if first == 0 else None
+            piece = replace(
+                self, inputs=self.inputs[at], outputs=self.outputs[at], root_weights=self.root_weights[at], rest=rest
+            )
+            found.append(piece)
+        return found
+
+
+def segments_of(experiments: Sequence[Experiment], scaling: Scaling) -> tuple[Segment, ...]:
+    """Experiments of one output as segments.
+
+    Args:
+        experiments: The records.
+        scaling: Between units and scaled numbers.
+
+    Returns:
+        One segment a record, its measured history put before it.
+    """
+    return tuple(_segment(experiment, scaling) for experiment in experiments)
+
+
+def _segment(experiment: Experiment, scaling: Scaling) -> Segment:
+    inputs, output = experiment.inputs, experiment.output
+    weights = np.ones(len(output)) if experiment.weights is None else experiment.weights
+    if experiment.past is not None and experiment.past.any():
+        inputs = np.concatenate([experiment.history.inputs, inputs])
+        output = np.concatenate([experiment.history.output, output])
+        weights = np.concatenate([experiment.past_weights, weights])
+    history = experiment.history
+    stood = scaling.scale_inputs(history.inputs[:1])[0], np.atleast_1d(scaling.scale_output(history.output[0]))
+    return Segment(
+        inputs=scaling.scale_inputs(inputs),
+        outputs=scaling.scale_output(output)[:, np.newaxis],
+        root_weights=np.sqrt(weights),
+        rest=None if experiment.free else stood,
+    )

@@ -1,0 +1,1 @@
+"""State spaces in innovations form: subspace starts, refined on the prediction error."""

@@ -1,0 +1,145 @@
+r"""Local coordinates of a state space: the directions in which its matrices change what it does.
+
+Changing the state's coordinates by :math:`I + \epsilon E` moves the matrices by
+:math:`(EA - AE, EB, -CE, 0, EK)\,\epsilon` and the system not at all. What is orthogonal to these :math:`n^2`
+directions is a chart of all systems nearby, with as many parameters as the data can tell (McKelvey, Helmersson and
+Ribarits 2004, "Data driven local coordinates for multivariable linear systems"). There is no canonical form, and none
+of its ill conditioning; after some steps the chart is laid anew, in balanced coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.models.innovations import Innovations
+
+Array = NDArray[np.float64]
+
+
+class AbstractChart(Protocol):
+    """Systems as a function of a flat vector."""
+
+    @property
+    def n_parameters(self) -> int:
+        """Length of the vector."""
+
+    def system(self, theta: Array) -> Innovations:
+        """The system at a vector."""
+
+    def directions(self, theta: Array) -> Directions:
+        """Derivatives of each matrix with respect to the vector."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Chart:
+    """Systems around one, by a flat vector.
+
+    Args:
+        base: The system at zero.
+        basis: Directions of all matrices, in the order of :func:`flat`, shape ``(n_entries, n_parameters)``.
+    """
+
+    base: Innovations
+    basis: Array
+
+    @classmethod
+    def around(cls, base: Innovations, *, feedthrough: bool, noise: bool, intercept: bool) -> Chart:
+        """All directions that change the system.
+
+        Args:
+            base: The system.
+            feedthrough: Whether ``D`` is fitted.
+            noise: Whether ``K`` is fitted.
+            intercept: Whether the constant is fitted.
+
+        Returns:
+            The chart.
+        """
+        n, fitted = base.n_state, _fitted(base, feedthrough=feedthrough, noise=noise, intercept=intercept)
+        changes = []
+        for a in range(n):
+            for b in range(n):
+                E = np.zeros((n, n))
+                E[a, b] = 1.0
+                of_A, of_C = E @ base.A - base.A @ E, -base.C @ E
+                changes.append(_joined(of_A, E @ base.B, of_C, 0.0 * base.D, E @ base.K, 0.0 * base.constant)[fitted])
+        directions = np.eye(len(flat(base)))[:, fitted]
+        if not changes:
+            return cls(base=base, basis=directions)
+        Q, R, _ = linalg.qr(np.array(changes).T, pivoting=True)
+        sizes = np.abs(np.diag(R))
+        rank = int(np.count_nonzero(sizes > 1e-12 * max(float(sizes[0]), 1e-300)))
+        return cls(base=base, basis=directions @ Q[:, rank:])
+
+    @classmethod
+    def linear(cls, base: Innovations, *, feedthrough: bool, intercept: bool) -> Chart:
+        """The directions in which the prediction is linear: ``B``, ``D`` and the constant."""
+        n, m, p = base.n_state, base.n_inputs, base.n_outputs
+        parts = [np.zeros(n * n), np.ones(n * m), np.zeros(p * n), np.full(p * m, float(feedthrough))]
+        kept = np.concatenate([*parts, np.zeros(n * p), np.full(p, float(intercept))]) > 0.0
+        return cls(base=base, basis=np.eye(len(kept))[:, kept])
+
+    @property
+    def n_parameters(self) -> int:
+        """Length of the vector."""
+        return int(self.basis.shape[1])
+
+    def system(self, theta: Array) -> Innovations:
+        """The system at a vector."""
+        return split(flat(self.base) + self.basis @ theta, self.base)
+
+    def directions(self, theta: Array) -> Directions:
+        """Derivatives of each matrix with respect to the vector: the basis, wherever one stands."""
+        del theta
+        n, m, p, P = self.base.n_state, self.base.n_inputs, self.base.n_outputs, self.n_parameters
+        shapes = ((n, n), (n, m), (p, n), (p, m), (n, p), (p,))
+        ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
+        parts = np.split(self.basis, ends[:-1])
+        A, B, C, D, K, c = (part.reshape(*shape, P) for part, shape in zip(parts, shapes, strict=True))
+        return Directions(A=A, B=B, C=C, D=D, K=K, constant=c)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Directions:
+    """Changes of each matrix, the parameters last; see :class:`Innovations` for the shapes."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    K: Array
+    constant: Array
+
+
+def flat(system: Innovations) -> Array:
+    """Every entry of every matrix, row by row: ``A``, ``B``, ``C``, ``D``, ``K``, the constant."""
+    return _joined(system.A, system.B, system.C, system.D, system.K, system.constant)
+
+
+def split(entries: Array, like: Innovations) -> Innovations:
+    """The system with these entries."""
+    shapes = [part.shape for part in (like.A, like.B, like.C, like.D, like.K, like.constant)]
+    parts = np.split(entries, np.cumsum([int(np.prod(shape)) for shape in shapes])[:-1])
+    A, B, C, D, K, constant = (part.reshape(shape) for part, shape in zip(parts, shapes, strict=True))
+    return Innovations(A=A, B=B, C=C, D=D, K=K, constant=constant)
+
+
+def _joined(*parts: Array) -> Array:
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def _fitted(base: Innovations, *, feedthrough: bool, noise: bool, intercept: bool) -> NDArray[np.intp]:
+    parts = (
+        (base.A, True),
+        (base.B, True),
+        (base.C, True),
+        (base.D, feedthrough),
+        (base.K, noise),
+        (base.constant, intercept),
+    )
+    return np.flatnonzero(np.concatenate([np.full(part.size, kept) for part, kept in parts]))

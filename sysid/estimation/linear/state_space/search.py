@@ -1,0 +1,259 @@
+r"""The search for a state space: subspace estimates, and from the best of them the least prediction error.
+
+Steps are those of :class:`~sysid.estimation.least_squares.levenberg_marquardt.LevenbergMarquardt` in a chart of local
+coordinates; when no step improves the fit any more, the system is balanced, the covariance of the errors is taken
+anew, and a new chart is laid there, until that changes nothing either.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from threadpoolctl import threadpool_limits
+
+from sysid.errors import ConfigError, FitDivergedError
+from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
+from sysid.estimation.least_squares.provider import Linearisation
+from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.linear.segments import Segment
+from sysid.estimation.linear.state_space.coordinates import Chart
+from sysid.estimation.linear.state_space.provider import PredictionErrors
+from sysid.estimation.linear.subspace.projections import Weighting
+from sysid.estimation.linear.subspace.starts import Subspace
+from sysid.estimation.linear.subspace.system import stabilised
+from sysid.estimation.result import Status
+from sysid.models import LinearStateSpace
+from sysid.models.innovations import Innovations
+
+Array = NDArray[np.float64]
+
+METHODS = ("prediction-error", "subspace")
+BEST = "best"
+WEIGHTINGS = (BEST, *(one.value for one in Weighting))
+CHARTS = 6
+"""Charts that are laid at most."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateSpaceTraining:
+    """How a linear state space is fitted.
+
+    Args:
+        method: ``prediction-error``, from a subspace estimate on; or ``subspace``, without iterations.
+        weighting: Of the subspace method: ``N4SID``, ``MOESP``, ``CVA``, ``SSARX`` (also for records under feedback),
+            or ``best``: each is tried, and the one with the least prediction error is taken.
+        horizon: Samples of past and of future that it looks at; ``None`` takes the order of a long ARX model, up to 40,
+            by Akaike's criterion.
+        stable: Keep all poles inside the unit circle; ``None`` does so where the noise is not modelled, since the free
+            run of an unstable plant is then lost.
+        max_iterations: Steps of the prediction-error method.
+        max_time_s: Wall time in seconds.
+        seed: Nothing is random; here so that all training has one.
+
+    Raises:
+        ConfigError: If a name or a number cannot be used.
+    """
+
+    method: str = METHODS[0]
+    weighting: str = BEST
+    horizon: int | None = None
+    stable: bool | None = None
+    max_iterations: int = 100
+    max_time_s: float = float("inf")
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, choices in (("method", METHODS), ("weighting", WEIGHTINGS)):
+            if getattr(self, name) not in choices:
+                raise ConfigError(
+                    f"unknown {name}",
+                    where=name,
+                    expected=" or ".join(choices),
+                    got=getattr(self, name),
+                    remedy=f"write for example {name}: {choices[0]}",
+                )
+        for name, least in (("max_iterations", 0), ("horizon", 2)):
+            value = getattr(self, name)
+            if value is not None and value < least:
+                raise ConfigError(
+                    f"{name} is too small", where=name, expected=f"{least} or more", got=value, remedy="correct it"
+                )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Found:
+    """What was found.
+
+    Args:
+        system: In scaled numbers, balanced.
+        chart: Local coordinates around it.
+        n_samples: Samples that count, times outputs.
+        at: Its linearisation there.
+        status: How the search ended.
+        curve: Its learning curve, losses as mean squared whitened errors.
+        covariance: Of the innovations, in scaled numbers.
+        weighting: The subspace method that it began with.
+        singular_values: Canonical correlations of past and future.
+    """
+
+    system: Innovations
+    chart: Chart
+    n_samples: int
+    at: Linearisation
+    status: Status
+    curve: tuple[Iteration, ...]
+    covariance: Array
+    weighting: Weighting
+    singular_values: Array
+
+
+def search(segments: Sequence[Segment], orders: LinearStateSpace, training: StateSpaceTraining) -> Found:
+    """Find the state space of some records.
+
+    Args:
+        segments: The records, in scaled numbers, of one output or several.
+        orders: The structure.
+        training: How.
+
+    Returns:
+        What was found.
+
+    Raises:
+        TraceError: If no record is long enough.
+        FitDivergedError: If no start gives a finite prediction.
+    """
+    began = time.perf_counter()
+    whole = tuple(piece for segment in segments for piece in segment.pieces()) if orders.noise else tuple(segments)
+    whole = tuple(piece for piece in whole if len(piece) > orders.states)
+    # BLAS threads that wake for matrices of this size cost more than they give.
+    with threadpool_limits(1, "blas"):
+        subspace = Subspace.of(
+            segments, states=orders.states, horizon=training.horizon, feedthrough=orders.feedthrough, noise=orders.noise
+        )
+        stable = not orders.noise if training.stable is None else training.stable
+        problem = _Problem(segments=whole, orders=orders, stable=stable)
+        start, weighting = problem.start(subspace, training.weighting)
+        iterations = training.max_iterations if training.method == METHODS[0] else 0
+        sizes = subspace.singular_values()
+        found = problem.refined(start, iterations, training.max_time_s - (time.perf_counter() - began))
+    return replace(found, weighting=weighting, singular_values=sizes)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Problem:
+    """Records and what is asked of a system."""
+
+    segments: Sequence[Segment]
+    orders: LinearStateSpace
+    stable: bool
+
+    def start(self, subspace: Subspace, weighting: str) -> tuple[Innovations, Weighting]:
+        """The subspace estimate with the least prediction error, its ``B``, ``D`` and constant fitted to that."""
+        chosen = list(Weighting) if weighting == BEST else [Weighting(weighting)]
+        found: list[tuple[float, int, Innovations, Weighting]] = []
+        for one in chosen:
+            try:
+                system = subspace.estimate(self.orders.states, one)
+            except (linalg.LinAlgError, ValueError):  # not finite, or no decomposition: another one may do
+                continue
+            fitted = self._with_inputs(system)
+            if fitted is not None:
+                found.append((fitted[0], len(found), fitted[1], one))
+        if not found:
+            raise FitDivergedError(
+                "no subspace estimate gives a finite prediction",
+                remedy="ask for fewer states, or for noise: true where the plant is unstable",
+            )
+        _, _, system, one = min(found, key=lambda entry: entry[:2])
+        return system, one
+
+    def _with_inputs(self, system: Innovations) -> tuple[float, Innovations] | None:
+        """The loss and the system with the ``B``, ``D`` and constant that fit best; twice, for rounding."""
+        if self.stable:
+            system = stabilised(system)
+        system = system.balanced()
+        for _ in range(2):
+            errors = self.errors(self.linear(system), np.eye(system.n_outputs))
+            at = errors.linearise(np.zeros(errors.chart.n_parameters))
+            if not errors.allowed(system) or not np.isfinite(at.loss) or not at.finite:
+                return None
+            root = np.sqrt(np.diag(at.gauss_newton))
+            scaled = at.gauss_newton / np.outer(root, root)
+            step = -np.linalg.lstsq(scaled, at.gradient / root, rcond=1e-13)[0] / root
+            system = errors.chart.system(step)
+        errors = self.errors(self.linear(system), np.eye(system.n_outputs))
+        covariance = errors.covariance(system)
+        if not np.isfinite(covariance).all():
+            return None
+        return float(np.linalg.slogdet(covariance + 1e-30 * np.eye(len(covariance)))[1]), system
+
+    def errors(self, chart: Chart, whitening: Array) -> PredictionErrors:
+        """The least-squares problem over a chart."""
+        return PredictionErrors(chart=chart, segments=self.segments, whitening=whitening, stable=self.stable)
+
+    def around(self, system: Innovations) -> Chart:
+        """All that changes a system."""
+        o = self.orders
+        return Chart.around(system, feedthrough=o.feedthrough, noise=o.noise, intercept=o.intercept)
+
+    def linear(self, system: Innovations) -> Chart:
+        """The part in which its predictions are linear."""
+        return Chart.linear(system, feedthrough=self.orders.feedthrough, intercept=self.orders.intercept)
+
+    def refined(self, system: Innovations, iterations: int, seconds: float) -> Found:
+        """The system with the least prediction error nearby."""
+        began, status = time.perf_counter(), Status.EXACT if iterations == 0 else Status.MAX_ITERATIONS
+        curve: list[Iteration] = []
+        whitening = self._whitening(system)
+        for _ in range(CHARTS):
+            system = system.balanced()
+            chart = self.around(system)
+            errors = self.errors(chart, whitening)
+            zero = np.zeros(errors.chart.n_parameters)
+            left = iterations - (curve[-1].iteration if curve else 0)
+            if left <= 0:
+                break
+            spent = time.perf_counter() - began
+            limits = Termination(max_iterations=left, max_time_s=seconds - spent, tolerance=1e-6, patience=2)
+            engine = LevenbergMarquardt(termination=limits, evidence_after=None)
+            solution = engine.minimise(errors, zero, flat_prior(len(zero)))
+            before = curve[-1].iteration if curve else 0
+            steps = solution.curve if not curve else solution.curve[1:]
+            curve += [replace(one, iteration=one.iteration + before, elapsed_s=one.elapsed_s + spent) for one in steps]
+            system, status = errors.chart.system(solution.theta), solution.status
+            gained = solution.curve[0].mse - solution.curve[-1].mse
+            if status in {Status.TIME_LIMIT, Status.INTERRUPTED} or gained <= 1e-6 * solution.curve[0].mse:
+                break
+            whitening = self._whitening(system)
+        system = system.balanced()
+        chart = self.around(system)
+        errors = self.errors(chart, self._whitening(system))
+        at = errors.linearise(np.zeros(errors.chart.n_parameters))
+        if status in {Status.NOT_IMPROVED, Status.STALLED} and curve:
+            status = Status.CONVERGED  # a later chart found nothing more to gain
+        mse = 2.0 * at.loss / max(errors.n_samples, 1)
+        if not curve:
+            curve = [Iteration(iteration=0, mse=mse, damping=0.0, effective_parameters=np.nan, elapsed_s=0.0)]
+        return Found(
+            system=system, chart=chart, n_samples=errors.n_samples, at=at, status=status, curve=tuple(curve),
+            covariance=errors.covariance(system), weighting=Weighting.CVA, singular_values=np.zeros(0),
+        )  # fmt: skip
+
+    def _whitening(self, system: Innovations) -> Array:
+        """What makes the errors of one sample independent and of size 1."""
+        p = system.n_outputs
+        covariance = self.errors(self.linear(system), np.eye(p)).covariance(system)
+        floor = 1e-20 * max(float(np.trace(covariance)), 1e-20) * np.eye(p)
+        return np.asarray(linalg.inv(linalg.cholesky(covariance + floor, lower=True)))
+
+
+def flat_prior(n: int) -> Prior:
+    """No prior: the loss alone counts."""
+    everything = Group(name="all", members=np.arange(n))
+    return Prior(centre=np.zeros(n), groups=(everything,), alphas=np.zeros(1), beta=1.0)

@@ -1,0 +1,1 @@
+"""Subspace identification: state spaces from projections of lagged data, without iterations."""

@@ -1,0 +1,162 @@
+"""Linear state spaces in innovations form, as matrices: what subspace methods find and prediction errors refine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.kernels import innovations as kernel
+
+Array = NDArray[np.float64]
+
+_NAMES = ("A", "B", "C", "D", "K", "constant")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Innovations:
+    r"""``x(t+1) = A x + B u + K e``, ``y = C x + D u + c + e`` with white innovations ``e``.
+
+    Args:
+        A: Shape ``(n_state, n_state)``.
+        B: Shape ``(n_state, n_inputs)``.
+        C: Shape ``(n_outputs, n_state)``.
+        D: Shape ``(n_outputs, n_inputs)``.
+        K: Shape ``(n_state, n_outputs)``; zeros where the noise is added to the output.
+        constant: Output without inputs, shape ``(n_outputs,)``.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    K: Array
+    constant: Array
+
+    def __post_init__(self) -> None:
+        for name in _NAMES:
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The matrices as JSON values."""
+        return {name: getattr(self, name).tolist() for name in _NAMES}
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> Innovations:
+        """The system that :meth:`to_dict` wrote."""
+        p, n = len(fields["constant"]), len(fields["A"])
+        shapes = {"A": (n, n), "B": (n, -1), "C": (p, n), "D": (p, -1), "K": (n, p), "constant": (p,)}
+        parts = {name: np.asarray(fields[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()}
+        return cls(**parts)
+
+    @property
+    def n_state(self) -> int:
+        """Length of the state."""
+        return len(self.A)
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return int(self.B.shape[1])
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return len(self.C)
+
+    @property
+    def predictor(self) -> Array:
+        """The state matrix of the one-step predictor, ``A - K C``."""
+        return np.asarray(self.A - self.K @ self.C)
+
+    @property
+    def radius(self) -> float:
+        """Largest magnitude of a pole."""
+        return spectral_radius(self.A)
+
+    def poles(self) -> NDArray[np.complex128]:
+        """Eigenvalues of ``A``."""
+        return np.asarray(linalg.eigvals(self.A), dtype=np.complex128) if self.n_state else np.zeros(0, dtype=complex)
+
+    def predicted(self, inputs: Array, outputs: Array, x: Array) -> tuple[Array, Array]:
+        """One-step prediction over a record.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``.
+            outputs: Measured, shape ``(n_samples, n_outputs)``.
+            x: State before the first sample; becomes the state after the last one.
+
+        Returns:
+            The prediction, shape ``(n_samples, n_outputs)``, and the states it was made from.
+        """
+        states, predicted = np.empty((len(inputs), self.n_state)), np.empty((len(inputs), self.n_outputs))
+        matrices = (self.A, self.B, self.C, self.D, self.K, self.constant)
+        kernel.predict(*matrices, np.ascontiguousarray(inputs), np.ascontiguousarray(outputs), x, states, predicted)
+        return predicted, states
+
+    def simulated(self, inputs: Array, x: Array) -> Array:
+        """Free run over some inputs; ``x`` becomes the state after them."""
+        return self.without_noise().predicted(inputs, np.full((len(inputs), self.n_outputs), np.nan), x)[0]
+
+    def without_noise(self) -> Innovations:
+        """The same system without a model of its noise."""
+        return replace(self, K=np.zeros_like(self.K))
+
+    def standing(self, inputs: Array, outputs: Array) -> Array:
+        """The predictor's state after inputs and outputs that have stood at some values for ever.
+
+        Without a model of the noise outputs have no say, and it is the equilibrium of the inputs.
+
+        Args:
+            inputs: Shape ``(n_inputs,)``.
+            outputs: Shape ``(n_outputs,)``.
+
+        Returns:
+            Shape ``(n_state,)``; the shortest where there are many.
+        """
+        drive = self.B @ inputs + self.K @ (outputs - self.D @ inputs - self.constant)
+        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.predictor, drive, cond=1e-9)[0])
+
+    def in_coordinates(self, T: Array) -> Innovations:
+        """The same system with the state ``T x``."""
+        back = linalg.inv(T)
+        return replace(self, A=T @ self.A @ back, B=T @ self.B, C=self.C @ back, K=T @ self.K)
+
+    def balanced(self) -> Innovations:
+        """The same system in coordinates in which its stable predictor is balanced.
+
+        Returns:
+            The system; as it is where a state is neither reached nor seen, so that nothing balances it.
+        """
+        A, n = self.predictor, self.n_state
+        if n == 0 or spectral_radius(A) >= 1.0:
+            return self
+        drive = np.concatenate([self.B - self.K @ self.D, self.K], axis=1)
+        try:
+            P = _root(linalg.solve_discrete_lyapunov(A, drive @ drive.T))
+            Q = _root(linalg.solve_discrete_lyapunov(A.T, self.C.T @ self.C))
+            U, sizes, _ = linalg.svd(Q.T @ P)
+            if not sizes[-1] > 1e-12 * sizes[0]:
+                return self
+            return self.in_coordinates((U / np.sqrt(sizes)).T @ Q.T)
+        except (linalg.LinAlgError, ValueError):
+            return self
+
+
+def spectral_radius(A: Array) -> float:
+    """Largest magnitude of an eigenvalue; infinite where it cannot be told."""
+    if not len(A):
+        return 0.0
+    if not np.isfinite(A).all():
+        return np.inf
+    return float(np.abs(linalg.eigvals(A, check_finite=False)).max())
+
+
+def _root(gramian: Array) -> Array:
+    """A factor ``G`` with ``G G' `` the Gramian, whose small eigenvalues rounding may have made negative."""
+    sizes, vectors = linalg.eigh(0.5 * (gramian + gramian.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))

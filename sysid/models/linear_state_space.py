@@ -1,0 +1,234 @@
+"""Linear state spaces in innovations form: hidden states, and a model of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError, shortened
+from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.innovations import Innovations
+from sysid.models.lags import whole
+from sysid.models.mapping import Mapping
+from sysid.models.ranges import IntRange
+from sysid.models.ratio import Ratio
+from sysid.models.scaling import Scaling
+from sysid.models.state_space import StateSpace
+from sysid.models.to_control import Matrices, in_powers_of_z, transfer_function
+
+MOST_STATES = 100
+"""A subspace method compresses matrices of some times as many columns."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearStateSpace(AbstractStructure):
+    """States of ``x(t+1) = A x + B u + K e``, ``y = C x + D u + c + e``, as of MATLAB's ``ssest`` and ``n4sid``.
+
+    Args:
+        states: Number of states.
+        feedthrough: Whether the output depends on inputs of the same sample (``D``). One that is sampled from a plant
+            does not; a dead time of one sample is in the structure.
+        noise: Whether the noise is modelled (``K``): one step ahead is then a Kalman filter's prediction. Without it
+            noise is added to the output, and the free run is what is fitted.
+        intercept: Fit a constant output.
+
+    Raises:
+        ConfigError: If the number of states cannot be used.
+
+    Example:
+        >>> LinearStateSpace(states=4).label
+        'SS 4'
+    """
+
+    states: Annotated[int, IntRange(low=1, high=10)]
+    feedthrough: bool = False
+    noise: bool = True
+    intercept: bool = True
+
+    kind = "SS"
+
+    def __post_init__(self) -> None:
+        if not whole(self.states) or not 1 <= self.states <= MOST_STATES:
+            raise ConfigError(
+                "not a number of states",
+                where="states",
+                expected=f"a whole number from 1 to {MOST_STATES}",
+                got=shortened(self.states),
+                remedy="write for example {kind: SS, states: 4}",
+            )
+
+    @property
+    def label(self) -> str:
+        """The states, and what is not the default."""
+        words = ["direct"] * self.feedthrough + ["without noise model"] * (not self.noise)
+        return " ".join(["SS", str(self.states), *words])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        fields = {name: getattr(self, name) for name in ("states", "feedthrough", "noise", "intercept")}
+        return {"kind": self.kind, **fields}
+
+    def n_parameters(self, n_inputs: int, n_outputs: int = 1) -> int:
+        """Parameters that tell systems apart: entries of all matrices less those of a change of coordinates.
+
+        Args:
+            n_inputs: Inputs.
+            n_outputs: Outputs.
+
+        Returns:
+            The number.
+
+        Example:
+            >>> LinearStateSpace(states=4).n_parameters(1)
+            13
+        """
+        gain = self.states * n_outputs * self.noise
+        direct = n_inputs * n_outputs * self.feedthrough
+        return self.states * (n_inputs + n_outputs) + gain + direct + n_outputs * self.intercept
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearStateSpaceModel(AbstractModel):
+    """A fitted state space of one output.
+
+    Args:
+        orders: The structure.
+        system: The matrices, in scaled numbers.
+        scaling: Between units and scaled numbers.
+        mapping: Which channels go in, which comes out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+    """
+
+    orders: LinearStateSpace
+    system: Innovations
+    scaling: Scaling
+    mapping: Mapping
+    sample_time: float
+    input_units: tuple[str, ...]
+    output_unit: str
+    rest_output: float
+
+    @property
+    def structure(self) -> LinearStateSpace:
+        """The number of states."""
+        return self.orders
+
+    @property
+    def n_parameters(self) -> int:
+        """Parameters that tell systems apart, whatever the coordinates of the state."""
+        return self.orders.n_parameters(len(self.mapping.inputs))
+
+    @cached_property
+    def recursion(self) -> StateSpace:
+        """The form that is run."""
+        system = self.system
+        return StateSpace(
+            A=system.A, B=system.B, C=system.C[0], D=system.D[0], constant=float(system.constant[0]),
+            K=system.K[:, 0] if self.orders.noise else None, scaling=self.scaling,
+        )  # fmt: skip
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Poles in the z plane, shape ``(states,)``."""
+        return self.system.poles()
+
+    @property
+    def pole_radius(self) -> float:
+        """Magnitude of the largest pole."""
+        return self.system.radius
+
+    def ratio(self, j: int) -> Ratio:
+        """From one input to the output, in ``1/z``; all inputs share the denominator."""
+        F, numerators, _ = polynomials(self.system)
+        gain = self.scaling.output_scale / self.scaling.input_scale[j]
+        first = 0 if self.orders.feedthrough else 1
+        return Ratio(
+            B=gain * numerators[0, j, first:], F=F, delay=first, discrete=True,
+            of_numerator=f"B({self.mapping.inputs[j]}, ", of_denominator="F(",
+        )  # fmt: skip
+
+    def to_control(self) -> Any:
+        """The model as a ``control.TransferFunction``, from deviations of the inputs to deviations of the output.
+
+        Returns:
+            One row, one column per input; :func:`sysid.models.to_control.state_space` keeps the states.
+        """
+        F, numerators, _ = polynomials(self.system)
+        gains = self.scaling.output_scale / np.array(self.scaling.input_scale)
+        ratios = [in_powers_of_z(gain * row, F) for gain, row in zip(gains, numerators[0], strict=True)]
+        return transfer_function(ratios, self.mapping, self.sample_time)
+
+    @property
+    def matrices(self) -> Matrices:
+        """The state space in the channels' units."""
+        gain, scale = self.scaling.output_scale, np.array(self.scaling.input_scale)
+        return self.system.A, self.system.B / scale, gain * self.system.C, gain * self.system.D / scale
+
+    @property
+    def kalman_gain(self) -> NDArray[np.float64]:
+        """``K`` from the innovation in the output's unit, for the state of :attr:`matrices`; shape ``(states, 1)``."""
+        return np.asarray(self.system.K / self.scaling.output_scale)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return {
+            "structure": self.orders.to_dict(),
+            "mapping": str(self.mapping),
+            "sample_time": self.sample_time,
+            "input_units": list(self.input_units),
+            "output_unit": self.output_unit,
+            "rest_output": self.rest_output,
+            "scaling": self.scaling.to_dict(),
+            "system": self.system.to_dict(),
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> LinearStateSpaceModel:
+        """The model that :meth:`to_dict` wrote."""
+        orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
+        return cls(
+            orders=LinearStateSpace(**orders),
+            system=Innovations.from_dict(fields["system"]),
+            scaling=Scaling.from_dict(fields["scaling"]),
+            mapping=Mapping.parse(fields["mapping"]),
+            input_units=tuple(fields["input_units"]),
+            **{key: fields[key] for key in ("sample_time", "output_unit", "rest_output")},
+        )
+
+
+def polynomials(system: Innovations) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    r"""A state space as polynomials in ``1/z``, by Faddeev and LeVerrier.
+
+    :math:`\det(I - A q^{-1})` and :math:`C\,\mathrm{adj}(I - A q^{-1})\,B q^{-1} + D \det` come out of one
+    recursion of products and sums, so that complex steps give exact derivatives.
+
+    Args:
+        system: The system.
+
+    Returns:
+        The denominator, shape ``(n + 1,)``; the numerators of inputs, shape ``(n_outputs, n_inputs, n + 1)``; and those
+        of innovations, shape ``(n_outputs, n_outputs, n + 1)``.
+    """
+    A, n = system.A, system.n_state
+    drive = np.concatenate([system.B, system.K], axis=1)
+    direct = np.concatenate([system.D, np.eye(system.n_outputs)], axis=1)
+    F = np.zeros(n + 1, dtype=A.dtype)
+    F[0] = 1.0
+    rows = np.zeros((system.n_outputs, drive.shape[1], n + 1), dtype=A.dtype)
+    M = np.eye(n, dtype=A.dtype)
+    for k in range(1, n + 1):
+        rows[:, :, k] = system.C @ M @ drive
+        AM = A @ M
+        F[k] = -np.trace(AM) / k
+        M = AM + F[k] * np.eye(n)
+    rows += direct[:, :, np.newaxis] * F
+    m = system.n_inputs
+    return F, rows[:, :m], rows[:, m:]

@@ -1,0 +1,93 @@
+"""Polynomial models by the prediction error: known systems are found, within their own intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import optimize
+from scipy.signal import lfilter
+
+from sysid.errors import TraceError
+from sysid.estimation import Status, fit_arx, fit_polynomial
+from sysid.estimation.linear.polynomial.chart import PolynomialChart
+from sysid.estimation.linear.polynomial.starts import inside
+from sysid.estimation.linear.segments import Segment
+from sysid.estimation.linear.state_space.provider import PredictionErrors
+from sysid.models import ARMAX, ARX, BJ, OE, Mapping, Start
+from sysid.models.polynomial import AbstractPolynomial
+from tests.estimation.linear_systems import trace_of
+
+TWO, FREE = Mapping.parse("u1+u2 -> y"), Start(kind="estimated")
+CASES = {
+    "OE": (OE(nb=(2, 1), nf=(2, 1), nk=(1, 2)), [1.0, 0.5, 0.4, -1.5, 0.7, -0.8]),
+    "BJ": (BJ(nb=(2, 1), nc=1, nd=1, nf=(2, 1), nk=(1, 2)), [1.0, 0.5, 0.4, -1.5, 0.7, -0.8, 0.5, -0.9]),
+    "ARMAX": (ARMAX(na=2, nb=(2, 1), nc=2, nk=(1, 2)), [1.0, 0.5, 0.4, -1.5, 0.7, -0.6, 0.3]),
+    "ARIX": (ARMAX(na=2, nb=(2, 1), nc=0, nk=(1, 2), integrated=True), [1.0, 0.5, 0.4, -1.5, 0.7]),
+    "ARIMAX": (ARMAX(na=1, nb=(1, 1), nc=1, nk=(1, 1), integrated=True), [1.0, 0.5, -0.8, 0.4]),
+}
+KINDS = pytest.mark.parametrize(("orders", "truth"), CASES.values(), ids=list(CASES))
+
+
+def record(orders: AbstractPolynomial, truth: list[float], seed: int, n: int = 700, noise: float = 0.5):
+    rng = np.random.default_rng(seed)
+    p = orders.polynomials(np.array([*truth, *[2.0] * orders.level]))
+    u, e = np.sign(rng.normal(size=(n + 100, len(p.B)))), noise * rng.normal(size=n + 100)
+    y = lfilter(p.C, np.convolve(p.A, p.D), e) + float(p.constant)
+    for b, f, x in zip(p.B, p.F, u.T, strict=True):
+        y = y + lfilter(b, np.convolve(p.A, f), x)
+    return trace_of(u[100:], y[100:])
+
+
+@KINDS
+def test_true_coefficients_lie_within_their_intervals(orders: AbstractPolynomial, truth: list[float]) -> None:
+    """Four standard deviations; how often two hold the truth is counted by ``tests.benchmarks linear``."""
+    fit = fit_polynomial([record(orders, truth, 0)], TWO, orders, start=FREE)
+    assert fit.status is Status.CONVERGED
+    off = np.abs(fit.uncertainty.values[: len(truth)] - truth) / fit.uncertainty.standard_deviations[: len(truth)]
+    assert 0.2 < off.max() < 4.0
+    assert fit.uncertainty.noise_variance == pytest.approx(0.25, rel=0.25)
+
+
+@KINDS
+def test_gradients_are_those_of_the_loss(orders: AbstractPolynomial, truth: list[float]) -> None:
+    trace = record(orders, truth, 1, 60)
+    one = Segment(inputs=trace.columns(["u1", "u2"]), outputs=trace.columns(["y"]), root_weights=np.ones(60))
+    chart = PolynomialChart(orders=orders)
+    errors = PredictionErrors(chart=chart, segments=(one,), whitening=np.eye(1), stable=False)
+    theta = np.array([*truth, *[1.5] * orders.level]) * 0.98
+    numeric = optimize.approx_fprime(theta, errors.loss, 1e-7)
+    np.testing.assert_allclose(errors.linearise(theta).gradient, numeric, rtol=1e-3, atol=1e-3 * np.abs(numeric).max())
+
+
+def test_arma_needs_no_input() -> None:
+    e = np.random.default_rng(0).normal(size=3000)
+    series = trace_of(np.zeros((3000, 0)), 5.0 + lfilter([1.0, 0.6], [1.0, -0.8], e))
+    fit = fit_polynomial([series], Mapping.parse("-> y"), ARMAX(na=1, nb=(), nc=1, nk=()), start=FREE)
+    assert fit.uncertainty.names == ("A(1)", "C(1)", "constant")
+    np.testing.assert_allclose(fit.uncertainty.values[:2], [-0.8, 0.6], atol=0.05)
+    assert fit.model.structure.label == "ARMA [1; 1]"
+
+
+def test_without_c_it_is_the_arx_model_of_least_squares() -> None:
+    trace = record(*CASES["ARMAX"], 3)
+    mine = fit_polynomial([trace], TWO, ARMAX(na=2, nb=(2, 1), nc=0, nk=(1, 2)), start=FREE)
+    other = fit_arx([trace], TWO, ARX(na=2, nb=(2, 1), nk=(1, 2)), start=FREE)
+    np.testing.assert_allclose(-mine.uncertainty.values[3:5], other.model.a, atol=5e-3)
+
+
+def test_several_records_are_not_one() -> None:
+    orders, truth = CASES["BJ"]
+    records = [record(orders, truth, seed, 250) for seed in range(3)]
+    fit = fit_polynomial(records, TWO, orders, start=FREE)
+    np.testing.assert_allclose(fit.uncertainty.values[: len(truth)], truth, atol=0.25)
+
+
+def test_roots_are_mirrored_into_the_unit_circle() -> None:
+    np.testing.assert_allclose(inside(np.array([-2.5, 1.0])), np.poly([0.5, 0.5])[1:], atol=1e-9)
+    assert inside(np.array([np.nan])).tolist() == [0.0]
+
+
+def test_a_record_too_short_for_its_orders_is_refused() -> None:
+    orders, truth = CASES["BJ"]
+    with pytest.raises(TraceError, match="fewer samples"):
+        fit_polynomial([record(orders, truth, 0, 12)], TWO, orders, start=FREE)
