@@ -1,6 +1,7 @@
 """Settings that all tests share."""
 
 import signal
+from html import escape
 
 import pytest
 from hypothesis import settings
@@ -18,3 +19,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 def no_store_of_an_earlier_test(monkeypatch: pytest.MonkeyPatch) -> None:
     """MLflow leaves the store that it was last told of in the environment."""
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages with empty pictures: to draw them takes longer than all else, and most tests of a page are not of these."""
+
+    def empty(_: object, *, title: str, description: str, name: str) -> str:
+        words = f'<title id="{name}-title">{escape(title)}</title><desc id="{name}-desc">{escape(description)}</desc>'
+        return f'<svg role="img" aria-labelledby="{name}-title {name}-desc" viewBox="0 0 1 1">{words}</svg>'
+
+    monkeypatch.setattr("sysid.reporting.parts.svg", empty)

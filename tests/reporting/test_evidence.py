@@ -88,6 +88,7 @@ def test_the_sections_show_what_the_run_stored(run: Path) -> None:
     assert [part.caption.partition(":")[0] for part in response.parts] == ["ARX, ARX [2; 2 2; 1 1]", "ARX", "ARX"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_they_are_on_the_page_escaped_and_listed(run: Path) -> None:
     page = write_report(run).read_text(encoding="utf-8")
     for title in ("Is linear enough?", "Residuals", "Frequency response"):

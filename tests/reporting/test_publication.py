@@ -74,6 +74,7 @@ def test_published_again_it_is_the_same_and_holds_nothing_older(page: tuple[Path
     assert [entry.name for entry in path.parent.parent.iterdir()] == [path.parent.name]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_folder_of_somebody_else_is_left_alone(page: tuple[Path, Path], tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "README.md").write_text("# My own words\n", encoding="utf-8")

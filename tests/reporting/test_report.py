@@ -188,6 +188,7 @@ def test_the_first_picture_has_every_model_over_the_measured_output_case_by_case
     assert "<script" not in text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_model_without_a_run_one_step_ahead_claims_no_figures_of_it(
     make_run: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -249,6 +250,7 @@ def test_four_fits_on_five_cases_of_20000_noisy_samples_stay_under_three_megabyt
     assert page.stat().st_size < 3_000_000
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_published_figures_stand_beside_ours_with_their_ratio(
     make_run: Callable[..., Path], workspace: Path, tmp_path: Path
 ) -> None:
@@ -267,6 +269,7 @@ def test_published_figures_stand_beside_ours_with_their_ratio(
     assert "Other tanks." in "".join(page.texts)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_figures_of_another_unit_are_not_set_beside_ours(
     make_run: Callable[..., Path], workspace: Path, tmp_path: Path
 ) -> None:
@@ -317,6 +320,7 @@ def _two_mappings(document: dict[str, Any]) -> None:
     document["fits"][0]["mapping"] = "pump -> flow"
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("edit", "words"),
     [

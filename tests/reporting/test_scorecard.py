@@ -18,6 +18,8 @@ from sysid.reporting.scores import Score, read_scores
 from tests.reporting.assembly.conftest import document, write_run
 from tests.reporting.judging.conftest import leakage
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 ROOT = Path(__file__).resolve().parents[2]
 NAN = float("nan")
 

@@ -8,6 +8,7 @@ from scipy import signal
 
 from sysid.errors import TraceError
 from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
+from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
 from sysid.models import Domain, Mapping, TransferFunction
 
 T = 0.1
@@ -19,6 +20,7 @@ TRUE = {
 }
 DELAYS = {Domain.DISCRETE: (2, 1), Domain.CONTINUOUS: (2, 0)}
 DOMAINS = pytest.mark.parametrize("domain", list(Domain), ids=lambda d: d.value)
+QUICK = TransferFunctionTraining(scattered_starts=0)
 TERMS = {"sample_time": T, "output_unit": "1"}
 
 
@@ -41,7 +43,7 @@ def test_true_parameters_lie_within_their_95_percent_intervals(domain: Domain) -
         rng = np.random.default_rng(seed)
         noisy = responses(domain) + 0.02 * (rng.normal(size=(200, 2)) + 1j * rng.normal(size=(200, 2)))
         fit = fit_spectra(
-            Spectrum.of_response(W, noisy), TWO, orders(domain, DELAYS[domain]), input_units=("1", "1"), **TERMS
+            Spectrum.of_response(W, noisy), TWO, orders(domain, DELAYS[domain]), QUICK, input_units=("1", "1"), **TERMS
         )
         low, high = fit.uncertainty.interval(0.95).T
         held += int(np.sum((low <= TRUE[domain]) & (high >= TRUE[domain])))

@@ -1,6 +1,6 @@
 """Fitting networks: what is learnt, what is chosen, what an interruption leaves."""
 
-import _thread
+import signal
 import threading
 from types import SimpleNamespace
 
@@ -159,7 +159,7 @@ def test_an_interruption_keeps_the_best_model_so_far():
     def interrupt_once(progress) -> None:
         if progress.iteration == 10 and not seen.is_set():
             seen.set()
-            _thread.interrupt_main()
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)  # as Ctrl-C does
 
     training = Training(max_iterations=100_000, starts=1, patience=100_000)
     fit = fit_narx([tank(1)], TANK, SMALL, training, on_progress=interrupt_once)

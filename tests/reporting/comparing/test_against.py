@@ -17,6 +17,8 @@ from sysid.workbench.cli import run_cli
 from tests.reporting.assembly.conftest import document, write_run
 from tests.reporting.judging.conftest import leakage
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 PAIR = ("ARX", "NARX free run")
 
 

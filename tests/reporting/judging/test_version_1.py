@@ -142,6 +142,7 @@ def test_judgements_of_both_versions_stand_in_the_run_that_was_judged(tmp_path: 
     assert len({one.anchor for one in sections}) == 3
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("document", [RUN, ASSEMBLY], ids=["judgement", "assembly"])
 def test_a_run_of_version_1_is_read_reported_and_published(tmp_path: Path, document: dict[str, Any]) -> None:
     folder = stored(tmp_path / "run", document)
