@@ -76,12 +76,13 @@ def _band(low: float, high: float, error: np.ndarray[tuple[int], np.dtype[np.flo
     )
 
 
-def amplitude_section(fit: FitRecord, signals: Dict[str, CaseSignals]) -> Section | None:
+def amplitude_section(fit: FitRecord, signals: Dict[str, CaseSignals], *, suffix: str = "") -> Section | None:
     """Table and picture of the errors by amplitude.
 
     Args:
         fit: The fit.
         signals: By case, those that the verdict rests on.
+        suffix: Tells its anchor from others in the page.
 
     Returns:
         The section; ``None`` for a target that does not vary.
@@ -110,9 +111,14 @@ def amplitude_section(fit: FitRecord, signals: Dict[str, CaseSignals]) -> Sectio
     )
     title = f"{fit.name}: error by level of {output}"
     words = "Errors of the free run by level of the target, logarithmic."
-    drawing = picture(amplitude_figure(found, label=output, unit=unit), title, words, "error-by-level")
+    drawing = picture(amplitude_figure(found, label=output, unit=unit), title, words, f"error-by-level{suffix}")
     parts: tuple[Part, ...] = (table, drawing)
-    return Section(anchor="amplitude", title="Error by amplitude", parts=parts)
+    return Section(anchor=f"amplitude{suffix}", title=f"Error by amplitude{_of(fit)}", parts=parts)
+
+
+def _of(fit: FitRecord) -> str:
+    """Which output, where there are several."""
+    return "" if fit.system is None else f": {output_side(fit.mapping)}"
 
 
 def _missing(band: Band) -> str:

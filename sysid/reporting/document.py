@@ -35,6 +35,7 @@ from sysid.reporting.tables import (
     ranking_table,
     run_time_table,
     scored_cases,
+    systems_table,
 )
 from sysid.reporting.training_view import training_parts, trust_sections
 from sysid.reporting.verdict import verdict
@@ -56,18 +57,17 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         ConfigError: If the signals of a fit are missing or damaged.
     """
     signals = {fit.slug: read_signals(folder / "fits" / fit.slug, list(fit.cases)) for fit in results.fits}
-    best = results.best_fit
-    instants: list[Instant] = []
-    if best is not None:
+    instants: dict[str, list[Instant]] = {}
+    for best in results.best_fits:
         judged = scored_cases(best) or best.cases
-        instants = worst_instants({name: signals[best.slug][name] for name in judged}, 5)
+        instants[best.name] = worst_instants({name: signals[best.slug][name] for name in judged}, 5)
     sections = [overview_section(results, signals), _accuracy(results, published), *sweep_sections(folder, published)]
     columns = _columns(results)
-    if best is not None:
-        sections.append(_best(best, signals[best.slug], instants, columns))
-        by_level = amplitude_section(
-            best, {name: signals[best.slug][name] for name in scored_cases(best) or best.cases}
-        )
+    for index, best in enumerate(results.best_fits):
+        suffix = f"-{index + 1}" if index else ""
+        sections.append(_best(best, signals[best.slug], instants[best.name], columns, suffix))
+        seen = {name: signals[best.slug][name] for name in scored_cases(best) or best.cases}
+        by_level = amplitude_section(best, seen, suffix=suffix)
         sections += [] if by_level is None else [by_level]
     sections += [*trust_sections(results), *evidence_sections(folder, results)]
     states = state_section(results)
@@ -89,8 +89,8 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
 
 
 def _accuracy(results: Results, published: PublishedTable | None) -> Section:
-    best = None if results.best is None else results.best.name
-    parts: list[Part] = []
+    best = {fit.name for fit in results.best_fits}
+    parts: list[Part] = [] if not results.systems else [systems_table(results)]
     for index, (mapping, fits) in enumerate(results.mappings().items()):
         parts.append(accuracy_table(fits, "free_run", best))
         parts.append(_mse_picture(mapping, fits, f"mse-{index}"))
@@ -119,20 +119,23 @@ def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
     return picture(figure, f"Free-run mse by case, {mapping}", caption, name)
 
 
-def _best(fit: FitRecord, signals: Dict[str, CaseSignals], instants: list[Instant], columns: int) -> Section:
+def _best(
+    fit: FitRecord, signals: Dict[str, CaseSignals], instants: list[Instant], columns: int, suffix: str
+) -> Section:
     parts: list[Part] = [*_quality(fit)]
     parts += _case_pictures(fit, signals, columns)
     output = output_side(fit.mapping)
     if instants:
         title = f"{fit.name}: the {len(instants)} worst instants"
         drawing = figures.instants_figure(instants, signals, title=title, label=output, unit=fit.unit)
-        parts.append(picture(drawing, title, "Zooms at the largest errors of the free run, worst first.", "instants"))
+        words = "Zooms at the largest errors of the free run, worst first."
+        parts.append(picture(drawing, title, words, f"instants{suffix}"))
         parts.append(_instants_table(fit, instants))
     r = {case: record.free_run.r for case, record in fit.cases.items()}
     drawing = figures.regression_figure(signals, r, label=output, unit=fit.unit)
     caption = "Free run against target: a perfect model lies on the line."
-    parts.append(picture(drawing, f"{fit.name}: target-output regression", caption, "regression"))
-    return Section(anchor="best", title=f"The chosen model: {fit.name}", parts=tuple(parts))
+    parts.append(picture(drawing, f"{fit.name}: target-output regression", caption, f"regression{suffix}"))
+    return Section(anchor=f"best{suffix}", title=f"The chosen model: {fit.name}", parts=tuple(parts))
 
 
 def _quality(fit: FitRecord) -> list[Table]:
@@ -191,7 +194,7 @@ def _instants_table(fit: FitRecord, instants: list[Instant]) -> Table:
 
 
 def _run_times(results: Results, published: PublishedTable | None) -> Section:
-    best = None if results.best is None else results.best.name
+    best = {fit.name for fit in results.best_fits}
     parts: list[Part] = [run_time_table(fits, best) for fits in results.mappings().values()]
     per_thousand = {
         fit.name: float(np.median([1e6 * case.run_time_s / case.simulated_s for case in fit.cases.values()]))
@@ -246,7 +249,6 @@ def _data(results: Results) -> Section:
 
 
 def _others(results: Results, signals: Dict[str, Dict[str, CaseSignals]], columns: int) -> list[Section]:
-    best = results.best_fit
     return [
         Section(
             anchor=f"fit-{identifier(fit.slug)}",
@@ -257,5 +259,5 @@ def _others(results: Results, signals: Dict[str, Dict[str, CaseSignals]], column
             ),
         )
         for fit in results.fits
-        if fit is not best
+        if not results.chosen(fit)
     ]

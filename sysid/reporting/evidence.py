@@ -71,10 +71,9 @@ def _residuals(results: Results, residuals: dict[str, dict[str, GroupRecord]]) -
     parts: list[Part] = [_residual_table(results, residuals)]
     kinds = {fit.structure.get("kind") for fit in results.fits}
     parts += [row.of_residuals for kind, row in ESTIMATORS.items() if kind in kinds and row.of_residuals]
-    best = results.best_fit
     for fit in results.fits:
         groups = {name: group.analysis for name, group in residuals[fit.name].items() if group.analysis is not None}
-        if not groups or not (fit is best or _linear(fit)):
+        if not groups or not (results.chosen(fit) or _linear(fit)):
             continue
         said = " ".join(f"{name.capitalize()} cases: {' '.join(found.sentences)}" for name, found in groups.items())
         caption = f"{fit.name}: correlation of the one-step residuals, with 99 % bounds in grey. {said}"
@@ -124,7 +123,7 @@ def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord
 
 
 def _responses(folder: Path, fit: FitRecord) -> list[Part]:
-    stored = _read_fit(folder / "fits" / fit.slug / "fit.json")
+    stored = _read_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
     if stored is None or stored.model.pole_radius is None:
         return []
     model, uncertainty, name = stored.model, stored.uncertainty, identifier(fit.slug)

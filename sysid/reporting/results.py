@@ -167,6 +167,10 @@ class FitRecord(Record):
     name: str = Field(description="Its name in tables.")
     slug: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+-]*$", description="Its folder under fits/.")
     mapping: str = Field(description="Written as in 'BP+AR -> BC'.")
+    system: str | None = Field(
+        default=None, description="Name of the fit of several outputs that it is one output of; null for one output."
+    )
+    model_slug: str = Field(default="", description="Folder under fits/ of its model; empty where it is its own.")
     structure: dict[str, Any] = Field(description="All fields of the structure.")
     label: str = Field(description="Structure in a few characters, such as 'NARX 4/4/20'.")
     loop: Loop
@@ -244,6 +248,27 @@ class AmplitudeRecord(Record):
     network_fit: Number = Field(description="That free-run fit in percent.")
 
 
+class SystemCaseRecord(Record):
+    """A fit of several outputs on one case."""
+
+    role: Role
+    mean_fit: Number = Field(description="Mean over the outputs of the free run's fit in percent.")
+    run_time_s: Number = Field(description="Seconds that the free run of all models took.")
+
+
+class SystemRecord(Record):
+    """A fit of several outputs as a whole."""
+
+    name: str = Field(description="Its name in the pipeline.")
+    mapping: str = Field(description="Written as in 'u -> y1+y2'.")
+    label: str = Field(description="Structure in a few characters.")
+    fits: dict[str, str] = Field(description="By output the name of the fit object that has its figures.")
+    models: int = Field(description="How many models: one, or one an output.")
+    n_parameters: int = Field(description="Fitted parameters of all models.")
+    train_time_s: Number = Field(description="Wall seconds of the fits of all models.")
+    cases: dict[str, SystemCaseRecord]
+
+
 class LinearityRecord(Record):
     """Whether a linear model is enough, amplitude by amplitude."""
 
@@ -257,7 +282,8 @@ class Results(RunResults):
 
     data: DataRecord
     selection: SelectionRecord | None = Field(default=None, description="The traces that chose between fits.")
-    fits: list[FitRecord] = Field(min_length=1, description="One object a fit.")
+    fits: list[FitRecord] = Field(min_length=1, description="One object a fit and output.")
+    systems: list[SystemRecord] = Field(default=[], description="Fits of several outputs as wholes.")
     best: BestRecord | None = Field(default=None, description="Which fit was chosen.")
     linearity: LinearityRecord | None = Field(default=None, description="Whether a linear model is enough.")
     published: str | None = Field(default=None, description="Reference table to set beside ours.")
@@ -267,6 +293,24 @@ class Results(RunResults):
     def best_fit(self) -> FitRecord | None:
         """The fit that was chosen."""
         return None if self.best is None else next(fit for fit in self.fits if fit.name == self.best.name)
+
+    @property
+    def best_fits(self) -> list[FitRecord]:
+        """The fit that was chosen, output by output."""
+        best = self.best_fit
+        if best is None or best.system is None:
+            return [] if best is None else [best]
+        return [fit for fit in self.fits if fit.system == best.system]
+
+    @property
+    def best_name(self) -> str:
+        """Name of the fit that was chosen, as the pipeline has it."""
+        best = self.best_fit
+        return "" if best is None else best.system or best.name
+
+    def chosen(self, fit: FitRecord) -> bool:
+        """Whether a fit is what was chosen, or one output of that."""
+        return any(fit is one for one in self.best_fits)
 
     def mappings(self) -> dict[str, list[FitRecord]]:
         """The fits by mapping, both in the order of the file."""

@@ -7,7 +7,7 @@ import math
 from sysid.reporting.assembly.results import AssemblyResults
 from sysid.reporting.judging.results import JudgementResults
 from sysid.reporting.numbers import seconds
-from sysid.reporting.results import Results
+from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.scores import Score
 
 
@@ -18,23 +18,22 @@ def fit_scores(results: Results) -> list[Score]:
         results: Of a run, with the published figures where there are some.
 
     Returns:
-        One score; none where no fit was chosen.
+        One score an output; none where no fit was chosen.
     """
-    fit = results.best_fit
-    if fit is None:
-        return []
+    return [_fit_score(fit) for fit in results.best_fits]
+
+
+def _fit_score(fit: FitRecord) -> Score:
     figures = {name: (case.published or {}).get("free_run") for name, case in fit.cases.items()}
     known = {name: figure for name, figure in figures.items() if figure is not None}
-    return [
-        Score(
-            mapping=fit.mapping,
-            unit=fit.unit,
-            model=f"{fit.label}, trained in {fit.loop.value} loop in {seconds(fit.train_time_s)}",
-            mse={name: case.free_run.mse for name, case in fit.cases.items()},
-            published={name: figure.value for name, figure in known.items()},
-            source=", ".join(dict.fromkeys(f"{figure.source}: {figure.label}" for figure in known.values())),
-        )
-    ]
+    return Score(
+        mapping=fit.mapping,
+        unit=fit.unit,
+        model=f"{fit.label}, trained in {fit.loop.value} loop in {seconds(fit.train_time_s)}",
+        mse={name: case.free_run.mse for name, case in fit.cases.items()},
+        published={name: figure.value for name, figure in known.items()},
+        source=", ".join(dict.fromkeys(f"{figure.source}: {figure.label}" for figure in known.values())),
+    )
 
 
 def assembly_scores(results: AssemblyResults) -> list[Score]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -172,13 +172,13 @@ def mean_mse(fit: FitRecord, kind: str) -> float:
     return sum(values) / len(values) if values else float("nan")
 
 
-def accuracy_table(fits: Sequence[FitRecord], kind: str, best: str | None) -> Table:
+def accuracy_table(fits: Sequence[FitRecord], kind: str, best: Collection[str]) -> Table:
     """Mean squared errors of the fits of one mapping by case, of one kind only, with the published figures below.
 
     Args:
         fits: The fits.
         kind: ``free_run`` or ``one_step``.
-        best: Name of the chosen fit.
+        best: Names of what was chosen.
 
     Returns:
         The table.
@@ -206,12 +206,50 @@ def accuracy_table(fits: Sequence[FitRecord], kind: str, best: str | None) -> Ta
     )
 
 
-def run_time_table(fits: Sequence[FitRecord], best: str | None) -> Table:
+def systems_table(results: Results) -> Table:
+    """Fits of several outputs as wholes: mean over the outputs of the free run's fit, by case.
+
+    Args:
+        results: The results, with systems.
+
+    Returns:
+        The table.
+    """
+    cases = {name: case.role for one in results.systems for name, case in one.cases.items()}
+    best = {fit.system for fit in results.best_fits}
+    rows = []
+    for one in results.systems:
+        chosen = one.name in best
+        count = f"{one.models} model{'' if one.models == 1 else 's'}, {one.n_parameters} parameters"
+        below = f"{one.label}, {count}{'; chosen' if chosen else ''}"
+        unseen = [case.mean_fit for case in one.cases.values() if case.role in SCORED]
+        rows.append(
+            (
+                Cell(text=one.name, below=below, header=True, mark="best" if chosen else ""),
+                *(figure_cell(one.cases[name].mean_fit, digits=4, missing=DIVERGED) for name in cases),
+                figure_cell(sum(unseen) / len(unseen) if unseen else math.nan, digits=4, missing="no such case"),
+                Cell(text=seconds(one.train_time_s), value=one.train_time_s, mark="number"),
+            )
+        )
+    return Table(
+        caption=f"The whole: mean over the outputs of the free run's fit [%]. {results.systems[0].mapping}.",
+        head=(
+            ("fit", ""),
+            *((name, role.value) for name, role in cases.items()),
+            ("mean", "unseen cases"),
+            ("training", ""),
+        ),
+        rows=tuple(rows),
+        note="100 is exact. Each output has its own tables below.",
+    )
+
+
+def run_time_table(fits: Sequence[FitRecord], best: Collection[str]) -> Table:
     """Run time of the free run by case, with how many times faster than real time it is.
 
     Args:
         fits: The fits of one mapping.
-        best: Name of the chosen fit.
+        best: Names of what was chosen.
 
     Returns:
         The table.
@@ -230,7 +268,7 @@ def run_time_table(fits: Sequence[FitRecord], best: str | None) -> Table:
 
 
 def _by_case(
-    fits: Sequence[FitRecord], best: str | None, cell: Callable[[CaseRecord], Cell]
+    fits: Sequence[FitRecord], best: Collection[str], cell: Callable[[CaseRecord], Cell]
 ) -> list[tuple[FitRecord, tuple[Cell, ...]]]:
     """Each fit with its name and a cell of every case that one of them has."""
     columns = case_columns(fits)
@@ -292,15 +330,18 @@ def _word(figures: FiguresRecord, missing: str) -> str:
 
 def ranking_table(results: Results) -> Table:
     """What was tried, best first on the traces that chose."""
-    ranked = sorted(results.fits, key=lambda fit: (math.isnan(fit.selection_mse), fit.selection_mse))
-    best = None if results.best is None else results.best.name
+    order = list(results.mappings())
+    ranked = sorted(
+        results.fits, key=lambda fit: (order.index(fit.mapping), math.isnan(fit.selection_mse), fit.selection_mse)
+    )
+    best = {fit.name for fit in results.best_fits}
     rows = []
     for fit in ranked:
         effective = None if fit.evidence is None else sum(fit.evidence.effective_parameters.values())
         count = Cell(text="unknown") if fit.n_parameters is None else _count_cell(fit.n_parameters, effective)
         rows.append(
             (
-                Cell(text=fit.name, header=True, below="chosen" if fit.name == best else "", mark=_mark(fit, best)),
+                Cell(text=fit.name, header=True, below="chosen" if fit.name in best else "", mark=_mark(fit, best)),
                 Cell(text=fit.label, below=fit.mapping.replace("->", "→")),
                 Cell(text=fit.loop.value),
                 count,
@@ -408,8 +449,8 @@ def _sentence(text: str) -> str:
     return text if text.endswith((".", "!", "?")) else text + "."
 
 
-def _name_cell(fit: FitRecord, best: str | None) -> Cell:
-    chosen = fit.name == best
+def _name_cell(fit: FitRecord, best: Collection[str]) -> Cell:
+    chosen = fit.name in best
     below = f"{fit.label}, trained in {fit.loop.value} loop" + ("; chosen" if chosen else "")
     return Cell(text=fit.name, below=below, header=True, mark=_mark(fit, best))
 
@@ -419,8 +460,8 @@ def _selection_words(results: Results) -> str:
     return f"{units.pop()}², free run" if len(units) == 1 else "free run"
 
 
-def _mark(fit: FitRecord, best: str | None) -> str:
-    return "best" if fit.name == best else ""
+def _mark(fit: FitRecord, best: Collection[str]) -> str:
+    return "best" if fit.name in best else ""
 
 
 def _mse_cell(case: CaseRecord, kind: str) -> Cell:

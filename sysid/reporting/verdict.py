@@ -7,6 +7,7 @@ from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 
 from sysid.estimation import Status
+from sysid.names import output_side
 from sysid.reporting.numbers import number, quantity, seconds, times
 from sysid.reporting.parts import Tile, Verdict
 from sysid.reporting.results import CaseRecord, FitRecord, Results
@@ -14,12 +15,12 @@ from sysid.reporting.tables import mean_mse, real_time_factor, scored_cases
 from sysid.reporting.worst_instants import Instant
 
 
-def verdict(results: Results, instants: Sequence[Instant], comparability: str) -> Verdict:
+def verdict(results: Results, instants: Dict[str, Sequence[Instant]], comparability: str) -> Verdict:
     """Say which model was chosen and what it is worth.
 
     Args:
         results: The results, with published figures where there are some.
-        instants: The worst instants of the chosen fit, worst first.
+        instants: The worst instants of what was chosen, by name of the fit, worst first.
         comparability: What a comparison with the published figures can and cannot say.
 
     Returns:
@@ -33,19 +34,31 @@ def verdict(results: Results, instants: Sequence[Instant], comparability: str) -
             points=(("Fits", f"{len(results.fits)} fits are compared below; none was marked as the best."),),
             warnings=_warnings(results, None),
         )
-    cases = _judged(best)
-    points = [("Accuracy", _accuracy(best, cases, cases_chose=results.best.cases_chose))]
-    published = _published(cases, comparability)
-    points += [("Published", published)] if published else []
-    points += [("Speed", _speed(cases, results)), ("Weakness", _weakness(best, cases, instants))]
+    points: list[tuple[str, str]] = []
+    for fit in results.best_fits:
+        cases, of = _judged(fit), "" if fit.system is None else f", {output_side(fit.mapping)}"
+        points.append((f"Accuracy{of}", _accuracy(fit, cases, cases_chose=results.best.cases_chose)))
+        published = _published(cases, comparability)
+        points += [(f"Published{of}", published)] if published else []
+        points.append((f"Weakness{of}", _weakness(fit, cases, instants[fit.name])))
+    points.insert(-1 if best.system is None else len(points), ("Speed", _speed(_judged(best), results)))
     points += [("Choice", results.best.chosen_by), ("Export", _export(best))]
-    count = "" if best.n_parameters is None else f", {best.n_parameters} parameters"
+    tiles = [tile for fit in results.best_fits for tile in _tiles(fit, _judged(fit))]
     return Verdict(
-        headline=f"{best.name} ({best.label}, trained in {best.loop.value} loop{count}) models {best.mapping}.",
-        tiles=_tiles(best, cases),
+        headline=_headline(results, best),
+        tiles=tuple(tiles),
         points=tuple(points),
-        warnings=_warnings(results, best),
+        warnings=tuple(dict.fromkeys(text for fit in results.best_fits for text in _warnings(results, fit))),
     )
+
+
+def _headline(results: Results, best: FitRecord) -> str:
+    whole = next((one for one in results.systems if one.name == best.system), None)
+    if whole is not None:
+        what = "one model" if whole.models == 1 else f"{whole.models} models run as one"
+        return f"{whole.name} ({whole.label}, {what}, {whole.n_parameters} parameters) models {whole.mapping}."
+    count = "" if best.n_parameters is None else f", {best.n_parameters} parameters"
+    return f"{best.name} ({best.label}, trained in {best.loop.value} loop{count}) models {best.mapping}."
 
 
 def _judged(fit: FitRecord) -> Dict[str, CaseRecord]:
@@ -57,6 +70,9 @@ def _tiles(fit: FitRecord, cases: Dict[str, CaseRecord]) -> tuple[Tile, ...]:
     fits = [case.free_run.nrmse_fit for case in cases.values() if math.isfinite(case.free_run.nrmse_fit)]
     errors = [case.free_run.max_abs_error for case in cases.values()]
     factor = min(real_time_factor(case) for case in cases.values())
+    if fit.system is not None:
+        words = f"lowest fit of {output_side(fit.mapping)}, free run"
+        return (Tile(figure=quantity(min(fits), "%", digits=4) if fits else "-", words=words),)
     return (
         Tile(figure=quantity(mean, f"{fit.unit}²", missing="diverged"), words="mean mse, free run"),
         Tile(figure=quantity(min(fits), "%", digits=4) if fits else "-", words="lowest fit, free run"),
@@ -166,7 +182,7 @@ def _warnings(results: Results, best: FitRecord | None) -> tuple[str, ...]:
         found += _overtaken(results, best)
     for fit in results.fits:
         diverging = [name for name, case in fit.cases.items() if not math.isfinite(case.free_run.mse)]
-        if diverging and fit is not best:
+        if diverging and not results.chosen(fit):
             found.append(f"{fit.name}: the free run diverges on {', '.join(diverging)}.")
     return tuple(found)
 

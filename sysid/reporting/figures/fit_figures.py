@@ -294,14 +294,13 @@ def size_figure(results: Results) -> Figure:
     with styled():
         figure = new_figure(7.6, 3.4)
         axes = figure.subplots()
-        chosen = None if results.best is None else results.best.name
         for index, fit in enumerate(results.fits):
             error = fit.selection_mse if np.isfinite(fit.selection_mse) else _mean_mse(fit.cases)
             if fit.n_parameters is None or not (np.isfinite(error) and error > 0.0):
                 continue
             style = {**series_style(index), "linestyle": "none"}
             axes.plot([fit.n_parameters], [error], **style, markersize=6, label=f"{fit.name}, {fit.label}")
-            if fit.name == chosen:
+            if results.chosen(fit):
                 axes.plot([fit.n_parameters], [error], "o", fillstyle="none", color=TARGET, markersize=13)
             effective = 0.0 if fit.evidence is None else sum(fit.evidence.effective_parameters.values())
             if 0.0 < effective < fit.n_parameters:

@@ -26,8 +26,8 @@ from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
     FormatField,
+    MappingField,
     OptionsConfig,
-    SingleMappingField,
     StartField,
     StructureField,
     as_field_error,
@@ -122,7 +122,7 @@ class PipelineConfig(BaseModel):
         description: What it is for.
         data: Name of a data set, or path of its ``dataset.yaml``.
         selection: Data set with traces that choose between fits; validation cases never do.
-        mapping: Inputs and output, such as ``BP+AR -> BC``.
+        mapping: Inputs and outputs, such as ``BP+AR -> BC`` or ``STP -> BP+AR``.
         start: How each free run begins.
         rest: Value at rest of the output, by channel name, in its unit.
         seed: Seed of everything random.
@@ -140,7 +140,7 @@ class PipelineConfig(BaseModel):
     description: str = ""
     data: str
     selection: str | None = None
-    mapping: SingleMappingField
+    mapping: MappingField
     start: StartField = Start(kind=StartKind.ESTIMATED)
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
@@ -186,13 +186,14 @@ class PipelineConfig(BaseModel):
                 got=self.export.fit,
                 remedy=f"did you mean {near[0]}?" if near else "correct the name",
             )
-        strangers = sorted(set(self.rest) - {self.mapping.output})
+        outputs = self.mapping.outputs
+        strangers = sorted(set(self.rest) - set(outputs))
         if strangers:
             raise FieldError(
-                f"rest names {', '.join(strangers)}, which is not the output",
-                expected=self.mapping.output,
+                f"rest names {', '.join(strangers)}, which is not {'the' if len(outputs) == 1 else 'an'} output",
+                expected=", ".join(outputs),
                 got=", ".join(strangers),
-                remedy=f"write rest: {{{self.mapping.output}: 0}}; inputs rest at their first sample",
+                remedy=f"write rest: {{{outputs[0]}: 0}}; inputs rest at their first sample",
             )
         return self
 
@@ -202,15 +203,16 @@ class PipelineConfig(BaseModel):
         for fit in self.fits:
             initial = None if fit.initial is None else structures[fit.initial]
             try:
-                check_request(fit.structure, len(self.mapping.inputs), initial=initial)
+                n_outputs = len(self.mapping.outputs)
+                check_request(fit.structure, len(self.mapping.inputs), n_outputs=n_outputs, initial=initial)
             except ConfigError as error:
                 raise as_field_error(error, f"the fit {fit.name!r}") from error
         return self
 
     @property
-    def rest_output(self) -> float | None:
-        """The output's declared value at rest, ``None`` where none is declared."""
-        return self.rest.get(self.mapping.output)
+    def rest_output(self) -> float | dict[str, float] | None:
+        """The output's declared value at rest, ``None`` where none is declared; of several outputs those, by name."""
+        return self.rest.get(self.mapping.output) if len(self.mapping.outputs) == 1 else dict(self.rest)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -52,7 +52,7 @@ def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str],
         ChannelError: If a channel of the mapping is missing.
     """
     traces = _annotated(_load(config.data, beside, progress), config)
-    names = (*config.mapping.inputs, config.mapping.output)
+    names = (*config.mapping.inputs, *config.mapping.outputs)
     traces.traces[0].columns(names)
     if not traces.with_role(Role.ESTIMATION):
         raise ConfigError(

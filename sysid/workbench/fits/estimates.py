@@ -13,11 +13,11 @@ import time
 from collections.abc import Callable, Sequence
 
 from sysid.errors import ConfigError
-from sysid.estimation import FitProgress, FitResult, Training
+from sysid.estimation import FitProgress, FitResult, JointTraining, Training
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.networks.multistart import planned_iterations
 from sysid.traces import Trace, TraceSet
-from sysid.workbench.fields import TrainingConfig, given_options
+from sysid.workbench.fields import given_options, options_of
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
@@ -49,12 +49,30 @@ def how_long(fit: FitConfig, config: PipelineConfig, data: Data) -> Estimate:
         At most so long.
     """
     training = fit.training_options(config.seed)
+    if isinstance(training, JointTraining):
+        return _joint(training, lambda few: _fitted(fit, config, data, few, lambda _: None))
     if not isinstance(training, Training):
         return Estimate(seconds=_linear(fit, config, data), basis=f"measured now on 1/{SHARE} of the samples")
     return network_time(
         training.with_starts(estimator_of(fit.structure).starts),
         lambda few, note: _fitted(fit, config, data, few, note),
     )
+
+
+def _joint(training: JointTraining, fit: Callable[[JointTraining], object]) -> Estimate:
+    """How long the training of a network of several outputs takes."""
+    few = dataclasses.replace(
+        training, max_iterations=CALIBRATION_ITERATIONS, starts=1, checkpoints=1, max_time_s=CALIBRATION_LIMIT_S
+    )
+    fit(dataclasses.replace(few, max_iterations=1))  # compiles
+    began = time.perf_counter()
+    fit(few)
+    iteration = (time.perf_counter() - began) / CALIBRATION_ITERATIONS
+    # Half of the starts are dropped at each look, the first of which comes after a share of the iterations.
+    share = 1.0 + sum(2.0**-look * (training.starts - 1) for look in range(1, training.checkpoints + 1)) / 2.0
+    iterations = training.max_iterations * min(share, training.starts)
+    seconds = min(iterations * iteration, training.max_time_s)
+    return Estimate(seconds=seconds, basis=f"at most: {iterations:.0f} iterations of {1e3 * iteration:.1f} ms")
 
 
 def network_time(
@@ -106,9 +124,14 @@ def _median(moments: Sequence[float]) -> float | None:
 
 
 def _fitted(
-    fit: FitConfig, config: PipelineConfig, data: Data, training: Training, note: Callable[[FitProgress], None]
+    fit: FitConfig,
+    config: PipelineConfig,
+    data: Data,
+    training: Training | JointTraining,
+    note: Callable[[FitProgress], None],
 ) -> FitResult:
-    given = TrainingConfig(**{**(given_options(fit.training) or {}), **{name: getattr(training, name) for name in FEW}})
+    few = {name: getattr(training, name) for name in FEW if hasattr(training, name)}
+    given = options_of(estimator_of(fit.structure))(**{**(given_options(fit.training) or {}), **few})
     return steps.fit_traces(fit.model_copy(update={"training": given, "initial": None}), config, data, None, note)
 
 

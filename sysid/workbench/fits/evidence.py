@@ -24,7 +24,7 @@ def residuals(fit: FitResult, data: Data, config: PipelineConfig) -> dict[str, A
     Args:
         fit: The fit.
         data: The traces.
-        config: The pipeline.
+        config: The pipeline, as of one output.
 
     Returns:
         The contents of ``residuals.json``: by group its ``cases``, and its ``analysis`` or the ``reason`` why there is
@@ -37,7 +37,9 @@ def residuals(fit: FitResult, data: Data, config: PipelineConfig) -> dict[str, A
             continue
         groups[name] = {"cases": [trace.name for trace in traces], "analysis": None, "reason": ""}
         try:
-            groups[name]["analysis"] = analyse_residuals(fit.model, traces, config.start).to_dict()
+            groups[name]["analysis"] = analyse_residuals(
+                fit.model, traces, config.start, output=config.mapping.output
+            ).to_dict()
         except TraceError as error:
             # A short trace or a model that diverges one step ahead is a finding; the run goes on.
             groups[name]["reason"] = str(error)
@@ -51,8 +53,11 @@ def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:
         fits: The fits that are ready.
 
     Returns:
-        The verdict as JSON values; ``None`` unless there are linear models and networks that may be compared.
+        The verdict as JSON values; ``None`` unless there are linear models and networks that may be compared, and one
+        output.
     """
+    if len({ready.pipeline.mapping for ready in fits}) > 1:
+        return None
     usable = [ready for ready in fits if ready.fit.status.comparable]
     linear, networks = (
         {

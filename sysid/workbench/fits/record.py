@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from sysid.estimation import CascadeFit, FitResult, Posterior, Status
+from sysid.models import Mapping as Mapped
 from sysid.reporting.records import SCHEMA_VERSION
 from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import Role
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
+from sysid.validation.metrics import mean_fit
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.evidence import linearity
@@ -132,7 +134,9 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]]) -> dict[st
     return {
         "name": ready.config.name,
         "slug": ready.config.slug,
-        "mapping": str(model.mapping),
+        "mapping": str(ready.pipeline.mapping),
+        "system": ready.system,
+        "model_slug": ready.model_slug or ready.config.slug,
         "structure": model.structure.to_dict(),
         "label": model.structure.label,
         "loop": fit.loop.value,
@@ -179,7 +183,8 @@ def results_document(
         JSON values, apart from NaN and the infinities.
     """
     traces = data.traces
-    first = choice.name if choice else None
+    chosen = [] if choice is None else [one for one in fits if (one.system or one.config.name) == choice.name]
+    first = chosen[0].config.name if chosen else None
     start = config.start
     return {
         "schema_version": SCHEMA_VERSION,
@@ -213,10 +218,52 @@ def results_document(
         else None,
         "start": {"kind": start.kind.value, "n_measured": start.n_measured},
         "fits": [fit_record(ready, exports if ready.config.name == first else ()) for ready in fits],
-        "best": asdict(choice) if choice else None,
+        "systems": system_records(fits),
+        "best": asdict(choice) | {"name": first} if choice else None,
         "linearity": linearity(fits),
         "published": config.report.published,
         "sweep": None if sweep is None else sweep.summary.model_dump(),
+    }
+
+
+def system_records(fits: Sequence[FitReady]) -> list[dict[str, Any]]:
+    """The fits of several outputs as wholes, as they stand in results.json.
+
+    Args:
+        fits: The fits that are ready, output by output.
+
+    Returns:
+        JSON values, one for each; none of fits of one output.
+    """
+    groups: dict[str, list[FitReady]] = {}
+    for ready in fits:
+        if ready.system is not None:
+            groups.setdefault(ready.system, []).append(ready)
+    return [_system(name, outputs) for name, outputs in groups.items()]
+
+
+def _system(name: str, outputs: Sequence[FitReady]) -> dict[str, Any]:
+    models = {ready.model_slug: ready.fit for ready in outputs}
+    cases = [ready.evaluation.cases for ready in outputs]
+    whole = Mapped(inputs=outputs[0].pipeline.mapping.inputs, outputs=[ready.output for ready in outputs])
+    return {
+        "name": name,
+        "mapping": str(whole),
+        "label": outputs[0].fit.model.structure.label,
+        "fits": {ready.output: ready.config.name for ready in outputs},
+        "models": len(models),
+        "n_parameters": sum(fit.model.n_parameters for fit in models.values()),
+        "train_time_s": sum(fit.train_time_s for fit in models.values()),
+        "cases": {
+            case: {
+                "role": cases[0][case].role.value,
+                "mean_fit": mean_fit(one[case].free_run.nrmse_fit for one in cases),
+                "run_time_s": sum(
+                    {ready.model_slug: ready.evaluation.cases[case].run_time_s for ready in outputs}.values()
+                ),
+            }
+            for case in cases[0]
+        },
     }
 
 

@@ -20,6 +20,7 @@ from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, Pipel
 from sysid.workbench.fits.data import Data, load_data, unmade_data
 from sysid.workbench.fits.estimates import how_long
 from sysid.workbench.fits.evidence import residuals
+from sysid.workbench.fits.outputs import FitModel, FitOutput, models_of
 from sysid.workbench.fits.record import (
     export_record,
     is_final,
@@ -35,7 +36,7 @@ from sysid.workbench.runner import events
 from sysid.workbench.runner.program import Closing, Program, carry_out
 from sysid.workbench.runner.run import REPORT, Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
-from sysid.workbench.runner.store import strict, write_bytes
+from sysid.workbench.runner.store import digest, strict, write_bytes
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
@@ -141,7 +142,7 @@ def closing(results: Results, folder: Path) -> Closing:
     """
     lines: list[Any] = [table_of_fits(results)]
     if results.best is not None:
-        lines.append(f"Best: {results.best.name}. {results.best.chosen_by}")
+        lines.append(f"Best: {results.best_name}. {results.best.chosen_by}")
     files = {
         "Report": folder / "report" / "index.html",
         "Bundle": folder / "bundle",
@@ -151,29 +152,56 @@ def closing(results: Results, folder: Path) -> Closing:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Fitted:
-    """A fit and its figures, on their way."""
+class _Scored:
+    """One output of a fit and its figures, on their way."""
 
-    config: FitConfig
+    output: FitOutput
+    of: FitConfig
+    model: FitModel
     fit: Done[FitResult]
     scores: Done[steps.Scores]
+    folder: Path
 
     @property
     def pair(self) -> tuple[FitResult, steps.Scores]:
         return self.fit.value, self.scores.value
 
-    def ready(self, pipeline: PipelineConfig, folder: Path) -> events.FitReady:
+    def ready(self) -> events.FitReady:
         fit, scores = self.pair
         return events.FitReady(
-            config=self.config,
-            pipeline=pipeline,
+            config=self.output.fit,
+            pipeline=self.output.config,
             key=self.scores.key,
             fit=fit,
             evaluation=scores.evaluation,
             selection_mse=scores.selection_mse,
             stored=self.fit.stored and self.scores.stored,
-            folder=folder,
+            folder=self.folder,
+            system=None if self.of.name == self.output.fit.name else self.of.name,
+            model_slug=self.model.fit.slug,
         )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Fitted:
+    """A fit: its models, and its outputs in the mapping's order."""
+
+    config: FitConfig
+    models: Mapping[str, Done[FitResult]]
+    outputs: tuple[_Scored, ...]
+
+    @property
+    def pairs(self) -> list[tuple[FitResult, steps.Scores]]:
+        return [one.pair for one in self.outputs]
+
+    @property
+    def ready(self) -> list[events.FitReady]:
+        return [one.ready() for one in self.outputs]
+
+    @property
+    def scores_key(self) -> str:
+        keys = [one.scores.key for one in self.outputs]
+        return keys[0] if len(keys) == 1 else digest(keys)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -202,10 +230,11 @@ class FitSteps:
     def outline(self) -> list[Outlined]:
         """All steps, as far as they are known before the traces are."""
         found = [LOADING]
-        for fit in self.config.fits:
+        for model in (model for fit in self.config.fits for model in models_of(fit, self.config)):
+            found.append(Outlined(name=f"fit-{model.fit.slug}", title=fit_title(model.fit), called=model.fit.name))
             found += [
-                Outlined(name=f"fit-{fit.slug}", title=fit_title(fit), called=fit.name),
-                Outlined(name=f"scores-{fit.slug}", title=f"Scoring {fit.name}", estimate=SCORING_TIME),
+                Outlined(name=f"scores-{one.fit.slug}", title=f"Scoring {one.fit.name}", estimate=SCORING_TIME)
+                for one in model.outputs
             ]
         if self.config.export is not None:
             asked = self.config.export.fit
@@ -234,17 +263,21 @@ class FitSteps:
             fitted[fit.name] = self._fitted(run, fit, loaded, fitted)
             run.then(partial(self._announce, run, loaded, fitted, fit.name))
         asked = self.config.export.fit if self.config.export else "best"
-        choice = self.chosen or steps.choose({name: one.pair for name, one in fitted.items()}, asked)
+        sizes = steps.output_sizes(loaded.value, self.config.mapping.outputs)
+        choice = self.chosen or steps.choose({name: one.pairs for name, one in fitted.items()}, asked, sizes)
         best = fitted[choice.name]
         bundle = run.do(self._export(run, best, loaded)) if self.config.export else None
         exports = () if bundle is None else bundle.value
-        ready = best.ready(self.config, run.store.fit(best.config.slug))
         if bundle is not None:
-            told = events.BundleReady(of=ready, folder=run.store.path / "bundle", exports=exports, stored=bundle.stored)
-            run.then(lambda: run.tell(told))
+            place, stored = run.store.path / "bundle", bundle.stored
+            for ready in best.ready:
+                told = events.BundleReady(of=ready, folder=place, exports=exports, stored=stored)
+                run.then(partial(run.tell, told))
         results = self._results(run, loaded.value, fitted, choice=choice, exports=exports)
         page = run.report(results)
-        run.then(lambda: run.tell(events.ReportReady(page=page.value, results=run.store.results, of=ready)))
+        for ready in best.ready:
+            written = events.ReportReady(page=page.value, results=run.store.results, of=ready)
+            run.then(partial(run.tell, written))
         return results
 
     def loading(self) -> Step[Data]:
@@ -267,12 +300,20 @@ class FitSteps:
         )
 
     def _fitted(self, run: Run, fit: FitConfig, loaded: Done[Data], earlier: Mapping[str, _Fitted]) -> _Fitted:
-        initial = earlier[fit.initial].fit if fit.initial else None
-        made = run.do(self._fit(run, fit, loaded, initial))
-        return _Fitted(config=fit, fit=made, scores=run.do(self._score(run, made, loaded, fit)))
+        begun = earlier[fit.initial].models if fit.initial else {}
+        models, outputs = dict[str, Done[FitResult]](), list[_Scored]()
+        for model in models_of(fit, self.config):
+            mapping = str(model.config.mapping)
+            made = models[mapping] = run.do(self._fit(run, model, loaded, begun.get(mapping)))
+            for one in model.outputs:
+                folder = run.store.fit(one.fit.slug)
+                scores = run.do(self._score(made, loaded, one, folder))
+                outputs.append(_Scored(output=one, of=fit, model=model, fit=made, scores=scores, folder=folder))
+        return _Fitted(config=fit, models=models, outputs=tuple(outputs))
 
-    def _fit(self, run: Run, fit: FitConfig, loaded: Done[Data], initial: Done[FitResult] | None) -> Step[FitResult]:
-        config, given, folder = self.config, self.given.get(fit.name), run.store.fit(fit.slug)
+    def _fit(self, run: Run, model: FitModel, loaded: Done[Data], initial: Done[FitResult] | None) -> Step[FitResult]:
+        fit, config = model.fit, model.config
+        given, folder = self.given.get(fit.name), run.store.fit(fit.slug)
 
         def find_key() -> str:
             return given.key if given else steps.fit_key(fit, config, loaded.value, initial.key if initial else None)
@@ -297,17 +338,18 @@ class FitSteps:
             amount=lambda: _amount(fit, loaded.value),
             how_long=lambda: how_long(fit, config, loaded.value),
             called=fit.name,
-            export=lambda result, into, provenance: self._bundle(result, loaded.value, into, provenance),
+            export=lambda result, into, provenance: self._bundle(model, result, loaded.value, into, provenance),
         )
 
-    def _bundle(self, fit: FitResult, data: Data, folder: Path, provenance: dict[str, Any]) -> Bundle:
-        """Any fit as a bundle, whether or not it is the one that the pipeline exports."""
-        config = self.config.model_copy(update={"export": self.config.export or ExportConfig()})
-        scores = steps.score(fit, data, config)
-        return steps.export(fit, scores, data, config, folder=folder, provenance=provenance)
+    def _bundle(self, model: FitModel, fit: FitResult, data: Data, folder: Path, provenance: dict[str, Any]) -> Bundle:
+        """Any model of a fit as a bundle, whether or not it is the one that the pipeline exports."""
+        config = model.config.model_copy(update={"export": self.config.export or ExportConfig()})
+        scores = {one.config.mapping.output: steps.score(fit, data, one.config) for one in model.outputs}
+        return steps.export([fit], scores, data, config, folder=folder, provenance=provenance)
 
-    def _score(self, run: Run, made: Done[FitResult], loaded: Done[Data], fit: FitConfig) -> Step[steps.Scores]:
-        config, folder, found = self.config, run.store.fit(fit.slug), list[dict[str, Any]]()
+    @staticmethod
+    def _score(made: Done[FitResult], loaded: Done[Data], output: FitOutput, folder: Path) -> Step[steps.Scores]:
+        fit, config, found = output.fit, output.config, list[dict[str, Any]]()
 
         def make(_: Work) -> steps.Scores:
             scores = steps.score(made.value, loaded.value, config)
@@ -329,11 +371,13 @@ class FitSteps:
         )
 
     def _export(self, run: Run, best: _Fitted, loaded: Done[Data]) -> Step[tuple[dict[str, Any], ...]]:
-        config, folder, unit = self.config, run.store.path / "bundle", best.fit.value.model.output_unit
+        config, folder, fits = self.config, run.store.path / "bundle", [one.value for one in best.models.values()]
+        unit = ", ".join(dict.fromkeys(unit for fit in fits for unit in fit.model.ends.output_units))
+        scores = {one.output.config.mapping.output: one.scores.value for one in best.outputs}
         provenance = {"pipeline": config.name, "fit": best.config.name, "command": run.command}
 
         def make(_: Work) -> tuple[dict[str, Any], ...]:
-            bundle = steps.export(*best.pair, loaded.value, config, folder=folder, provenance=provenance)
+            bundle = steps.export(fits, scores, loaded.value, config, folder=folder, provenance=provenance)
             timed = steps.export_run_times(bundle) if config.export and config.export.run_times else ()
             return tuple(export_record(entry, folder.name, unit, timed) for entry in bundle.files)
 
@@ -347,8 +391,8 @@ class FitSteps:
             name="export",
             title=self._exporting(best.config.name),
             make=make,
-            key=lambda: steps.export_key(best.scores.key, config),
-            of=best.scores,
+            key=lambda: steps.export_key(best.scores_key, config),
+            of=best.outputs[-1].scores,
             write=lambda _: [file for file in sorted(folder.rglob("*")) if file.is_file()],
             read=lambda facts: tuple(facts["exports"]),
             facts=lambda exports: {"exports": list(exports)},
@@ -362,9 +406,10 @@ class FitSteps:
 
     def _announce(self, run: Run, loaded: Done[Data], fitted: Mapping[str, _Fitted], name: str) -> None:
         """Tell of a fit; a killed run leaves results.json with what is finished, not with what an older run had."""
-        ready = fitted[name].ready(self.config, run.store.fit(fitted[name].config.slug))
-        run.tell(ready)
-        if not ready.stored:
+        told = fitted[name].ready
+        for ready in told:
+            run.tell(ready)
+        if not all(ready.stored for ready in told):
             self._results(run, loaded.value, fitted, choice=None, exports=())
 
     def _results(
@@ -381,7 +426,7 @@ class FitSteps:
             command=run.command,
             environment=run.environment,
             data=data,
-            fits=[one.ready(self.config, run.store.fit(one.config.slug)) for one in fitted.values()],
+            fits=[ready for one in fitted.values() for ready in one.ready],
             choice=choice,
             exports=exports,
             sweep=read_sweep(run.store.path) if has_sweep(run.store.path) else None,

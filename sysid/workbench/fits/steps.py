@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,9 +20,9 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
 from sysid.estimation.estimators import estimator_of
 from sysid.export.exporters import wanted_formats
-from sysid.models import AbstractStructure
+from sysid.models import AbstractStructure, Cascade
 from sysid.traces import Role
-from sysid.validation import Evaluation, evaluate, evaluate_case
+from sysid.validation import CascadeEvaluation, Evaluation, case_results, evaluate_outputs
 from sysid.workbench.annotation import by_state, find_annotator
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
@@ -166,18 +166,20 @@ def scores_key(fit: str, structure: AbstractStructure, data: Data, config: Pipel
 
 
 def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
-    """Run a fitted model over every case, in free run and one step ahead.
+    """Run a fitted model over every case, in free run and one step ahead, and judge one output.
 
     Args:
         fit: The fit.
         data: The traces.
-        config: The pipeline.
+        config: The pipeline, as of that output.
 
     Returns:
         The figures.
     """
-    errors = [evaluate_case(fit.model, trace, Role.SELECTION, config.start, 1).free_run.mse for trace in data.selection]
-    evaluation = evaluate(fit.model, data.traces, config.start, posterior=fit.posterior)
+    output = config.mapping.output
+    chosen = [case_results(fit.model, trace, Role.SELECTION, config.start, 1)[output] for trace in data.selection]
+    errors = [case.free_run.mse for case in chosen]
+    evaluation = evaluate_outputs(fit.model, data.traces, config.start, posterior=fit.posterior)[output]
     if config.annotate is not None:
         annotator = find_annotator(config.annotate.by, where="annotate, by")
         evaluation = by_state(evaluation, data.traces, annotator)
@@ -202,31 +204,58 @@ class Choice:
     cases_chose: bool = False
 
 
-def choose(fits: Mapping[str, tuple[FitResult, Scores]], asked: str) -> Choice:
+def choose(
+    fits: Mapping[str, Sequence[tuple[FitResult, Scores]]], asked: str, sizes: Sequence[float] = (1.0,)
+) -> Choice:
     """Choose the fit that is exported and put first in the report.
 
     Args:
-        fits: Fits and figures by name.
+        fits: By name of the fit, for each of its outputs the fit and its figures.
         asked: ``best``, or the name of a fit.
+        sizes: For each output the squared error that counts as one.
 
     Returns:
         The choice. Cases for validation have no say in it.
     """
     if asked != "best":
         return Choice(name=asked, chosen_by="Named in the pipeline.")
+
+    def mean(figure: Callable[[Scores], float], pairs: Sequence[tuple[FitResult, Scores]]) -> float:
+        return float(np.mean([figure(scores) / size for (_, scores), size in zip(pairs, sizes, strict=True)]))
+
+    what = "mean squared error" if len(sizes) == 1 else "mean over the outputs of squared error over variance,"
     # An unstable fit is compared by its figures like the others, and says what it is in its status.
-    usable = {name: pair for name, pair in fits.items() if pair[0].status.comparable} or dict(fits)
-    by_selection = {name: pair[1].selection_mse for name, pair in usable.items()}
+    usable = {name: pairs for name, pairs in fits.items() if all(fit.status.comparable for fit, _ in pairs)} or fits
+    by_selection = {name: mean(lambda scores: scores.selection_mse, pairs) for name, pairs in usable.items()}
     if not any(math.isnan(mse) for mse in by_selection.values()):
-        sentence = "Least mean squared error of the free run on the selection traces."
+        sentence = f"Least {what} of the free run on the selection traces."
         return Choice(name=min(by_selection, key=by_selection.__getitem__), chosen_by=sentence)
     # Evidence cannot be compared between open and closed loop: their residuals are not the same.
-    by_estimation = {name: pair[1].evaluation.mean_mse(Role.ESTIMATION) for name, pair in usable.items()}
+    by_estimation = {
+        name: mean(lambda scores: scores.evaluation.mean_mse(Role.ESTIMATION), pairs) for name, pairs in usable.items()
+    }
     return Choice(
         name=min(by_estimation, key=by_estimation.__getitem__),
-        chosen_by="Least mean squared error of the free run on the estimation traces, for want of selection traces; "
+        chosen_by=f"Least {what} of the free run on the estimation traces, for want of selection traces; "
         "it favours the largest network.",
     )
+
+
+def output_sizes(data: Data, outputs: Sequence[str]) -> tuple[float, ...]:
+    """For each output the squared error that counts as one where fits are compared.
+
+    Args:
+        data: The traces.
+        outputs: The outputs.
+
+    Returns:
+        One for a single output, else the variance over the traces that choose, or that are fitted where none does.
+    """
+    if len(outputs) == 1:
+        return (1.0,)
+    traces = data.selection or data.estimation
+    found = [np.concatenate([trace[name][trace.usable_samples] for trace in traces]).var() for name in outputs]
+    return tuple(float(size) if size > 0.0 else 1.0 for size in found)
 
 
 def export_key(scores: str, config: PipelineConfig) -> str:
@@ -248,13 +277,19 @@ def export_key(scores: str, config: PipelineConfig) -> str:
 
 
 def export(
-    fit: FitResult, scores: Scores, data: Data, config: PipelineConfig, *, folder: Path, provenance: dict[str, Any]
+    fits: Sequence[FitResult],
+    scores: Mapping[str, Scores],
+    data: Data,
+    config: PipelineConfig,
+    *,
+    folder: Path,
+    provenance: dict[str, Any],
 ) -> Bundle:
     """Write a fit's files and check each against the model on every case.
 
     Args:
-        fit: The fit.
-        scores: Its figures, for the model card.
+        fits: Its models: one, or one an output, which are run as one.
+        scores: By output its figures, for the model card.
         data: The traces that the files are run on.
         config: The pipeline, with an ``export``.
         folder: Where the bundle goes.
@@ -271,14 +306,18 @@ def export(
 
     if config.export is None:
         raise ConfigError("the pipeline exports nothing", where=config.name, remedy="add export: {fit: best}")
+    figures = {output: one.evaluation for output, one in scores.items()}
+    several = len(fits) > 1
     return export_bundle(
-        fit,
+        Cascade(models=tuple(fit.model for fit in fits)) if several else fits[0],
         data.traces,
         folder,
         start=config.start,
+        outputs=config.mapping.outputs if several else None,
         formats=wanted_formats(config.export.formats).names,
         tolerance=config.export.tolerance,
-        metrics=scores.evaluation,
+        metrics=next(iter(figures.values())) if len(figures) == 1 else CascadeEvaluation(outputs=figures, activity={}),
+        fits={str(fit.model.mapping): fit for fit in fits} if several else None,
         provenance=provenance,
     )
 

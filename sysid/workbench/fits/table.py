@@ -17,9 +17,10 @@ def table_of_fits(results: Results) -> Table:
     Returns:
         The table.
     """
-    unit = next((fit.unit for fit in results.fits), "")
+    units = {fit.unit for fit in results.fits}
+    unit = f"{units.pop()}²" if len(units) == 1 else "each output's unit, squared"
     # Shown in one power of ten, as publications print them, so that columns compare at a glance.
-    table = Table(title=f"Free run, mean squared error in {unit}²", title_justify="left", header_style="bold")
+    table = Table(title=f"Free run, mean squared error in {unit}", title_justify="left", header_style="bold")
     table.add_column("fit")
     table.add_column("structure")
     table.add_column("loop")
@@ -30,7 +31,7 @@ def table_of_fits(results: Results) -> Table:
         table.add_column("selection", justify="right")
     table.add_column("training", justify="right")
     for fit in results.fits:
-        best = results.best is not None and fit.name == results.best.name
+        best = results.chosen(fit)
         table.add_row(*_row(fit, cases, selection=bool(results.selection)), style="bold" if best else None)
     return table
 

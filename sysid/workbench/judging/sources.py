@@ -104,7 +104,7 @@ def _of_run(part: PartConfig, workspace: Path) -> Found:
     fit = names[wanted]
     store = RunFolder(path=folder.resolve())
     return Found(
-        model=read_fit(store.fit(fit.slug)).model,
+        model=read_fit(store.fit(fit.model_slug or fit.slug)).model,
         said=f"{fit.name} ({fit.label}, {fit.mapping}) of the run {given}",
         run_folder=store.path,
         fit_key=_key(store, f"scores-{fit.slug}"),

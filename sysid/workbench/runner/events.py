@@ -97,14 +97,16 @@ class FitReady(Event):
     """A fit and its figures are on disk.
 
     Args:
-        config: The fit as the pipeline asks for it.
-        pipeline: The pipeline.
+        config: The fit as the pipeline asks for it; of several outputs, under a name of this one's own.
+        pipeline: The pipeline, as of this output alone.
         key: Digest of everything the fit and its figures depend on.
         fit: The fit.
         evaluation: Its figures on every case, signals included.
         selection_mse: Mean free-run mse on the selection traces; NaN without any.
         stored: Whether both come from an earlier run.
-        folder: Where they lie.
+        folder: Where its figures lie.
+        system: Name of the fit of several outputs that it is one output of; ``None`` for a fit of one output.
+        model_slug: Name of the folder under ``fits`` where its model lies.
     """
 
     config: FitConfig
@@ -115,6 +117,19 @@ class FitReady(Event):
     selection_mse: float
     stored: bool
     folder: Path
+    system: str | None = None
+    model_slug: str = ""
+
+    @property
+    def output(self) -> str:
+        """The output."""
+        return self.pipeline.mapping.output
+
+    @property
+    def unit(self) -> str:
+        """The output's unit."""
+        ends = self.fit.model.ends
+        return ends.output_units[ends.outputs.index(self.output)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

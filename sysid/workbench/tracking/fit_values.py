@@ -48,7 +48,7 @@ def run_name(ready: FitReady) -> str:
         For example ``BP+AR -> BC · NARX 4/4/20 · closed``.
     """
     model = ready.fit.model
-    mapping = shortened(visible(model.mapping), 180)
+    mapping = shortened(visible(ready.pipeline.mapping), 180)
     return f"{mapping} · {model.structure.label} · {ready.fit.loop.value}"
 
 
@@ -63,18 +63,22 @@ def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
     Returns:
         Texts by name.
     """
-    found = {
-        "pipeline": run.pipeline,
-        "pipeline_run": run.run_id,
-        "fit": ready.config.name,
-        "structure": ready.fit.model.structure.label,
-        "loop": ready.fit.loop.value,
-        "status": ready.fit.status.name,
-        "data": data.traces.name,
-        "data_digest": data.traces.digest,
-        "output_unit": ready.fit.model.output_unit,
-        "folder": str(ready.folder),
-    } | ({"initial_fit": ready.config.initial} if ready.config.initial else {})
+    found = (
+        {
+            "pipeline": run.pipeline,
+            "pipeline_run": run.run_id,
+            "fit": ready.config.name,
+            "structure": ready.fit.model.structure.label,
+            "loop": ready.fit.loop.value,
+            "status": ready.fit.status.name,
+            "data": data.traces.name,
+            "data_digest": data.traces.digest,
+            "output_unit": ready.unit,
+            "folder": str(ready.folder),
+        }
+        | ({"fit_of_several_outputs": ready.system} if ready.system else {})
+        | ({"initial_fit": ready.config.initial} if ready.config.initial else {})
+    )
     return {name: tracking_text(value) for name, value in found.items()}
 
 
@@ -107,7 +111,7 @@ def parameters(ready: FitReady) -> dict[str, str]:
         Texts by name.
     """
     structure = ready.fit.model.structure.to_dict()
-    chosen: dict[str, Any] = {"mapping": ready.fit.model.mapping, "start": ready.pipeline.start.kind.value, **structure}
+    chosen: dict[str, Any] = {"mapping": ready.pipeline.mapping, "start": ready.pipeline.start.kind.value, **structure}
     training = ready.config.training_options(ready.pipeline.seed)
     if training is not None:
         chosen |= {f"training.{name}": getattr(value, "value", value) for name, value in vars(training).items()}
@@ -188,8 +192,8 @@ def _picture(ready: FitReady, case: CaseResult) -> NDArray[np.uint8]:
         case.target,
         case.simulated,
         title=f"{case.case}, {case.role.value}: {model.structure.label}, {ready.fit.loop.value} loop",
-        label=model.mapping.output,
-        unit=model.output_unit,
+        label=ready.output,
+        unit=ready.unit,
     )
     # matplotlib's backends carry no annotations.
     canvas: Any = FigureCanvasAgg(figure)

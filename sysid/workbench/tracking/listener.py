@@ -120,7 +120,7 @@ class Tracker:
     def _log_fit(self, ready: FitReady) -> None:
         if self.client is None or self.run is None or self.data is None:
             return
-        experiment = tracking.experiment_of(self.client, str(ready.fit.model.mapping), self.artifacts)
+        experiment = tracking.experiment_of(self.client, str(ready.pipeline.mapping), self.artifacts)
         known = tracked_fit.known_run(self.client, experiment, ready, key_tag=KEY_TAG)
         if known is not None and ready.stored:
             self.run_ids[ready.config.name] = known

@@ -177,23 +177,36 @@ def fitted(free_run_mse: dict[Role, float], selection_mse: float, status: Status
     return fit, steps.Scores(evaluation=Evaluation(cases=cases), selection_mse=selection_mse)
 
 
+def one_output(fits: dict[str, tuple[FitResult, steps.Scores]]) -> dict[str, list[tuple[FitResult, steps.Scores]]]:
+    return {name: [pair] for name, pair in fits.items()}
+
+
+def test_each_output_counts_by_its_own_size() -> None:
+    near, far = (fitted({Role.ESTIMATION: 1.0}, mse) for mse in (1.0, 100.0))
+    small, large = (fitted({Role.ESTIMATION: 1.0}, mse) for mse in (0.001, 0.1))
+    fits = {"good at the small one": [far, small], "good at the large one": [near, large]}
+    assert steps.choose(fits, "best", (1e4, 1e-3)).name == "good at the small one"
+    assert steps.choose(fits, "best", (1.0, 1.0)).name == "good at the large one"
+
+
 def test_selection_traces_choose_and_validation_has_no_say() -> None:
     fits = {
         "best on validation": fitted({Role.ESTIMATION: 1.0, Role.VALIDATION: 0.1}, 3.0),
         "best on selection": fitted({Role.ESTIMATION: 2.0, Role.VALIDATION: 9.0}, 2.0),
         "best on estimation": fitted({Role.ESTIMATION: 0.1, Role.VALIDATION: 9.0}, 4.0),
     }
-    assert steps.choose(fits, "best").name == "best on selection"
-    assert "selection traces" in steps.choose(fits, "best").chosen_by
+    given = one_output(fits)
+    assert steps.choose(given, "best").name == "best on selection"
+    assert "selection traces" in steps.choose(given, "best").chosen_by
     without = {name: (fit, dataclasses.replace(scores, selection_mse=math.nan)) for name, (fit, scores) in fits.items()}
-    assert steps.choose(without, "best").name == "best on estimation"
-    assert "for want of selection traces" in steps.choose(without, "best").chosen_by
-    named = steps.choose(fits, "best on validation")
+    assert steps.choose(one_output(without), "best").name == "best on estimation"
+    assert "for want of selection traces" in steps.choose(one_output(without), "best").chosen_by
+    named = steps.choose(given, "best on validation")
     assert (named.name, named.chosen_by) == ("best on validation", "Named in the pipeline.")
 
 
 def test_a_fit_that_failed_is_not_chosen_unless_all_did() -> None:
     good = fitted({Role.ESTIMATION: 1.0}, 5.0)
     failed = fitted({Role.ESTIMATION: 1.0}, 1.0, Status.NOT_IMPROVED)
-    assert steps.choose({"failed": failed, "good": good}, "best").name == "good"
-    assert steps.choose({"failed": failed}, "best").name == "failed"
+    assert steps.choose(one_output({"failed": failed, "good": good}), "best").name == "good"
+    assert steps.choose(one_output({"failed": failed}), "best").name == "failed"

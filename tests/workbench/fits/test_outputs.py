@@ -1,0 +1,162 @@
+"""A pipeline of several outputs: one fit, one table row an output and the whole, one bundle."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from sysid.errors import ConfigError
+from sysid.export import read_bundle
+from sysid.models import model_from_dict
+from sysid.reporting.results import Results, read_results
+from sysid.workbench.fits.config import Pipeline, parse_pipeline
+from sysid.workbench.fits.record import read_fit
+from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.runner import events
+
+DATASET = """\
+name: tanks
+sample_time: 0.5
+channels: [{name: u, unit: V}, {name: w, unit: V}, {name: level, unit: cm}, {name: heat, unit: K}]
+source: {files: {}}
+cases:
+  run-1: {role: estimation, file: run-1.csv}
+  run-2: {role: selection, file: run-2.csv}
+  run-3: {role: validation, file: run-3.csv}
+"""
+PIPELINE = """\
+name: both
+data: tanks
+mapping: u+w -> level+heat
+start: rest
+rest: {heat: 1.0}
+stability: {count: 5}
+fits:
+  - {name: ARX, structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}}
+  - name: alone
+    structure: {kind: NARX, input_delays: 1, output_delays: 1, neurons: 1}
+    training: {max_iterations: 3, workers: 1}
+    initial: ARX
+  - name: whole
+    structure: {kind: VectorNARX, input_delays: 1, output_delays: 1, neurons: 1}
+    training: {max_iterations: 3, checkpoints: 1, workers: 1}
+  - name: further
+    structure: {kind: VectorNARX, input_delays: 1, output_delays: 1, neurons: 1}
+    training: {max_iterations: 2, checkpoints: 1, workers: 1}
+    initial: whole
+export: {fit: best, formats: [onnx]}
+"""
+
+
+def fill(folder: Path) -> None:
+    """Two outputs that act on each other."""
+    data = folder / "datasets" / "tanks"
+    data.mkdir(parents=True)
+    (data / "dataset.yaml").write_text(DATASET, encoding="utf-8")
+    for seed in (1, 2, 3):
+        rng = np.random.default_rng(seed)
+        u, w = (np.repeat(rng.choice([-1.0, 0.5, 1.0], 10), 20) for _ in range(2))
+        level, heat = np.zeros(200), np.ones(200)
+        for t in range(199):
+            level[t + 1] = 0.9 * level[t] + 2.0 * u[t]
+            heat[t + 1] = 0.8 * heat[t] + 0.2 + 0.01 * level[t] * w[t] + 0.03 * w[t]
+        rows = np.column_stack([0.5 * np.arange(200), u, w, level, heat])
+        header = "t [s],u [V],w [V],level [cm],heat [K]"
+        np.savetxt(data / f"run-{seed}.csv", rows, delimiter=",", header=header, comments="", fmt="%.17g")
+
+
+def run(folder: Path, text: str = PIPELINE, watch: list[events.Event] | None = None) -> Results:
+    pipeline = Pipeline(config=parse_pipeline(text), text=text, path=folder / "pipelines" / "both.yaml")
+    heard = [] if watch is None else [watch.append]
+    return run_pipeline(pipeline, folder / "runs" / "both", command="sysid run both", watchers=heard)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("tanks")
+    fill(folder)
+    run(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(place: Path) -> Results:
+    return read_results(place / "runs" / "both")
+
+
+def test_each_output_of_each_fit_has_a_record(results: Results) -> None:
+    assert [(fit.name, fit.mapping, fit.unit) for fit in results.fits] == [
+        (f"{name}, {output}", f"u+w -> {output}", unit)
+        for name in ("ARX", "alone", "whole", "further")
+        for output, unit in (("level", "cm"), ("heat", "K"))
+    ]
+    assert {fit.initial for fit in results.fits if fit.system == "alone"} == {"ARX, level", "ARX, heat"}
+    assert len(results.mappings()) == 2
+
+
+def test_the_whole_is_told_beside_its_outputs(results: Results) -> None:
+    by_name = {one.name: one for one in results.systems}
+    assert {name: one.models for name, one in by_name.items()} == {"ARX": 2, "alone": 2, "whole": 1, "further": 1}
+    fits = {fit.name: fit for fit in results.fits}
+    arx = by_name["ARX"]
+    assert arx.n_parameters == sum(fits[name].n_parameters or 0 for name in arx.fits.values())
+    both = [fits[name].cases["run-3"].free_run.nrmse_fit for name in arx.fits.values()]
+    assert arx.cases["run-3"].mean_fit == pytest.approx(np.mean(both))
+
+
+def test_a_structure_with_several_outputs_is_stored_once(place: Path, results: Results) -> None:
+    folders = {fit.system: fit.model_slug for fit in results.fits if fit.system in {"whole", "further"}}
+    assert folders == {"whole": "whole", "further": "further"}
+    model = read_fit(place / "runs" / "both" / "fits" / "whole").model
+    assert model.mapping.outputs == ("level", "heat")
+    assert model.ends.rest_outputs[1] == 1.0
+
+
+def test_what_is_chosen_is_chosen_and_exported_as_a_whole(place: Path, results: Results) -> None:
+    assert results.best is not None
+    assert "outputs" in results.best.chosen_by
+    chosen = results.best_fits
+    assert [fit.mapping for fit in chosen] == ["u+w -> level", "u+w -> heat"]
+    bundle = read_bundle(place / "runs" / "both" / "bundle")
+    assert [one["name"] for one in bundle.outputs] == ["level", "heat"]
+    u = np.random.default_rng(5).normal(size=(30, 2))
+    models = {fit.model_slug: read_fit(place / "runs" / "both" / "fits" / fit.model_slug).model for fit in chosen}
+    alone = [model_from_dict(model.to_dict()).simulate(u).reshape(30, -1) for model in models.values()]
+    assert_allclose(bundle.simulate(u), np.column_stack(alone), rtol=1e-9, atol=1e-9)
+
+
+def test_the_report_has_the_whole_and_every_output(place: Path, results: Results) -> None:
+    page = (place / "runs" / "both" / "report" / "index.html").read_text(encoding="utf-8")
+    assert results.best_name in page
+    anchors = re.findall(r'<section[^>]* id="([^"]+)"', page)
+    assert len(anchors) == len(set(anchors))
+    assert {"best", "best-2"} <= set(anchors)
+    ids = re.findall(r' id="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+
+
+def test_a_second_run_does_nothing_again(place: Path) -> None:
+    heard: list[events.Event] = []
+    run(place, watch=heard)
+    steps = [event for event in heard if isinstance(event, events.StepDone)]
+    assert len(steps) > 10
+    assert [event.step for event in steps if not event.stored and "Loading" not in event.step] == []
+
+
+WRONG = {
+    "rest of an input": ("rest: {heat: 1.0}", "rest: {heat: 1.0, u: 0}", "not an output"),
+    "lags of three outputs": ("output_delays: 1", "output_delays: [[1], [1], [1]]", "not match|not a set of lags"),
+    "an initial fit that comes later": ("initial: ARX", "initial: whole", "not an earlier fit"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_does_not_go_together_is_refused(case: str) -> None:
+    old, new, match = WRONG[case]
+    assert old in PIPELINE
+    with pytest.raises(ConfigError, match=match):
+        parse_pipeline(PIPELINE.replace(old, new))
