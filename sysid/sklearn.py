@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from sysid.api import ARX, SystemFit, data, fit
 from sysid.estimation import Training
 from sysid.extras import need
-from sysid.models import AbstractStructure
+from sysid.models import AbstractStructure, History
 
 need("sklearn", "sysid.sklearn")
 
@@ -128,10 +128,15 @@ class DynamicRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type
 
     def _run(self, inputs: NDArray[np.float64], first: NDArray[np.float64]) -> NDArray[np.float64]:
         found = self.fit_
+        # A history is no question of whether the model remembers its output: one that does not begins at its inputs.
         if isinstance(found, SystemFit):
-            return found.simulate(inputs, initial=dict(zip(found.outputs, first.tolist(), strict=True)))
-        run = found.simulate(inputs, initial=float(first[0]))
-        return run if self.single_ else run[:, None]
+            starts = zip(found.fits.values(), first.tolist(), strict=True)
+            runs = [one.simulate(inputs, initial=History.at_rest(inputs=inputs[0], output=y)) for one, y in starts]
+            return np.column_stack(runs)
+        several = found.model.structure.several_outputs
+        history = History.at_rest(inputs=inputs[0], output=first if several else float(first[0]))
+        run = found.simulate(inputs, initial=history).reshape(len(inputs), -1)
+        return run[:, 0] if self.single_ else run
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
