@@ -7,6 +7,7 @@ With ``--into`` it stands between the line ``<!-- scorecard: (the command) -->``
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Sequence
@@ -131,13 +132,19 @@ def _benchmarks(findings: Sequence[Finding]) -> list[str]:
             continue
         key = (_SETTING.sub("", one.what), one.unit, one.at_least)
         # What a peer was measured on too comes first.
-        if key not in kept or (not one.peer, one.ours) < (not kept[key].peer, kept[key].ours):
+        if key not in kept or _rank(one) < _rank(kept[key]):
             kept[key] = one
     if not kept:
         return []
     rows = [["benchmark (sources in its report)", "ours", "published", "peer"], ["---"] * 4]
     rows += [[markdown_cell(one.what), one.ours_text, *map(_brief, (one.published, one.peer))] for one in kept.values()]
     return rows_lines(rows)
+
+
+def _rank(one: Finding) -> tuple[bool, float]:
+    """What is shown of several findings on a record comes first; where more is better, that is what is worst for us."""
+    lost = -math.inf if one.at_least else math.inf
+    return (not one.peer, lost if math.isnan(one.ours) else one.ours)
 
 
 def _brief(text: str) -> str:

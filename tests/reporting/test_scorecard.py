@@ -95,6 +95,8 @@ def test_benchmarks_stand_beside_what_others_have_once_for_each_record(tmp_path:
         Finding(
             what="Race: time of two to 1 m, divided by ours", ours=4.0, unit="x", target=3.0, at_least=True, peer="4 s"
         ),
+        Finding(what="Race: time of one to its own best", ours=8.0, unit="x", target=3.0, at_least=True, peer="9 s"),
+        Finding(what="Race: time of two to its own best", ours=NAN, unit="x", target=3.0, at_least=True, peer="5 s"),
         Finding(what="without others", ours=1.0, target=2.0),
     ]
     benchmark = Benchmark(title="Public", command="public", findings=findings)
@@ -102,6 +104,7 @@ def test_benchmarks_stand_beside_what_others_have_once_for_each_record(tmp_path:
     assert rows(scorecard([folder]))[2:] == [
         ["Tanks, n = 50", "0.276 V", "0.306", "0.285 V"],
         ["Race: time of two to 1 m, divided by ours", "4.00 x", "", "4 s"],
+        ["Race: time of two to its own best", "none", "", "5 s"],
     ]
 
 

@@ -154,4 +154,4 @@ def write_findings(folder: Path, found: Benchmarks) -> Path:
 
 
 def _with_unit(value: float, unit: str) -> str:
-    return f"{number(value, missing='none')} {unit}".rstrip()
+    return "none" if math.isnan(value) else f"{number(value)} {unit}".rstrip()

@@ -88,7 +88,8 @@ def _section(benchmark: Benchmark) -> list[str]:
     if benchmark.findings:
         lines += [*_table(benchmark.findings), ""]
     lines += [*facts_lines(rows), ""]
-    lines += [markdown(benchmark.protocol), ""] if benchmark.protocol else []
+    # The docstring of our own benchmark: paragraphs and code in it are meant.
+    lines += [benchmark.protocol, ""] if benchmark.protocol else []
     return [
         *lines,
         "<details><summary>As printed</summary>",

@@ -77,7 +77,7 @@ def test_own_data_from_a_yaml(workspace: Path) -> None:
     assert results.best is not None
     assert results.best.name == "closed loop"
     exported = {entry.file: entry for entry in closed.exports}
-    assert {entry.format for entry in exported.values()} == {"onnx", "torchscript"}
+    assert {entry.format for entry in exported.values()} == {"onnx", "c"}
     assert all(entry.largest_difference <= 1e-9 and entry.unit == "kPa" for entry in exported.values())
     folder = workspace / "run"
     assert all((folder / file).is_file() for file in exported)
