@@ -17,7 +17,7 @@ __version__ = "0.1.0"
 
 WORDS = (
     *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
-    *("OrderSearch", "ARX", "ARMAX", "OE", "BJ", "LinearStateSpace", "TransferFunction"),
+    *("OrderSearch", "ARX", "ARMAX", "OE", "BJ", "LinearStateSpace", "VectorStateSpace", "TransferFunction"),
     *("NARX", "NeuralStateSpace", "VectorNARX"),
     *("Training", "JointTraining", "TransferFunctionTraining", "StateSpaceTraining", "PolynomialTraining"),
     *("StabilityOptions", "Start", "Role"),

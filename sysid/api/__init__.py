@@ -42,10 +42,11 @@ from sysid.models import (
     Start,
     TransferFunction,
     VectorNARX,
+    VectorStateSpace,
 )
 from sysid.traces import Role
 
 __all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "OrderSearch", "Role", "StabilityOptions", "Start"]
-__all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining"]
+__all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining", "VectorStateSpace"]
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
 __all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]

@@ -5,7 +5,7 @@ from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
 from sysid.estimation.linear.instrumental import fit_iv4
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
-from sysid.estimation.linear.state_space.fit import fit_state_space
+from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
 from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
@@ -49,5 +49,6 @@ __all__ = [
     "fit_state_space",
     "fit_transfer_function",
     "fit_vector_narx",
+    "fit_vector_state_space",
     "with_upstream_outputs",
 ]

@@ -21,7 +21,7 @@ from sysid.estimation.equilibrium import equilibrium_notes
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
-from sysid.estimation.linear.state_space.fit import fit_state_space
+from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
 from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
@@ -53,6 +53,7 @@ from sysid.models import (
     Start,
     TransferFunction,
     VectorNARX,
+    VectorStateSpace,
 )
 from sysid.traces import Trace
 
@@ -273,6 +274,14 @@ ESTIMATORS: dict[str, Estimator] = {
             structure=LinearStateSpace,
             name="a linear state space",
             fit=fit_state_space,
+            training=StateSpaceTraining,
+            begins=LINEAR_START,
+            stability=PoleCheck,
+        ),
+        Estimator(
+            structure=VectorStateSpace,
+            name="a linear state space of several outputs",
+            fit=fit_vector_state_space,
             training=StateSpaceTraining,
             begins=LINEAR_START,
             stability=PoleCheck,

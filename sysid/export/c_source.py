@@ -158,7 +158,7 @@ def _space(stage: Stage) -> dict[str, Any]:
         "change": cell.change,
         "drift": cell.drift,
         "readout": cell.readout,
-        "constant": [cell.constant],
+        "constant": cell.constant,
         "state_neurons": cell.state_neurons,
         "output_neurons": cell.output_neurons,
         "cubic": cell.cubic,

@@ -244,7 +244,7 @@ def space_body(outer: Nodes, stage: Stage, *, keeps: bool) -> Body:
         [*(nodes.value(name, [n, "batch"]) for name in carried), nodes.value("x", [cell.n_inputs, "batch"])],
         [
             *(nodes.value(name.removeprefix(nodes.prefix), [n, "batch"]) for name in carried.values()),
-            nodes.value(output.removeprefix(nodes.prefix), [1, "batch"]),
+            nodes.value(output.removeprefix(nodes.prefix), [cell.n_outputs, "batch"]),
         ],
     )
     return Body(graph=graph, held=False)

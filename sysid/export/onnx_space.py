@@ -42,7 +42,7 @@ def space_step(nodes: Nodes, cell: SpaceCell, z: str, *, rows: bool) -> tuple[st
             hidden = nodes.add("Tanh", [hidden], f"{name}_hidden")
         return product(f"{name}_V", neurons.readout, hidden, total, f"{name}_network")
 
-    output = summed("output", cell.readout[np.newaxis], cell.constant, cell.output_neurons)
+    output = summed("output", cell.readout, cell.constant, cell.output_neurons)
     if cell.rectified:
         output = nodes.add("Abs", [output], "output_rectified")
     return output, summed("change", cell.change, cell.drift, cell.state_neurons)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models import History, NeuralForm, Scaling, StateSpace
+from sysid.models import History, NeuralForm, Scaling, StateSpace, VectorScaling
 from sysid.models.ends import Ends
 
 
@@ -42,8 +42,8 @@ class SpaceCell:
         change: ``T``, what a step adds to the state, shape ``(n_states, n_states + n_inputs)``: a slow mode is nearly
             an integrator, so that ``A - 1`` is kept and not ``A``.
         drift: ``d``, shape ``(n_states,)``.
-        readout: ``C``, shape ``(n_states + n_inputs,)``.
-        constant: ``c``.
+        readout: ``C``, shape ``(n_outputs, n_states + n_inputs)``.
+        constant: ``c``, shape ``(n_outputs,)``.
         state_neurons: Those of the state.
         output_neurons: Those of the output.
         cubic: ``s`` is the cube; tanh otherwise.
@@ -59,7 +59,7 @@ class SpaceCell:
     change: NDArray[np.float64]
     drift: NDArray[np.float64]
     readout: NDArray[np.float64]
-    constant: float
+    constant: NDArray[np.float64]
     state_neurons: Neurons
     output_neurons: Neurons
     cubic: bool
@@ -73,19 +73,21 @@ class SpaceCell:
         """A linear state space: no neurons, no bound."""
         n, row = form.n_state, form.n_state + form.n_inputs
         units, none = np.eye(form.n_inputs), np.zeros(form.n_inputs)
+        silent = np.zeros(form.n_outputs)
         gain, rest = [form.equilibrium(unit) for unit in units], np.zeros(n)
         if form.K is not None:
-            rest = form.standing(none, 0.0)
-            gain = [*(form.standing(unit, 0.0) - rest for unit in units), form.standing(none, 1.0) - rest]
+            rest = form.standing(none, silent)
+            gain = [form.standing(unit, silent) - rest for unit in units]
+            gain += [form.standing(none, unit) - rest for unit in np.eye(form.n_outputs)]
         return cls(
             ends=ends,
             form=form,
             change=np.concatenate([form.A - np.eye(n), form.B], axis=1),
             drift=np.zeros(n),
-            readout=np.concatenate([form.C, form.D]),
+            readout=np.concatenate([form.C, form.D], axis=1),
             constant=form.constant,
             state_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((n, 0))),
-            output_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((1, 0))),
+            output_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((form.n_outputs, 0))),
             cubic=False,
             rectified=False,
             bound=np.inf,
@@ -107,8 +109,8 @@ class SpaceCell:
             form=form,
             change=change,
             drift=M[:, -1],
-            readout=L[:-1],
-            constant=float(L[-1]),
+            readout=L[np.newaxis, :-1],
+            constant=L[-1:],
             state_neurons=Neurons(weights=W[:, :-1], bias=W[:, -1], readout=theta[sizes.readout].reshape(n, k)),
             output_neurons=Neurons(
                 weights=Wy[:, :-1], bias=Wy[:, -1], readout=theta[sizes.output_readout].reshape(1, q)
@@ -121,7 +123,7 @@ class SpaceCell:
         )
 
     @property
-    def scaling(self) -> Scaling:
+    def scaling(self) -> Scaling | VectorScaling:
         """Between units and scaled numbers."""
         return self.form.scaling
 
@@ -137,18 +139,18 @@ class SpaceCell:
 
     @property
     def n_outputs(self) -> int:
-        """One."""
-        return 1
+        """Number of outputs."""
+        return len(self.constant)
 
     @property
     def offset(self) -> tuple[float, ...]:
-        """Of every input, then of the output, in its unit."""
-        return (*self.scaling.input_offset, self.scaling.output_offset)
+        """Of every input, then of every output, in its unit."""
+        return (*self.scaling.input_offset, *_each(self.scaling.output_offset))
 
     @property
     def scale(self) -> tuple[float, ...]:
-        """Of every input, then of the output, in its unit."""
-        return (*self.scaling.input_scale, self.scaling.output_scale)
+        """Of every input, then of every output, in its unit."""
+        return (*self.scaling.input_scale, *_each(self.scaling.output_scale))
 
     @property
     def low(self) -> float:
@@ -162,7 +164,7 @@ class SpaceCell:
 
     def rest_of(self, levels: NDArray[np.float64]) -> float | NDArray[np.float64]:
         """The levels of the outputs, shape ``(n_outputs,)``, as a history has them."""
-        return float(levels[0])
+        return levels if isinstance(self.scaling, VectorScaling) else float(levels[0])
 
     @property
     def rest_channels(self) -> tuple[str, ...]:
@@ -179,3 +181,7 @@ class SpaceCell:
             Shape ``(n_states,)``.
         """
         return self.form.state(history)
+
+
+def _each(value: float | tuple[float, ...]) -> tuple[float, ...]:
+    return value if isinstance(value, tuple) else (value,)

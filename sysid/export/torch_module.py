@@ -178,8 +178,8 @@ class SpaceStep(nn.Module):
             **_scaling(cell),
             "change": cell.change.T,
             "drift": cell.drift,
-            "readout": cell.readout[:, np.newaxis],
-            "constant": [cell.constant],
+            "readout": cell.readout.T,
+            "constant": cell.constant,
             "state_weights": cell.state_neurons.weights.T,
             "state_bias": cell.state_neurons.bias,
             "state_readout": cell.state_neurons.readout.T,
@@ -207,12 +207,12 @@ class SpaceStep(nn.Module):
             total = torch.abs(total)
         y = torch.clamp(total, self.low, self.high)
         outputs = y * self.output_scale + self.output_offset
-        reached = torch.zeros_like(y, dtype=torch.bool)
+        reached = torch.zeros_like(y[:, :1], dtype=torch.bool)
         if self.limited:
             y, outputs, reached = self.limits(known, y, outputs)
         held = torch.zeros_like(reached)
         if self.bounded:
-            held = (y <= self.low) | (y >= self.high)
+            held = ((y <= self.low) | (y >= self.high)).any(dim=1, keepdim=True)
         change = torch.addmm(self.drift, x, self.change)
         change = change + self.active(torch.addmm(self.state_bias, x, self.state_weights)) @ self.state_readout
         return outputs, torch.clamp(state + change, -self.bound, self.bound), held, reached

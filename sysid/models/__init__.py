@@ -13,7 +13,12 @@ from sysid.models.history import History, Start, StartKind
 from sysid.models.innovations import Innovations
 from sysid.models.interpolation import Line
 from sysid.models.lags import Lagged, Lags
-from sysid.models.linear_state_space import LinearStateSpace, LinearStateSpaceModel
+from sysid.models.linear_state_space import (
+    LinearStateSpace,
+    LinearStateSpaceModel,
+    VectorStateSpace,
+    VectorStateSpaceModel,
+)
 from sysid.models.mapping import Mapping
 from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_form import NeuralForm
@@ -72,6 +77,8 @@ __all__ = [
     "VectorNARXModel",
     "VectorRecursion",
     "VectorScaling",
+    "VectorStateSpace",
+    "VectorStateSpaceModel",
     "Wiring",
     "beginning",
     "cascade_from_dict",

@@ -157,6 +157,15 @@ class AbstractModel(ABC):
         del j
         return None
 
+    @property
+    def ratios(self) -> tuple[tuple[str, str, Ratio], ...]:
+        """What a linear model is from each input to each output: a name and the input's unit with each ratio."""
+        found = [
+            (name, unit, self.ratio(j))
+            for j, (name, unit) in enumerate(zip(self.mapping.inputs, self.input_units, strict=True))
+        ]
+        return tuple((name, unit, ratio) for name, unit, ratio in found if ratio is not None)
+
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again, as JSON values."""

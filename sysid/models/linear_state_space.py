@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
 from sysid.models.innovations import Innovations
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
-from sysid.models.scaling import Scaling
+from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_space import StateSpace
-from sysid.models.to_control import Matrices, in_powers_of_z, transfer_function
+from sysid.models.to_control import Matrices, in_powers_of_z, state_space, transfer_function
 
 MOST_STATES = 100
 """A subspace method compresses matrices of some times as many columns."""
@@ -59,19 +59,18 @@ class LinearStateSpace(AbstractStructure):
                 where="states",
                 expected=f"a whole number from 1 to {MOST_STATES}",
                 got=shortened(self.states),
-                remedy="write for example {kind: SS, states: 4}",
+                remedy=f"write for example {{kind: {self.kind}, states: 4}}",
             )
 
     @property
     def label(self) -> str:
         """The states, and what is not the default."""
         words = ["direct"] * self.feedthrough + ["without noise model"] * (not self.noise)
-        return " ".join(["SS", str(self.states), *words])
+        return " ".join([self.kind, str(self.states), *words])
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
-        fields = {name: getattr(self, name) for name in ("states", "feedthrough", "noise", "intercept")}
-        return {"kind": self.kind, **fields}
+        return {"kind": self.kind, **{name: getattr(self, name) for name in self.__dataclass_fields__}}
 
     def n_parameters(self, n_inputs: int, n_outputs: int = 1) -> int:
         """Parameters that tell systems apart: entries of all matrices less those of a change of coordinates.
@@ -131,8 +130,8 @@ class LinearStateSpaceModel(AbstractModel):
         """The form that is run."""
         system = self.system
         return StateSpace(
-            A=system.A, B=system.B, C=system.C[0], D=system.D[0], constant=float(system.constant[0]),
-            K=system.K[:, 0] if self.orders.noise else None, scaling=self.scaling,
+            A=system.A, B=system.B, C=system.C, D=system.D, constant=system.constant,
+            K=system.K if self.orders.noise else None, scaling=self.scaling,
         )  # fmt: skip
 
     @property
@@ -201,6 +200,132 @@ class LinearStateSpaceModel(AbstractModel):
             mapping=Mapping.parse(fields["mapping"]),
             input_units=tuple(fields["input_units"]),
             **{key: fields[key] for key in ("sample_time", "output_unit", "rest_output")},
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class VectorStateSpace(LinearStateSpace):
+    """A linear state space that all outputs of a mapping share; see :class:`LinearStateSpace`.
+
+    What one output says of the states is used for the others, in the fit and one step ahead.
+
+    Example:
+        >>> VectorStateSpace(states=6).label
+        'VectorSS 6'
+    """
+
+    kind = "VectorSS"
+    several_outputs = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VectorStateSpaceModel(SeveralOutputs):
+    """A fitted state space of several outputs.
+
+    Args:
+        orders: The structure.
+        system: The matrices, in scaled numbers.
+        scaling: Between units and scaled numbers.
+        mapping: Which channels go in, which come out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_units: Unit of each output.
+        rest_outputs: Each output at rest, in its unit.
+    """
+
+    orders: VectorStateSpace
+    system: Innovations
+    scaling: VectorScaling
+    mapping: Mapping
+    sample_time: float
+    input_units: tuple[str, ...]
+    output_units: tuple[str, ...]
+    rest_outputs: tuple[float, ...]
+
+    @property
+    def structure(self) -> VectorStateSpace:
+        """The number of states."""
+        return self.orders
+
+    @property
+    def n_parameters(self) -> int:
+        """Parameters that tell systems apart, whatever the coordinates of the state."""
+        return self.orders.n_parameters(len(self.mapping.inputs), len(self.mapping.outputs))
+
+    @cached_property
+    def recursion(self) -> StateSpace:
+        """The form that is run."""
+        system = self.system
+        return StateSpace(
+            A=system.A, B=system.B, C=system.C, D=system.D, constant=system.constant,
+            K=system.K if self.orders.noise else None, scaling=self.scaling,
+        )  # fmt: skip
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Poles in the z plane, shape ``(states,)``."""
+        return self.system.poles()
+
+    @property
+    def pole_radius(self) -> float:
+        """Magnitude of the largest pole."""
+        return self.system.radius
+
+    @property
+    def ratios(self) -> tuple[tuple[str, str, Ratio], ...]:
+        """From each input to each output, in ``1/z``; all share the denominator."""
+        F, numerators, _ = polynomials(self.system)
+        first, found = (0 if self.orders.feedthrough else 1), []
+        for o, output in enumerate(self.mapping.outputs):
+            for j, (name, unit) in enumerate(zip(self.mapping.inputs, self.input_units, strict=True)):
+                gain = self.scaling.output_scale[o] / self.scaling.input_scale[j]
+                ratio = Ratio(
+                    B=gain * numerators[o, j, first:], F=F, delay=first, discrete=True,
+                    of_numerator=f"B({output}, {name}, ", of_denominator="F(",
+                )  # fmt: skip
+                found.append((f"{output} from {name}", unit, ratio))
+        return tuple(found)
+
+    def to_control(self) -> Any:
+        """The model as a discrete ``control.StateSpace`` in the channels' units, from deviations to deviations."""
+        return state_space(self)
+
+    @property
+    def matrices(self) -> Matrices:
+        """The state space in the channels' units."""
+        gain, scale = np.array(self.scaling.output_scale)[:, np.newaxis], np.array(self.scaling.input_scale)
+        return self.system.A, self.system.B / scale, gain * self.system.C, gain * self.system.D / scale
+
+    @property
+    def kalman_gain(self) -> NDArray[np.float64]:
+        """``K`` from innovations in the outputs' units, for the state of :attr:`matrices`."""
+        return np.asarray(self.system.K / np.array(self.scaling.output_scale))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return {
+            "structure": self.orders.to_dict(),
+            "mapping": str(self.mapping),
+            "sample_time": self.sample_time,
+            "input_units": list(self.input_units),
+            "output_units": list(self.output_units),
+            "rest_outputs": list(self.rest_outputs),
+            "scaling": self.scaling.to_dict(),
+            "system": self.system.to_dict(),
+        }
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> VectorStateSpaceModel:
+        """The model that :meth:`to_dict` wrote."""
+        orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
+        names = ("input_units", "output_units", "rest_outputs")
+        return cls(
+            orders=VectorStateSpace(**orders),
+            system=Innovations.from_dict(fields["system"]),
+            scaling=VectorScaling.from_dict(fields["scaling"]),
+            mapping=Mapping.parse(fields["mapping"]),
+            sample_time=fields["sample_time"],
+            **{name: tuple(fields[name]) for name in names},
         )
 
 

@@ -399,8 +399,8 @@ class PolynomialModel(AbstractModel):
         """The form that is run."""
         system = self.system
         return StateSpace(
-            A=system.A, B=system.B, C=system.C[0], D=system.D[0], constant=float(system.constant[0]),
-            K=system.K[:, 0] if self.orders.noise else None, scaling=self.scaling,
+            A=system.A, B=system.B, C=system.C, D=system.D, constant=system.constant,
+            K=system.K if self.orders.noise else None, scaling=self.scaling,
         )  # fmt: skip
 
     @property

@@ -14,7 +14,7 @@ from sysid.kernels import innovations
 from sysid.kernels import linear as kernel
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
-from sysid.models.scaling import Scaling
+from sysid.models.scaling import Scaling, VectorScaling
 
 HISTORY_NOISE = 1e-6
 """Variance of the output's history relative to what the model explains, where it is too short to tell its noise: small
@@ -44,22 +44,22 @@ class StateSpace(AbstractForm):
     Args:
         A: Shape ``(n_state, n_state)``.
         B: Shape ``(n_state, n_inputs)``.
-        C: Shape ``(n_state,)``.
-        D: Shape ``(n_inputs,)``.
-        constant: Output without inputs.
-        K: Gain from the innovation ``y - yhat`` to the state, shape ``(n_state,)``, with which the output one step
-            ahead is predicted; ``None`` where the noise is added to the output and predicts nothing.
-        scaling: Between units and scaled numbers.
+        C: Shape ``(n_outputs, n_state)``.
+        D: Shape ``(n_outputs, n_inputs)``.
+        constant: Outputs without inputs, shape ``(n_outputs,)``.
+        scaling: Between units and scaled numbers; one of several outputs makes arrays of outputs have columns.
         low: Lower bound of the output in scaled numbers; ``-inf`` for none.
         high: Upper bound of the output in scaled numbers; ``inf`` for none.
+        K: Gain from the innovation ``y - yhat`` to the state, shape ``(n_state, n_outputs)``, with which the output one
+            step ahead is predicted; ``None`` where the noise is added to the output and predicts nothing.
     """
 
     A: NDArray[np.float64]
     B: NDArray[np.float64]
     C: NDArray[np.float64]
     D: NDArray[np.float64]
-    constant: float
-    scaling: Scaling
+    constant: NDArray[np.float64]
+    scaling: Scaling | VectorScaling
     low: float = -np.inf
     high: float = np.inf
     K: NDArray[np.float64] | None = None
@@ -82,7 +82,18 @@ class StateSpace(AbstractForm):
     def numbers(self) -> NDArray[np.float64]:
         """All matrices and the constant, flat."""
         gain = np.zeros(0) if self.K is None else self.K
-        return np.concatenate([self.A.ravel(), self.B.ravel(), self.C, self.D, [self.constant], gain])
+        parts = (self.A, self.B, self.C, self.D, self.constant, gain)
+        return np.concatenate([part.ravel() for part in parts])
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return len(self.C)
+
+    @property
+    def gain(self) -> NDArray[np.float64]:
+        """``K``, or zeros."""
+        return np.zeros((self.n_state, self.n_outputs)) if self.K is None else self.K
 
     def state(self, history: History) -> NDArray[np.float64]:
         """The state after some samples.
@@ -100,14 +111,13 @@ class StateSpace(AbstractForm):
 
     def followed(self, history: History) -> NDArray[np.float64]:
         """The free run over a history itself; see the base class."""
-        y = self._run(self._checked(history.inputs), self._begun(history))
-        return self.scaling.unscale_output(np.clip(y, self.low, self.high))
+        return self._in_units(self._run(self._checked(history.inputs), self._begun(history)))
 
     def _begun(self, history: History) -> NDArray[np.float64]:
         """The state before the oldest sample of a history; of a single one, the state after it."""
-        inputs, output = self._checked(history.inputs), self.scaling.scale_output(history.output)
+        inputs, output = self._checked(history.inputs), self._scaled(history.output)
         if len(inputs) == 1:
-            return self._resting(inputs[0], float(output[0]))
+            return self._resting(inputs[0], output[0])
         x = self.equilibrium(inputs[0]) if self._radius < 1.0 - AT_ONE else np.zeros(self.n_state)
         return x + self._correction(inputs, output, x, history.known)
 
@@ -122,7 +132,7 @@ class StateSpace(AbstractForm):
         """Largest magnitude of an eigenvalue."""
         return float(np.abs(linalg.eigvals(self.A)).max(initial=0.0)) if self.n_state else 0.0
 
-    def _resting(self, inputs: NDArray[np.float64], output: float) -> NDArray[np.float64]:
+    def _resting(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Equilibrium at scaled inputs, with the output where the model leaves it open.
 
         With a model of the noise it is the filter's state after that output and these inputs stood for ever: like a
@@ -135,8 +145,8 @@ class StateSpace(AbstractForm):
             return x
         _, sizes, rows = linalg.svd(np.eye(self.n_state) - self.A)
         free = rows[sizes <= AT_ONE * max(float(sizes[0]), 1.0)]
-        level = output - float(self.C @ x + self.D @ inputs) - self.constant
-        return np.asarray(x + free.T @ linalg.lstsq((free @ self.C)[np.newaxis], [level])[0]) if len(free) else x
+        level = output - self.C @ x - self.D @ inputs - self.constant
+        return np.asarray(x + free.T @ linalg.lstsq(self.C @ free.T, level)[0]) if len(free) else x
 
     def equilibrium(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The state at which the system stays while its inputs are held.
@@ -151,25 +161,23 @@ class StateSpace(AbstractForm):
             return np.zeros(0)
         return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A, self.B @ inputs, cond=AT_ONE)[0])
 
-    def standing(self, inputs: NDArray[np.float64], output: float) -> NDArray[np.float64]:
-        """The filter's state after scaled inputs and a scaled output that have stood for ever.
+    def standing(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The filter's state after scaled inputs and scaled outputs that have stood for ever.
 
         Args:
             inputs: Shape ``(n_inputs,)``.
-            output: The output.
+            output: Shape ``(n_outputs,)``.
 
         Returns:
             Shape ``(n_state,)``.
         """
-        K = np.zeros(self.n_state) if self.K is None else self.K
-        drive = self.B @ inputs + K * (output - float(self.D @ inputs) - self.constant)
-        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A + np.outer(K, self.C), drive, cond=AT_ONE)[0])
+        drive = self.B @ inputs + self.gain @ (output - self.D @ inputs - self.constant)
+        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A + self.gain @ self.C, drive, cond=AT_ONE)[0])
 
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""
         scaled = self._checked(inputs)
-        y = self._run(scaled, self.state(history))
-        return self.scaling.unscale_output(np.clip(y, self.low, self.high))
+        return self._in_units(self._run(scaled, self.state(history)))
 
     def predict(
         self, inputs: NDArray[np.float64], output: NDArray[np.float64], history: History, steps: int
@@ -182,7 +190,7 @@ class StateSpace(AbstractForm):
         if self.K is None:
             raise no_prediction("a linear model without a model of its noise")
         scaled, n = self._checked(inputs), len(inputs)
-        measured = self.scaling.scale_output(np.asarray(output, dtype=np.float64))
+        measured = self._scaled(np.asarray(output, dtype=np.float64))
         x = self._filtered(history)
         start = x.copy()
         X, _ = self._tracked(scaled, measured, x)
@@ -190,14 +198,13 @@ class StateSpace(AbstractForm):
         for _ in range(min(steps, n) - 1):
             X[1:] = X[:-1] @ self.A.T + moved[:-1]
             X[0] = start
-        y = X @ self.C + scaled @ self.D + self.constant
-        return self.scaling.unscale_output(np.clip(y, self.low, self.high))
+        return self._in_units(X @ self.C.T + scaled @ self.D.T + self.constant)
 
     def _filtered(self, history: History) -> NDArray[np.float64]:
         """The state after some samples by the Kalman filter, from the one that fits them best."""
         x = self._begun(history)
         if len(history.output) > 1:
-            measured = np.where(history.known, self.scaling.scale_output(history.output), np.nan)
+            measured = np.where(history.known[:, np.newaxis], self._scaled(history.output), np.nan)
             self._tracked(self._checked(history.inputs), measured, x)
         return x
 
@@ -205,19 +212,25 @@ class StateSpace(AbstractForm):
         self, scaled: NDArray[np.float64], output: NDArray[np.float64], x: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The filter's states and predictions over some scaled samples; ``x`` becomes the state after them."""
-        gain = np.zeros(self.n_state) if self.K is None else self.K
-        states, predicted = np.empty((len(scaled), self.n_state)), np.empty((len(scaled), 1))
-        innovations.predict(
-            self.A, self.B, self.C[np.newaxis], self.D[np.newaxis], np.ascontiguousarray(gain[:, np.newaxis]),
-            np.array([self.constant]), scaled, np.ascontiguousarray(output[:, np.newaxis]), x, states, predicted,
-        )  # fmt: skip
-        return states, predicted[:, 0]
+        states, predicted = np.empty((len(scaled), self.n_state)), np.empty((len(scaled), self.n_outputs))
+        matrices = (self.A, self.B, self.C, self.D, self.gain, self.constant)
+        innovations.predict(*matrices, scaled, np.ascontiguousarray(output), x, states, predicted)
+        return states, predicted
 
     def _run(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Scaled output over some scaled inputs; ``x`` becomes the state after them."""
-        y = np.empty((len(scaled), 1))
-        kernel.state_space(self.A, self.B, self.C[np.newaxis], self.D[np.newaxis], scaled, x, y)
-        return y[:, 0] + self.constant
+        """Scaled outputs over some scaled inputs; ``x`` becomes the state after them."""
+        y = np.empty((len(scaled), self.n_outputs))
+        kernel.state_space(self.A, self.B, self.C, self.D, scaled, x, y)
+        return y + self.constant
+
+    def _scaled(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Outputs in scaled numbers, one column each."""
+        return np.asarray(self.scaling.scale_output(output)).reshape(len(output), self.n_outputs)
+
+    def _in_units(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Outputs in their units, within bounds; of a single one without an axis of its own."""
+        bounded = np.clip(y, self.low, self.high)
+        return self.scaling.unscale_output(bounded if isinstance(self.scaling, VectorScaling) else bounded[:, 0])
 
     def _correction(
         self,
@@ -228,12 +241,12 @@ class StateSpace(AbstractForm):
     ) -> NDArray[np.float64]:
         """How far the state at the history's begin is from the one expected, judged by its output."""
         missing = output - self._run(scaled, x.copy())
-        observed = np.empty((len(scaled), self.n_state))
+        rows = np.empty((len(scaled), self.n_outputs, self.n_state))
         row = self.C.copy()
         for t in range(len(scaled)):
-            observed[t] = row
+            rows[t] = row
             row = row @ self.A
-        observed, missing = observed[known], missing[known]
+        observed, missing = rows[known].reshape(-1, self.n_state), missing[known].ravel()
         if not np.isfinite(observed).all() or not len(missing):
             return np.zeros(self.n_state)
         size = np.linalg.norm(observed, axis=0)
@@ -241,7 +254,7 @@ class StateSpace(AbstractForm):
         found, _, rank, _ = linalg.lstsq(observed / scale, missing, cond=1e-10)
         left = missing - (observed / scale) @ found
         level = float(left @ left) / max(len(left) - rank, 1)
-        clean = level <= EXACT * max(float(output @ output) / len(output), np.finfo(np.float64).tiny)
+        clean = level <= EXACT * max(float(np.mean(output**2)), np.finfo(np.float64).tiny)
         if (len(left) > rank and clean) or self._radius >= 1.0 - AT_ONE:
             return np.asarray(found / scale)
         spread = self._covariance()

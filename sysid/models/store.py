@@ -10,7 +10,12 @@ from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_program import Limit
-from sysid.models.linear_state_space import LinearStateSpace, LinearStateSpaceModel
+from sysid.models.linear_state_space import (
+    LinearStateSpace,
+    LinearStateSpaceModel,
+    VectorStateSpace,
+    VectorStateSpaceModel,
+)
 from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
 from sysid.models.polynomial import POLYNOMIALS, PolynomialModel
@@ -23,6 +28,7 @@ _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
     (NeuralStateSpace, NeuralStateSpaceModel),
     (TransferFunction, TransferFunctionModel),
     (LinearStateSpace, LinearStateSpaceModel),
+    (VectorStateSpace, VectorStateSpaceModel),
     *((structure, PolynomialModel) for structure in POLYNOMIALS.values()),
     (VectorNARX, VectorNARXModel),
 )

@@ -79,8 +79,8 @@ def state_space(model: Linear) -> Any:
 
 def _signals(mapping: Mapping) -> dict[str, list[str]]:
     """The names of the channels as python-control takes them, which has no dots in names."""
-    names = distinct((*mapping.inputs, mapping.output), signal_name)
-    return {"inputs": [names[name] for name in mapping.inputs], "outputs": [names[mapping.output]]}
+    names = distinct((*mapping.inputs, *mapping.outputs), signal_name)
+    return {side: [names[name] for name in getattr(mapping, side)] for side in ("inputs", "outputs")}
 
 
 def delayed(ratio: Polynomials, seconds: float, order: int) -> Polynomials:

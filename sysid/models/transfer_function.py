@@ -264,9 +264,9 @@ class TransferFunctionModel(AbstractModel):
         return StateSpace(
             A=np.ascontiguousarray(linalg.block_diag(*(part.A for part in parts))),
             B=B,
-            C=np.concatenate([part.C[0] for part in parts]),
-            D=np.array([part.D[0] for part in parts]),
-            constant=self.constant,
+            C=np.concatenate([part.C[0] for part in parts])[np.newaxis],
+            D=np.array([[part.D[0] for part in parts]]),
+            constant=np.array([self.constant]),
             scaling=self.scaling,
         )
 
@@ -309,8 +309,8 @@ class TransferFunctionModel(AbstractModel):
     def matrices(self) -> Matrices:
         """A discrete state space of it, in the channels' units."""
         form = self.recursion
-        gain, scale = form.scaling.output_scale, np.array(form.scaling.input_scale)
-        return form.A, form.B / scale, gain * form.C[np.newaxis], gain * form.D[np.newaxis] / scale
+        gain, scale = self.scaling.output_scale, np.array(self.scaling.input_scale)
+        return form.A, form.B / scale, gain * form.C, gain * form.D / scale
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""

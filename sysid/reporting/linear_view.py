@@ -70,9 +70,8 @@ def linear_views(model: AbstractModel, uncertainty: Uncertainty | None, seed: in
         One view per input that has parameters.
     """
     views = []
-    for j, (name, unit) in enumerate(zip(model.mapping.inputs, model.input_units, strict=True)):
-        ratio = model.ratio(j)
-        if ratio is None or not len(ratio.B):
+    for name, unit, ratio in model.ratios:
+        if not len(ratio.B):
             continue
         Bs, Fs = ratio.B[np.newaxis], ratio.F[np.newaxis]
         if uncertainty is not None:

@@ -31,9 +31,14 @@ from sysid.models import (
     Scaling,
     Start,
     TransferFunction,
+    VectorScaling,
+    VectorStateSpace,
+    VectorStateSpaceModel,
 )
 from sysid.models.polynomial import AbstractPolynomial
 from sysid.models.transfer_function import TransferFunctionModel
+from sysid.traces import Channel, Trace
+from sysid.units import Reference
 
 FORMATS = ("onnx", "torchscript", "torch-export", "c", "fmi2", "fmi3")
 RANGES = {"BP": (0.0, 95.0), "AR": (0.0, 95.0)}
@@ -102,6 +107,25 @@ def build_innovations() -> LinearStateSpaceModel:
     )
 
 
+def build_vector() -> VectorStateSpaceModel:
+    """Two outputs of three states."""
+    rng = np.random.default_rng(8)
+    model = build()
+    system = Innovations(
+        A=np.array([[0.97, 0.1, 0.0], [-0.1, 0.97, 0.0], [0.0, 0.1, 0.8]]), B=0.1 * rng.normal(size=(3, 2)),
+        C=rng.normal(size=(2, 3)), D=0.1 * rng.normal(size=(2, 2)), K=0.1 * rng.normal(size=(3, 2)),
+        constant=np.array([0.2, -0.1]),
+    )  # fmt: skip
+    scaling = VectorScaling(
+        input_offset=(45.0, 70.0), input_scale=(45.0, 20.0), output_offset=(38.0, 1.0), output_scale=(40.0, 0.5)
+    )
+    return VectorStateSpaceModel(
+        orders=VectorStateSpace(states=3, feedthrough=True), system=system, scaling=scaling,
+        mapping=Mapping.parse("BP+AR -> BC+ER"), sample_time=0.1, input_units=model.input_units,
+        output_units=("psi", "bar"), rest_outputs=(5.0, 0.9),
+    )  # fmt: skip
+
+
 def build_polynomial(orders: AbstractPolynomial, theta: list[float]) -> PolynomialModel:
     model = build()
     return PolynomialModel(orders=orders, theta=np.array(theta), **{name: getattr(model, name) for name in TERMS})
@@ -111,6 +135,7 @@ TERMS = ("scaling", "mapping", "sample_time", "input_units", "output_unit", "res
 
 MODELS = {
     "innovations": build_innovations,
+    "innovations, two outputs": build_vector,
     "Box-Jenkins": lambda: build_polynomial(
         BJ(nb=(1, 2), nc=1, nd=1, nf=(2, 1), nk=(3, 0)), [0.1, 0.2, -0.1, -1.8, 0.85, -0.9, 0.4, -0.9, 0.1]
     ),
@@ -152,16 +177,19 @@ def test_files_compute_what_the_model_computes(model, name, kind, inputs, tmp_pa
     surrogate = Surrogate.of(model, RANGES)
     run = opened(name, kind, surrogate, tmp_path)
     cars = [inputs(200, 2, seed=seed) for seed in (1, 2)]
+    past = np.linspace(0.0, 30.0, 30)
+    if model.structure.several_outputs:
+        past = np.column_stack([past, 1.0 - 0.01 * past])
     histories = [
-        History(inputs=inputs(30, 2, seed=9), output=np.linspace(0.0, 30.0, 30)),
-        History.at_rest(inputs=cars[1][0], output=0.0),
+        History(inputs=inputs(30, 2, seed=9), output=past),
+        History.at_rest(inputs=cars[1][0], output=past[0]),
     ]
     states = np.stack([layout_of(model).from_history(history) for history in histories])
     whole = run(np.stack(cars, axis=1), states)
     for i, (u, history) in enumerate(zip(cars, histories, strict=True)):
-        expected = model.simulate(u, history)
-        assert largest_difference(whole.output[:, i, 0], expected) <= 1e-9
-        np.testing.assert_array_equal(whole.flags[:, i], expected_flags(surrogate, u, expected[:, np.newaxis]))
+        expected = model.simulate(u, history).reshape(len(u), -1)
+        assert largest_difference(whole.output[:, i], expected) <= 1e-9
+        np.testing.assert_array_equal(whole.flags[:, i], expected_flags(surrogate, u, expected))
     half = run(np.stack(cars, axis=1)[:70], states)
     rest = run(np.stack(cars, axis=1)[70:], half.state)
     np.testing.assert_array_equal(np.concatenate([half.output, rest.output]), whole.output)
@@ -195,11 +223,18 @@ def test_a_cascade_may_hold_some(narx, name, kind, inputs, tmp_path) -> None:
 def test_at_rest_can_be_computed_from_what_the_manifest_says(model) -> None:
     surrogate = Surrogate.of(model, RANGES)
     (space,) = surrogate.state_text()["state_spaces"]
-    levels = dict(zip(("BP", "AR", "BC"), surrogate.levels(np.array([88.0, 70.0])), strict=True))
+    channels = (*model.mapping.inputs, *model.mapping.outputs)
+    levels = dict(zip(channels, surrogate.levels(np.array([88.0, 70.0])), strict=True))
     scaled = (np.array([levels[name] for name in space["channels"]]) - space["offset"]) / space["scale"]
     state = np.clip(space["constant"] + np.array(space["at_rest"]) @ scaled, -space.get("bound", 1e9), 1e9)
     np.testing.assert_allclose(state, surrogate.at_rest(np.array([88.0, 70.0])), atol=1e-9)
     assert space["size"] == surrogate.state_size
+
+
+def with_another(trace: Trace) -> Trace:
+    """The record with a second output."""
+    channels = (*trace.channels, Channel(name="ER", unit="bar", reference=Reference.GAUGE))
+    return replace(trace, channels=channels, values=np.column_stack([trace.values, 0.1 * trace["BC"]]))
 
 
 def test_a_bundle_carries_one(model, traces, tmp_path) -> None:
@@ -207,6 +242,7 @@ def test_a_bundle_carries_one(model, traces, tmp_path) -> None:
         model=model, status=Status.CONVERGED, loop=Loop.CLOSED, train_time_s=1.0,
         history={"iteration": np.arange(2.0), "mse": np.array([2.0, 1.0])},
     )  # fmt: skip
+    traces = replace(traces, traces=tuple(with_another(trace) for trace in traces))
     export_bundle(fit, traces, tmp_path / "bundle", start=Start(), formats=("onnx", "torchscript"))
     again = read_bundle(tmp_path / "bundle").model
     u = traces["EST01"].columns(["BP", "AR"])

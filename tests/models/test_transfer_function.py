@@ -96,7 +96,7 @@ def test_a_run_in_pieces_equals_one_long_run(domain: Domain) -> None:
     form, u = build(domain).recursion, inputs()
     x = form.state(History.at_rest(inputs=u[0], output=0.0))
     pieces = np.concatenate([form._run(u[:70], x), form._run(u[70:], x)])
-    np.testing.assert_array_equal(pieces, build(domain).simulate(u))
+    np.testing.assert_array_equal(pieces[:, 0], build(domain).simulate(u))
 
 
 def test_there_is_no_prediction_that_is_not_the_free_run() -> None:

@@ -37,6 +37,7 @@ SHARED = {**TERMS, "stability": STABILITY, "export": None}
 NARX = {"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": 2}
 NSS = {"kind": "NSS", "states": 1, "neurons": 2}
 ARX = {"kind": "ARX", "na": 1, "nb": [1, 1], "nk": [1, 1]}
+VECTOR_SS = {"kind": "VectorSS", "states": 2}
 VECTOR = {"kind": "VectorNARX", "input_delays": 1, "output_delays": 1, "neurons": 2}
 SS = {"kind": "SS", "states": 1}
 OE = {"kind": "OE", "nb": [1, 1], "nf": [1, 1], "nk": [1, 1]}
@@ -66,6 +67,7 @@ FITS = [
         EVERYWHERE, id="NARX gated, an ensemble",
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
+    pytest.param(VECTOR_SS, None, ALONE, id="VectorSS, of one"),
     pytest.param(VECTOR, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="NARX of several outputs, of one"),
 ]  # fmt: skip
 

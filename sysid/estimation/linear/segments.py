@@ -77,6 +77,24 @@ def segments_of(experiments: Sequence[Experiment], scaling: Scaling) -> tuple[Se
     return tuple(_segment(experiment, scaling) for experiment in experiments)
 
 
+def side_by_side(each: Sequence[Sequence[Segment]]) -> tuple[Segment, ...]:
+    """Segments of several outputs from those of each.
+
+    Args:
+        each: For each output the segments of the same records.
+
+    Returns:
+        One segment a record.
+    """
+    return tuple(_joined(parts) for parts in zip(*each, strict=True))
+
+
+def _joined(parts: Sequence[Segment]) -> Segment:
+    rests = [part.rest for part in parts if part.rest is not None]
+    rest = (rests[0][0], np.concatenate([outputs for _, outputs in rests])) if rests else None
+    return replace(parts[0], outputs=np.concatenate([part.outputs for part in parts], axis=1), rest=rest)
+
+
 def _segment(experiment: Experiment, scaling: Scaling) -> Segment:
     inputs, output = experiment.inputs, experiment.output
     weights = np.ones(len(output)) if experiment.weights is None else experiment.weights

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,11 +11,20 @@ import numpy as np
 from sysid.errors import TraceError
 from sysid.estimation.experiment import experiments_of, unit_range
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.segments import segments_of
+from sysid.estimation.linear.segments import segments_of, side_by_side
 from sysid.estimation.linear.state_space.search import METHODS, Found, StateSpaceTraining, search
 from sysid.estimation.linear.state_space.uncertainty import state_space_uncertainty
 from sysid.estimation.result import FitResult, Loop
-from sysid.models import LinearStateSpace, LinearStateSpaceModel, Mapping, Start
+from sysid.models import (
+    LinearStateSpace,
+    LinearStateSpaceModel,
+    Mapping,
+    Scaling,
+    Start,
+    VectorScaling,
+    VectorStateSpace,
+    VectorStateSpaceModel,
+)
 from sysid.traces import Trace
 
 
@@ -47,18 +57,7 @@ def fit_state_space(
     """
     began, training = time.perf_counter(), training or StateSpaceTraining()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
-    experiments = experiments_of(traces, mapping, start or Start(), rest)
-    counted, needed = sum(e.n_counted for e in experiments), orders.n_parameters(len(mapping.inputs))
-    needed += orders.states * sum(e.free for e in experiments)
-    if counted < needed:
-        raise TraceError(
-            "fewer samples than parameters and initial states",
-            expected=f"at least {needed} samples that count",
-            got=counted,
-            remedy="ask for fewer states, or use longer traces",
-        )
-    scaling = unit_range(experiments)
-    found = search(segments_of(experiments, scaling), orders, training)
+    (scaling,), found = _found(traces, mapping, orders, training, start=start, rests=(rest,))
     model = LinearStateSpaceModel(
         orders=orders,
         system=found.system,
@@ -69,8 +68,91 @@ def fit_state_space(
         output_unit=traces[0].channel(mapping.output).unit,
         rest_output=rest,
     )
-    unit = float(found.covariance[0, 0]) * scaling.output_scale**2 / max(found.curve[-1].mse, 1e-300)
-    exact = training.method == METHODS[1]
+    unit = float(found.covariance[0, 0]) * scaling.output_scale**2 / max(found.curve[-1].mse, _TINY)
+    return _result(model, found, orders, training, began=began, unit=unit)
+
+
+def fit_vector_state_space(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    orders: VectorStateSpace,
+    training: StateSpaceTraining | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: Dict[str, float] | None = None,
+) -> FitResult:
+    """Fit a linear state space of several outputs; see :func:`fit_state_space`.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which come out.
+        orders: The structure.
+        training: How to fit.
+        start: What stands before each trace; at rest by default.
+        rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
+
+    Returns:
+        The fit. Its errors are mean squares over the outputs, each relative to its innovations.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If there are fewer samples than parameters, or no record is long enough.
+        FitDivergedError: If no start gives a finite prediction.
+    """
+    began, training, given = time.perf_counter(), training or StateSpaceTraining(), rest_output or {}
+    rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
+    scalings, found = _found(traces, mapping, orders, training, start=start, rests=rests)
+    model = VectorStateSpaceModel(
+        orders=orders,
+        system=found.system,
+        scaling=VectorScaling.of(scalings),
+        mapping=mapping,
+        sample_time=traces[0].sample_time,
+        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
+        output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
+        rest_outputs=rests,
+    )
+    return _result(model, found, orders, training, began=began, unit=1.0)
+
+
+_TINY = 1e-300
+
+
+def _found(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    orders: LinearStateSpace,
+    training: StateSpaceTraining,
+    *,
+    start: Start | None,
+    rests: tuple[float, ...],
+) -> tuple[list[Scaling], Found]:
+    """The scaling of each output, and what the search finds."""
+    each = [experiments_of(traces, one, start or Start(), rest) for one, rest in zip(mapping.each, rests, strict=True)]
+    counted = len(each) * sum(e.n_counted for e in each[0])
+    needed = orders.n_parameters(len(mapping.inputs), len(each)) + orders.states * sum(e.free for e in each[0])
+    if counted < needed:
+        raise TraceError(
+            "fewer samples than parameters and initial states",
+            expected=f"at least {-(-needed // len(each))} samples that count",
+            got=counted // len(each),
+            remedy="ask for fewer states, or use longer traces",
+        )
+    scalings = [unit_range(experiments) for experiments in each]
+    segments = side_by_side([segments_of(e, scaling) for e, scaling in zip(each, scalings, strict=True)])
+    return scalings, search(segments, orders, training)
+
+
+def _result(
+    model: LinearStateSpaceModel | VectorStateSpaceModel,
+    found: Found,
+    orders: LinearStateSpace,
+    training: StateSpaceTraining,
+    *,
+    began: float,
+    unit: float,
+) -> FitResult:
+    by_subspace = training.method == METHODS[1]
     return FitResult(
         model=model,
         status=found.status,
@@ -80,7 +162,7 @@ def fit_state_space(
             "mse": unit * np.array([one.mse for one in found.curve]),
         },
         train_time_s=time.perf_counter() - began,
-        uncertainty=None if exact else state_space_uncertainty(model, found),
+        uncertainty=None if by_subspace else state_space_uncertainty(model, found),
         notes=(*_notes(found, orders), _stability(model)),
     )
 
@@ -92,7 +174,7 @@ def _notes(found: Found, orders: LinearStateSpace) -> tuple[str, ...]:
     return (begun, f"Canonical correlations of past and future: {told}; the states are those that stand out.")
 
 
-def _stability(model: LinearStateSpaceModel) -> str:
+def _stability(model: LinearStateSpaceModel | VectorStateSpaceModel) -> str:
     """Whether the free run is stable, as a sentence."""
     verdict = "stable" if model.pole_radius < 1.0 else "not stable"
     return f"The free run is {verdict}: the largest pole has magnitude {model.pole_radius:.6f}."

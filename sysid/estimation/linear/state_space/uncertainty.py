@@ -11,7 +11,7 @@ from scipy import linalg
 from sysid.estimation.linear.state_space.coordinates import flat, split
 from sysid.estimation.linear.state_space.search import Found
 from sysid.estimation.uncertainty import Uncertainty
-from sysid.models import LinearStateSpaceModel
+from sysid.models import LinearStateSpaceModel, VectorStateSpaceModel
 from sysid.models.innovations import Innovations
 from sysid.models.linear_state_space import polynomials
 
@@ -57,7 +57,7 @@ def derivatives(found: Found, function: Callable[[Innovations], NDArray[np.compl
     return np.column_stack(columns)
 
 
-def state_space_uncertainty(model: LinearStateSpaceModel, found: Found) -> Uncertainty:
+def state_space_uncertainty(model: LinearStateSpaceModel | VectorStateSpaceModel, found: Found) -> Uncertainty:
     """What the prediction errors say about denominator, numerators, noise and constant, in the channels' units.
 
     Args:
@@ -65,29 +65,38 @@ def state_space_uncertainty(model: LinearStateSpaceModel, found: Found) -> Uncer
         found: How it was found.
 
     Returns:
-        The uncertainty: ``F(lag)``, ``B(input, lag)``, ``C(lag)`` of the innovations, ``constant``.
+        The uncertainty: ``B(input, lag)``, ``F(lag)``, ``C(lag)`` of the innovations and ``constant``; of several
+        outputs ``B(output, input, lag)``, ``F(lag)``, ``C(output, innovation, lag)`` and ``constant(output)``. Its
+        noise variance is that of the innovations, of several outputs the root of their covariance's determinant.
     """
-    gains = model.scaling.output_scale / np.array(model.scaling.input_scale)
-    first, orders = (0 if model.orders.feedthrough else 1), model.orders
+    scaling, orders, outputs, p = model.scaling, model.orders, model.mapping.outputs, found.system.n_outputs
+    scale, offset = np.atleast_1d(scaling.output_scale), np.atleast_1d(scaling.output_offset)
+    gains = scale[:, np.newaxis] / np.array(scaling.input_scale)
+    across = scale[:, np.newaxis] / scale
+    first, n = (0 if orders.feedthrough else 1), orders.states
 
     def coefficients(system: Innovations) -> NDArray[np.complex128]:
         F, numerators, noise = polynomials(system)
-        parts = [gain * row[first:] for gain, row in zip(gains, numerators[0], strict=True)]
-        parts += [F[1:]] + [noise[0, 0, 1:]] * orders.noise
-        return np.concatenate([*parts, model.scaling.output_scale * system.constant * orders.intercept])[: len(names)]
+        parts = [(gains[:, :, np.newaxis] * numerators)[:, :, first:].ravel(), F[1:]]
+        parts += [(across[:, :, np.newaxis] * noise)[:, :, 1:].ravel()] * orders.noise
+        return np.concatenate([*parts, *[scale * system.constant] * orders.intercept])
 
-    lags = range(1, orders.states + 1)
-    names = [f"B({name}, {lag})" for name in model.mapping.inputs for lag in range(first, orders.states + 1)]
-    names += [f"F({lag})" for lag in lags] + [f"C({lag})" for lag in lags] * orders.noise
-    names += ["constant"] * orders.intercept
+    of = [""] if p == 1 else [f"{name}, " for name in outputs]
+    names = [f"B({o}{u}, {lag})" for o in of for u in model.mapping.inputs for lag in range(first, n + 1)]
+    names += [f"F({lag})" for lag in range(1, n + 1)]
+    names += [f"C({o}{e}{lag})" for o in of for e in of for lag in range(1, n + 1)] * orders.noise
+    names += (["constant"] if p == 1 else [f"constant({name})" for name in outputs]) * orders.intercept
     J = derivatives(found, coefficients)
     values = np.real(coefficients(found.system))
     if orders.intercept:
-        values[-1] += model.scaling.output_offset
-    variance = float(found.covariance[0, 0]) * model.scaling.output_scale**2
+        values[-p:] += offset
+    covariance = found.covariance * np.outer(scale, scale)
     return Uncertainty(
         names=tuple(names),
         values=values,
         covariance=J @ coordinates_covariance(found) @ J.T,
-        noise_variance=variance,
+        noise_variance=float(np.exp(np.linalg.slogdet(covariance + _TINY * np.eye(p))[1] / p)),
     )
+
+
+_TINY = 1e-300

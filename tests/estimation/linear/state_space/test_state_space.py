@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from scipy import optimize
 
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation import Loop, StateSpaceTraining, Status, fit_state_space
+from sysid.estimation import Loop, StateSpaceTraining, Status, fit_state_space, fit_vector_state_space
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.state_space.search import search
-from sysid.models import LinearStateSpace, Mapping, Start
+from sysid.models import LinearStateSpace, Mapping, Start, VectorStateSpace, model_from_dict
 from sysid.models.innovations import Innovations
-from sysid.traces import Trace
+from sysid.traces import Channel, Trace
 from tests.estimation.linear.subspace.test_subspace import TRUE, poles, segment
+from tests.estimation.linear.subspace.test_subspace import C as C_TRUE
 from tests.estimation.linear_systems import trace_of
 
 ONE, FREE = Mapping.parse("u1 -> y"), Start(kind="estimated")
@@ -132,3 +135,38 @@ def test_numbers_of_states_that_cannot_be_are_refused(states: object) -> None:
 def test_a_record_too_short_for_its_states_is_refused() -> None:
     with pytest.raises(TraceError):
         fit_state_space([record(0, 12)], ONE, LinearStateSpace(states=5), start=FREE)
+
+
+def two_outputs(seed: int, n: int = 500) -> Trace:
+    one = segment(n, seed, noise=0.3)
+    values = np.column_stack([one.inputs, 10.0 * one.outputs[:, 0], one.outputs[:, 1] + 5.0])
+    channels = tuple(Channel(name=name, unit=unit) for name, unit in zip("abyz", ("V", "V", "bar", "K"), strict=True))
+    return Trace(name="t", sample_time=0.5, channels=channels, values=values)
+
+
+def test_several_outputs_are_one_model_that_stores_and_predicts_itself() -> None:
+    traces, mapping = [two_outputs(0), two_outputs(1)], Mapping.parse("a+b -> y+z")
+    fit = fit_vector_state_space(traces, mapping, VectorStateSpace(states=3), start=FREE)
+    np.testing.assert_allclose(poles(fit.model.system), poles(TRUE), atol=0.03)
+    gain = C_TRUE @ np.linalg.solve(np.eye(3) - TRUE.A, TRUE.B) * np.array([[10.0], [1.0]])
+    A, B, C, D = fit.model.matrices
+    np.testing.assert_allclose(C @ np.linalg.solve(np.eye(3) - A, B) + D, gain, rtol=0.1, atol=0.5)
+    u, y = two_outputs(2).columns("ab"), two_outputs(2).columns("yz")
+    again = model_from_dict(json.loads(json.dumps(fit.model.to_dict())))
+    np.testing.assert_array_equal(again.predict(u, y, steps=2), fit.model.predict(u, y, steps=2))
+    e = (y - again.predict(u, y))[50:]
+    np.testing.assert_allclose(np.std(e, axis=0), [3.0, 0.3], rtol=0.15)
+    known = dict(zip(fit.uncertainty.names, fit.uncertainty.standard_deviations, strict=True))
+    assert {"B(y, a, 1)", "B(z, b, 3)", "F(3)", "C(z, y, 1)", "constant(z)"} <= set(known)
+    assert all(0.0 < value < np.inf for value in known.values())
+    assert [name for name, _, _ in fit.model.ratios] == ["y from a", "y from b", "z from a", "z from b"]
+    control = fit.model.to_control()
+    np.testing.assert_allclose(control.dcgain(), gain, rtol=0.1, atol=0.5)
+
+
+def test_one_output_of_a_vector_model_is_the_single_model() -> None:
+    trace = record(5)
+    single = fit_state_space([trace], ONE, LinearStateSpace(states=2), start=FREE).model
+    vector = fit_vector_state_space([trace], ONE, VectorStateSpace(states=2), start=FREE).model
+    u = trace.columns(["u1"])
+    np.testing.assert_allclose(vector.simulate(u)[:, 0], single.simulate(u), rtol=1e-9, atol=1e-9)
