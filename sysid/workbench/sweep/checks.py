@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from sysid.workbench.fits.run import GivenFit
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.store import TrialStore
-from sysid.workbench.sweep.trial import Bench, train
+from sysid.workbench.sweep.trial import Bench, stored_models, train
 
 FOLDER = "checked"
 """Beside the trials: those whose free run was checked."""
@@ -35,7 +36,7 @@ class Checks:
 
     driver: Driver
     bench: Bench
-    found: dict[int, FitResult] = field(default_factory=dict)
+    found: dict[int, list[FitResult]] = field(default_factory=dict)
     """Fits that were checked, by the trial's number."""
 
     def first_stable(self, ranked: Sequence[Trial]) -> tuple[Trial, int]:
@@ -49,30 +50,33 @@ class Checks:
             it is, and so it is where none that was looked at is stable.
         """
         for refused, trial in enumerate(ranked[:VETTED]):
-            fit = self._stored(trial)
-            asks = self.bench.stability.choose and fit.loop is Loop.CLOSED
-            if not asks or self._checked(trial).status is not Status.UNSTABLE:
+            asks = self.bench.stability.choose and self._stored(trial)[0].loop is Loop.CLOSED
+            if not asks or all(fit.status is not Status.UNSTABLE for fit in self._checked(trial)):
                 return trial, refused
         return ranked[0], 0
 
-    def given(self, trial: Trial) -> GivenFit:
-        """A trial as a fit that was made elsewhere.
+    def given(self, trial: Trial) -> list[GivenFit]:
+        """A trial as fits that were made elsewhere.
 
         Args:
             trial: The trial.
 
         Returns:
-            The fit.
+            One for each of its models.
         """
         job, stability = self.driver.last[trial.number], self.bench.stability
+        terms = {"job": job.key, "stability": stability.terms}
+        count = len(self._stored(trial))
 
-        def make() -> FitResult:
-            return replace(self._whole(trial, self._checked(trial)), train_time_s=float(trial.seconds))
+        def make(number: int) -> FitResult:
+            fit = self._whole(trial, self._checked(trial), number)
+            return replace(fit, train_time_s=float(trial.seconds) / count)
 
-        return GivenFit(key=digest(strict({"job": job.key, "stability": stability.terms})), make=make)
+        keys = [digest(strict(terms if count == 1 else {**terms, "model": number})) for number in range(count)]
+        return [GivenFit(key=key, make=partial(make, number)) for number, key in enumerate(keys)]
 
-    def _stored(self, trial: Trial) -> FitResult:
-        return FitResult.from_dict(self._outcome(trial)["fit"])
+    def _stored(self, trial: Trial) -> list[FitResult]:
+        return [FitResult.from_dict(one["fit"]) for one in stored_models(self._outcome(trial))]
 
     def _outcome(self, trial: Trial) -> dict[str, Any]:
         key = self.driver.last[trial.number].key
@@ -85,8 +89,8 @@ class Checks:
             )
         return outcome
 
-    def _checked(self, trial: Trial) -> FitResult:
-        """The trial's fit with what its check found, from the disk where it was made before."""
+    def _checked(self, trial: Trial) -> list[FitResult]:
+        """The trial's fits with what their check found, from the disk where it was made before."""
         if trial.number not in self.found:
             store = TrialStore(path=self.driver.store.path / FOLDER)
             terms = {
@@ -96,23 +100,30 @@ class Checks:
             key = digest(strict(terms))
             outcome = store.read(key)
             if outcome is None:
-                fit, estimation = self._stored(trial), self.bench.traces.with_role(Role.ESTIMATION)
+                estimation = self.bench.traces.with_role(Role.ESTIMATION)
                 # A trial that chose between starts was checked as it did.
-                fit = fit if fit.stability is not None else with_stability(fit, estimation, self.bench.stability)
-                outcome = {"key": key, "fit": fit.to_dict()}
+                first, *further = [
+                    fit if fit.stability is not None else with_stability(fit, estimation, self.bench.stability)
+                    for fit in self._stored(trial)
+                ]
+                outcome = {
+                    "key": key,
+                    "fit": first.to_dict(),
+                    "further": [{"fit": fit.to_dict()} for fit in further],
+                }
                 store.write(outcome)
-            self.found[trial.number] = FitResult.from_dict(outcome["fit"])
+            self.found[trial.number] = [FitResult.from_dict(one["fit"]) for one in stored_models(outcome)]
         return self.found[trial.number]
 
-    def _whole(self, trial: Trial, fit: FitResult) -> FitResult:
+    def _whole(self, trial: Trial, fits: Sequence[FitResult], number: int) -> FitResult:
         """The fit with its posterior, which is too large to be kept of every trial: made from where training ended."""
-        job, outcome = self.driver.last[trial.number], self._outcome(trial)
-        if outcome["checkpoint"] is None:
+        job, outcome, fit = self.driver.last[trial.number], self._outcome(trial), fits[number]
+        if any(one["checkpoint"] is None for one in stored_models(outcome)):
             return fit
         training = {**job.training, "starts": 1, "ensemble": 1, "input_subsets": ()}
-        again, _ = train(self.bench, replace(job, after=job.key, resume=True, training=training), outcome)
+        again, _ = train(self.bench, replace(job, after=job.key, resume=True, training=training), outcome)[number]
         if not np.array_equal(again.model.recursion.numbers, fit.model.recursion.numbers):
             # An ensemble is no single start's: all of the trial is done again.
             before = None if job.after is None else self.driver.store.read(job.after)
-            again, _ = train(self.bench, job, before)
+            again, _ = train(self.bench, job, before)[number]
         return replace(fit, posterior=again.posterior)

@@ -10,7 +10,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import Start, StartKind
 from sysid.reporting.sweep_record import FIGURES
-from sysid.workbench.fields import SingleMappingField, StartField, as_field_error
+from sysid.workbench.fields import MappingField, StartField, as_field_error
 from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig, ReportConfig
 from sysid.workbench.old_words import STRICT, TRAINING, with_new_words
 from sysid.workbench.stability import StabilityConfig
@@ -115,7 +115,8 @@ class SweepConfig(BaseModel):
         description: What it is for.
         data: Name of a data set, or path of its ``dataset.yaml``.
         selection: Data set with traces that choose; validation cases do not.
-        mapping: Inputs and output, such as ``BP+AR -> BC``.
+        mapping: Inputs and outputs, such as ``BP+AR -> BC`` or ``STP -> BP+AR``; of several outputs errors count over
+            their variances.
         start: How each free run begins.
         rest: Value at rest of the output, by channel name, in its unit.
         seed: Seed of everything random; each trial's own follows from it and from the trial's point.
@@ -145,7 +146,7 @@ class SweepConfig(BaseModel):
     description: str = ""
     data: str
     selection: str | None = None
-    mapping: SingleMappingField
+    mapping: MappingField
     start: StartField = Start(kind=StartKind.ESTIMATED)
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)

@@ -15,6 +15,7 @@ from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.estimates import how_long
+from sysid.workbench.fits.outputs import models_of
 from sysid.workbench.fits.run import FitSteps, GivenFit
 from sysid.workbench.fits.table import table_of_fits
 from sysid.workbench.runner import events
@@ -207,7 +208,7 @@ class _Found:
     record: SweepRecord
     winner: Trial
     beside: list[Trial]
-    given: dict[int, GivenFit]
+    given: dict[int, list[GivenFit]]
     options: dict[int, Mapping[str, Any]]
     rank: float
     done_now: int
@@ -252,7 +253,11 @@ class _SweepSteps:
         found = run.do(self._trials(run, loaded)).value
         fits = [found.fit_of(WINNER, found.winner)] + [found.fit_of(trial.label, trial) for trial in found.beside]
         pipeline = Pipeline(config=self.config.pipeline(fits), text=self.sweep.text, path=self.sweep.path)
-        given = {fit.name: found.given[trial.number] for fit, trial in zip(fits, found.shown, strict=True)}
+        given = {
+            model.fit.name: made
+            for fit, trial in zip(fits, found.shown, strict=True)
+            for model, made in zip(models_of(fit, pipeline.config), found.given[trial.number], strict=True)
+        }
         cases_chose = self.config.choose.on == "cases"
         choice = steps.Choice(name=WINNER, chosen_by=found.record.chosen_by, cases_chose=cases_chose)
         results = FitSteps(pipeline=pipeline, given=given, chosen=choice).run(run, loaded)
@@ -295,11 +300,12 @@ class _SweepSteps:
         fit = FitConfig.model_validate(
             {"name": WINNER, "structure": middle.structure.to_dict(), "training": dict(middle.training) or None}
         )
-        one = how_long(fit, self.config.pipeline([fit]), data)
+        models = models_of(fit, self.config.pipeline([fit]))
+        one = how_long(models[0].fit, models[0].config, data)
         if one.seconds is None:
             return one
         basis = f"{left} trials, each as long as {middle.structure.label}, {self.config.workers} at a time"
-        return Estimate(seconds=left * one.seconds / self.config.workers, basis=basis)
+        return Estimate(seconds=left * len(models) * one.seconds / self.config.workers, basis=basis)
 
     def _bench(self, run: Run, data: Data) -> Bench:
         return Bench(
@@ -403,7 +409,9 @@ class _SweepSteps:
         ranked = sorted(usable, key=lambda trial: (driver.rank(trial), trial.parameters, trial.number))
         checks = Checks(driver=driver, bench=bench)
         winner, refused = checks.first_stable(ranked)
-        unit = bench.traces.traces[0].channel(self.config.mapping.output).unit
+        outputs = self.config.mapping.outputs
+        # Errors of several outputs count over their variances: in standard deviations, squared.
+        unit = bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
         n_points = len(self.config.space().points())
         record = self._record(tried, beside, winner, unit=unit, n_points=n_points, wall_s=wall_s, refused=refused)
         others = [trial for trial in beside if trial.number != winner.number]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -21,6 +21,8 @@ from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
+from sysid.workbench.fits.outputs import models_of
+from sysid.workbench.fits.steps import output_sizes
 from sysid.workbench.runner.store import RunFolder
 
 FAILED = "FAILED"
@@ -97,18 +99,25 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     try:
         with threadpool_limits(1):
             watch = _watch(bench, job)
-            fit, checkpoint = train(bench, job, before, watch)
+            trained_models = train(bench, job, before, watch)
             trained = watch.checkpoints.earlier_s + time.perf_counter() - began
+            fits = [fit for fit, _ in trained_models]
+            worst = next((fit for fit in fits if not fit.status.usable), fits[0])
+            first, *further = [
+                {"fit": fit.to_dict(), "checkpoint": None if checkpoint is None else dict(checkpoint.fields)}
+                for fit, checkpoint in trained_models
+            ]
+            evidences = [fit.evidence.log_evidence for fit in fits if fit.evidence is not None]
             outcome |= {
-                "status": fit.status.name,
-                "usable": fit.status.usable,
-                "iterations": _iterations(fit),
-                "parameters": fit.model.n_parameters,
-                "operations": operations(fit.model),
-                "log_evidence": None if fit.evidence is None else fit.evidence.log_evidence,
-                "fit": fit.to_dict(),
-                "checkpoint": None if checkpoint is None else dict(checkpoint.fields),
-                **_scores(bench, fit.model),
+                "status": worst.status.name,
+                "usable": worst.status.usable,
+                "iterations": sum(_iterations(fit) for fit in fits),
+                "parameters": sum(fit.model.n_parameters for fit in fits),
+                "operations": sum(operations(fit.model) for fit in fits),
+                "log_evidence": sum(evidences) if len(evidences) == len(fits) else None,
+                **first,
+                "further": further,
+                **_scores(bench, [fit.model for fit in fits]),
             }
     except (SysidError, ArithmeticError, np.linalg.LinAlgError) as error:
         # A structure that cannot be fitted to these traces is a finding; the other trials go on.
@@ -148,7 +157,7 @@ def train(
     job: Job,
     before: Mapping[str, Any] | None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
-) -> tuple[FitResult, Checkpoint | None]:
+) -> list[tuple[FitResult, Checkpoint | None]]:
     """Train one point.
 
     Args:
@@ -158,7 +167,8 @@ def train(
         on_progress: Told after every iteration; a ``Watch`` keeps where the training stands.
 
     Returns:
-        The fit, and where it can go on if it is a network's.
+        For each of its models, of which there is one where the structure has all outputs, the fit, and where it can go
+        on if it is a network's.
 
     Raises:
         SysidError: If it cannot be fitted.
@@ -167,23 +177,43 @@ def train(
     config = PipelineConfig.model_validate(dict(bench.pipeline))
     data = Data(traces=_shortened(bench.traces, job.record), selection=bench.selection)
     training = fit.training_options(config.seed)
-    kept: list[Checkpoint] = []
+    if job.iterations is not None:
+        training = replace(cast("Training", training), max_iterations=job.iterations)
     usable = before is not None and before["status"] != FAILED
-    result = estimators.fit(
-        data.estimation,
-        config.mapping,
-        fit.structure,
-        training if job.iterations is None else replace(cast("Training", training), max_iterations=job.iterations),
-        start=config.start,
-        rest_output=config.rest_output,
-        selection=data.selection,
-        initial=FitResult.from_dict(before["fit"]) if before and usable and not job.resume else None,
-        stability=_checked(bench, estimator_of(fit.structure), training),
-        resume=Checkpoint(fields=before["checkpoint"]) if before and usable and job.resume else None,
-        on_checkpoint=kept.append,
-        on_progress=on_progress,
-    )
-    return result, kept[-1] if kept else None
+    stood = stored_models(before) if before and usable else []
+    models = models_of(fit, config)
+    found: list[tuple[FitResult, Checkpoint | None]] = []
+    for number, model in enumerate(models):
+        kept: list[Checkpoint] = []
+        result = estimators.fit(
+            data.estimation,
+            model.config.mapping,
+            fit.structure,
+            training,
+            start=config.start,
+            rest_output=model.config.rest_output,
+            selection=data.selection,
+            initial=FitResult.from_dict(stood[number]["fit"]) if stood and not job.resume else None,
+            stability=_checked(bench, estimator_of(fit.structure), training),
+            resume=Checkpoint(fields=stood[number]["checkpoint"]) if stood and job.resume else None,
+            on_checkpoint=kept.append,
+            # Where a training stands is kept under names that know of one model only.
+            on_progress=on_progress if len(models) == 1 else lambda _: None,
+        )
+        found.append((result, kept[-1] if kept else None))
+    return found
+
+
+def stored_models(outcome: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Of each model of a trial, one an output or one of all, its ``fit`` and its ``checkpoint``.
+
+    Args:
+        outcome: What :func:`run_job` gave.
+
+    Returns:
+        JSON values.
+    """
+    return [outcome, *outcome.get("further", ())]
 
 
 def _checked(bench: Bench, row: Estimator, training: Options | None) -> StabilityOptions | None:
@@ -232,14 +262,16 @@ def operations(model: AbstractModel) -> int:
     return int(np.count_nonzero(model.recursion.numbers))
 
 
-def _scores(bench: Bench, model: AbstractModel) -> dict[str, Any]:
+def _scores(bench: Bench, models: Sequence[AbstractModel]) -> dict[str, Any]:
     """Figures on every case and on the selection traces."""
     start: Start = PipelineConfig.model_validate(dict(bench.pipeline)).start
+    outputs = [output for model in models for output in model.mapping.outputs]
+    sizes = dict(zip(outputs, output_sizes(Data(traces=bench.traces, selection=bench.selection), outputs), strict=True))
     cases = {
-        trace.name: {"role": bench.traces.roles[trace.name].value, **_case(model, trace, start, REPEATS)}
+        trace.name: {"role": bench.traces.roles[trace.name].value, **_case(models, trace, start, sizes, REPEATS)}
         for trace in bench.traces
     }
-    chosen = [_case(model, trace, start, 0) for trace in bench.selection]
+    chosen = [_case(models, trace, start, sizes, 0) for trace in bench.selection]
     means = {
         f"selection_{name}": float(np.mean([one[name] for one in chosen])) if chosen else math.nan
         for name in ("free_run_mse", "one_step_mse")
@@ -247,21 +279,34 @@ def _scores(bench: Bench, model: AbstractModel) -> dict[str, Any]:
     return {"cases": cases, **means}
 
 
-def _case(model: AbstractModel, trace: Trace, start: Start, repeats: int) -> dict[str, float]:
-    inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-    begun = beginning(model, inputs, target, start, trace.usable_samples)
-    history, n = begun.history, begun.first
-    inputs, target, counted = inputs[n:], target[n:], trace.usable_samples[n:]
-    simulated, predicted = model.simulate(inputs, history), np.full(target.shape, np.nan)
-    if model.recursion.predicts:
-        predicted = model.predict(inputs, target, history)
-    figures = {
-        "free_run_mse": float(np.mean((simulated - target)[counted] ** 2)),
-        "one_step_mse": float(np.mean((predicted - target)[counted] ** 2)),
-    }
-    seconds = []
+def _case(
+    models: Sequence[AbstractModel], trace: Trace, start: Start, sizes: Mapping[str, float], repeats: int
+) -> dict[str, float]:
+    """Means over the outputs, each over the squared error that counts as one."""
+    errors: dict[str, list[float]] = {"free_run_mse": [], "one_step_mse": []}
+    seconds = 0.0
+    for model in models:
+        inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
+        begun = beginning(model, inputs, target, start, trace.usable_samples)
+        history, n = begun.history, begun.first
+        inputs, target, counted = inputs[n:], target[n:], trace.usable_samples[n:]
+        runs = {"free_run_mse": model.simulate(inputs, history), "one_step_mse": np.full(target.shape, np.nan)}
+        if model.recursion.predicts:
+            runs["one_step_mse"] = model.predict(inputs, target, history)
+        size = np.array([sizes[output] for output in model.mapping.outputs])
+        for name, run in runs.items():
+            squared = ((run - target)[counted] ** 2).reshape(-1, len(size))
+            errors[name] += list(np.mean(squared, axis=0) / size)
+        seconds += _seconds(lambda m=model, u=inputs, h=history: m.simulate(u, h), repeats)  # type: ignore[misc]
+    figures = {name: float(np.mean(values)) for name, values in errors.items()}
+    return figures | ({"run_time_s": seconds} if repeats else {})
+
+
+def _seconds(run: Callable[[], object], repeats: int) -> float:
+    """The least time of some runs; whatever else the machine does only adds to it."""
+    taken = []
     for _ in range(repeats):
         began = time.perf_counter()
-        model.simulate(inputs, history)
-        seconds.append(time.perf_counter() - began)
-    return figures | ({"run_time_s": min(seconds)} if seconds else {})
+        run()
+        taken.append(time.perf_counter() - began)
+    return min(taken, default=0.0)

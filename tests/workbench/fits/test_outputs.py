@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import sysid
 from sysid.errors import ConfigError
 from sysid.export import read_bundle
 from sysid.models import model_from_dict
@@ -17,6 +18,10 @@ from sysid.workbench.fits.config import Pipeline, parse_pipeline
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.run import run_pipeline
 from sysid.workbench.runner import events
+from sysid.workbench.sweep.config import SweepConfig
+from sysid.workbench.sweep.run import Sweep, run_sweep
+from sysid.workbench.sweep.workers import InThisProcess
+from sysid.yaml_files import check
 
 DATASET = """\
 name: tanks
@@ -145,6 +150,31 @@ def test_a_second_run_does_nothing_again(place: Path) -> None:
     steps = [event for event in heard if isinstance(event, events.StepDone)]
     assert len(steps) > 10
     assert [event.step for event in steps if not event.stored and "Loading" not in event.step] == []
+
+
+SWEPT = [
+    {"kind": "ARX", "na": {"from": 1, "to": 2}, "nb": [1, 1], "nk": [1, 1]},
+    {"kind": "VectorNARX", "input_delays": 1, "output_delays": 1, "neurons": 1},
+]
+
+
+def test_a_sweep_tries_all_outputs_of_a_point(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sysid.reporting.report.write_report", lambda folder: folder / "results.json")
+    fields = {
+        "kind": "sweep", "name": "swept", "data": "tanks", "mapping": "u+w -> level+heat", "start": "rest",
+        "structure": SWEPT, "training": {"max_iterations": 2}, "export": None, "stability": {"count": 0},
+    }  # fmt: skip
+    sweep = Sweep(config=check(SweepConfig, fields, where="here"), text="", path=place / "pipelines" / "swept.yaml")
+    found = run_sweep(sweep, place / "runs" / "swept", command="", find_workers=lambda bench, _: InThisProcess(bench))
+    assert [trial.label.split()[0] for trial in found.record.trials] == ["ARX", "ARX", "VectorNARX"]
+    assert all(trial.usable for trial in found.record.trials), [trial.reason for trial in found.record.trials]
+    # Errors count over the variances of their outputs: neither centimetres nor kelvins rule.
+    best, chosen = found.record.trials[found.record.winner - 1], found.results.best_fits
+    trace = sysid.load(place / "datasets" / "tanks" / "dataset.yaml")["run-2"]
+    shares = [fit.selection_mse / trace[fit.mapping.split(" -> ")[1]].var() for fit in chosen]
+    assert best.selection_free_run_mse == pytest.approx(np.mean(shares))
+    assert [fit.mapping for fit in found.results.best_fits] == ["u+w -> level", "u+w -> heat"]
+    assert found.results.systems[0].name == "sweep winner"
 
 
 WRONG = {
