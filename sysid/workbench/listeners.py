@@ -1,4 +1,4 @@
-"""Who is told of a run: the screen, the log in its folder and MLflow; and what is said at its end.
+"""Who is told of a run: the screen, the log in its folder and the trackers; and what is said at its end.
 
 A run of whatever kind begins here: :func:`perform`.
 """
@@ -12,18 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from sysid.extras import has
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.dry_run import PlannedStep
 from sysid.workbench.runner.events import Warned, Watcher
 from sysid.workbench.runner.program import Closing, Program, carry_out, foretell
 from sysid.workbench.runner.screen import LogFile, Screen
-from sysid.workbench.tracking.listener import Tracker
+from sysid.workbench.trackers import Found, find_trackers
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
-
-UNTRACKED = 'Not tracked in MLflow, which is not installed: pip install "sysid-workbench[mlflow]"'
 
 
 def typed_command(verb: str, pipeline: str, out: Path | None) -> str:
@@ -52,22 +49,20 @@ class Listeners:
         target: Where the end of the run is shown.
         screen: Its steps and their progress.
         log: Writes the steps down in the run folder.
-        tracker: MLflow; ``None`` where the run is not tracked.
-        untracked: Why it is not tracked, where that was not asked for.
+        tracked: The trackers; none where the run is not tracked.
     """
 
     target: Console
     screen: Screen
     log: LogFile
-    tracker: Tracker | None
-    untracked: str = ""
+    tracked: Found
 
     @classmethod
     def of(cls, *, tracking: bool) -> Listeners:
         """Everybody who listens.
 
         Args:
-            tracking: Whether the run is tracked in MLflow.
+            tracking: Whether the run is tracked.
 
         Returns:
             The listeners.
@@ -79,15 +74,13 @@ class Listeners:
             for watch in (screen, log):
                 watch(Warned(text=text))
 
-        there = has("mlflow")
-        tracker = Tracker.of_workspace(Path.cwd(), warn) if tracking and there else None
-        untracked = UNTRACKED if tracking and not there else ""
-        return cls(target=target, screen=screen, log=log, tracker=tracker, untracked=untracked)
+        tracked = find_trackers(Path.cwd(), warn) if tracking else Found()
+        return cls(target=target, screen=screen, log=log, tracked=tracked)
 
     @property
     def watchers(self) -> list[Watcher]:
         """All of them."""
-        return [self.screen, self.log, *([self.tracker] if self.tracker else [])]
+        return [self.screen, self.log, *self.tracked.trackers]
 
     def end(self, closing: Closing) -> int:
         """Say how it came out, and what lies where.
@@ -104,15 +97,18 @@ class Listeners:
         for name, path in closing.files.items():
             if path.exists():
                 self.target.print(f"{name + ':':<9}{path}", soft_wrap=True)
-        if self.tracker is not None and self.tracker.failures:
+        failed = [one.name for one in self.tracked.trackers if one.failures]
+        if failed:
             self.target.print(
-                "Everything above is done and stored, but not all of it is tracked in MLflow; run it again to retry."
+                f"Everything above is done and stored, but not all of it is tracked in {' and '.join(failed)}; "
+                "run it again to retry."
             )
             return 1
-        if self.untracked:
-            self.target.print(self.untracked, soft_wrap=True, markup=False)
-        if self.tracker is not None and closing.compare:
-            self.target.print(f"{'Compare:':<9}sysid ui")
+        for said in self.tracked.missing:
+            self.target.print(said, soft_wrap=True, markup=False)
+        for one in self.tracked.trackers if closing.compare else ():
+            if one.compare:
+                self.target.print(f"{'Compare:':<9}{one.compare}")
         return 0
 
 

@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sysid.workbench.listeners import UNTRACKED
+from sysid.workbench.trackers import UNTRACKED
 from tests.test_readme import ROOT, Command, blocks, check, commands, stand_in
 
 LARGEST_MB = 600.0
