@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record
@@ -74,7 +74,7 @@ def _tested(without: float, with_them: float, count: int, free: tuple[int, int])
     """Probability that chance explains as much, and the share explained less what chance does of it."""
     F = (without - with_them) / count / max(with_them / free[1], 1e-300)
     share = 1.0 - with_them / max(without, 1e-300)
-    return float(stats.f.sf(F, count, free[1])), max(0.0, 1.0 - (1.0 - share) * free[0] / free[1])
+    return float(scipy.stats.f.sf(F, count, free[1])), max(0.0, 1.0 - (1.0 - share) * free[0] / free[1])
 
 
 def _at_once(some: Record, past: int) -> float:

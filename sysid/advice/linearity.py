@@ -14,9 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
-from scipy.signal import lfilter
 
 from sysid.advice.dynamics import BARELY
 from sysid.advice.finding import Finding, Topic, Verdict
@@ -195,7 +194,7 @@ def _features(one: Residual, found: ImpulseResponse) -> NDArray[np.float64]:
         g[found.lags] = found.values[j]
         size = float(np.sqrt(g @ g)) or 1.0
         curved = [z - z.mean() for z in (x**2, x**3 - 3 * x) if np.ptp(z) > 1e-9]
-        columns += [lfilter(g / size, [1.0], z)[deepest:] for z in curved]
+        columns += [scipy.signal.lfilter(g / size, [1.0], z)[deepest:] for z in curved]
     return np.column_stack(columns)
 
 
@@ -207,7 +206,7 @@ def _tested(
     share = _explained(features, left, whiten, corrected=False)
     free = rows - q - len(left)
     F = share / q / max((1.0 - share) / free, 1e-300)
-    return max(0.0, 1.0 - (1.0 - share) * (rows - len(left)) / free), float(stats.f.sf(F, q, free))
+    return max(0.0, 1.0 - (1.0 - share) * (rows - len(left)) / free), float(scipy.stats.f.sf(F, q, free))
 
 
 def _explained(
@@ -219,7 +218,7 @@ def _explained(
 ) -> float:
     blocks = []
     for X, y in zip(features, left, strict=True):
-        block = lfilter(whiten, [1.0], np.column_stack([X, y]), axis=0)[len(whiten) - 1 :]
+        block = scipy.signal.lfilter(whiten, [1.0], np.column_stack([X, y]), axis=0)[len(whiten) - 1 :]
         blocks.append(block - block.mean(axis=0))
     found = triangle(blocks, free=0)
     q, rows = features[0].shape[1], sum(map(len, blocks))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +46,7 @@ class Uncertainty:
         Returns:
             Shape ``(n_parameters, 2)``.
         """
-        half = stats.norm.ppf(0.5 + 0.5 * probability) * self.standard_deviations
+        half = scipy.stats.norm.ppf(0.5 + 0.5 * probability) * self.standard_deviations
         return np.column_stack([self.values - half, self.values + half])
 
     def to_dict(self) -> dict[str, Any]:

@@ -19,8 +19,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.models.cascade import Cascade
@@ -109,8 +109,8 @@ class Line:
         return self.along.n_parameters + self.at_place.n_parameters
 
     @cached_property
-    def _spline(self) -> CubicSpline:
-        return CubicSpline(list(self.knots.values()), np.eye(len(self.knots)))
+    def _spline(self) -> Any:
+        return scipy.interpolate.CubicSpline(list(self.knots.values()), np.eye(len(self.knots)))
 
     def weights(self, positions: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
         """What each knot says of the field at some positions.

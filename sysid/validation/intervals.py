@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Posterior
@@ -41,7 +41,7 @@ class OutputInterval:
     @property
     def half_width(self) -> NDArray[np.float64]:
         """Half the interval's width, in the output's unit, shape ``(n_samples,)``."""
-        quantile = float(stats.norm.ppf(0.5 + 0.5 * self.level))
+        quantile = float(scipy.stats.norm.ppf(0.5 + 0.5 * self.level))
         return np.asarray(quantile * self.spread * np.hypot(self.parameter_deviation, self.noise_deviation))
 
     @property

@@ -19,9 +19,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
-from scipy.fft import irfft, next_fast_len, rfft
 
 from sysid.errors import TraceError
 from sysid.models import AbstractModel, Start, beginning
@@ -62,8 +61,10 @@ class Correlation:
         its distance alone is unlikely among so many lags (Bonferroni, at 99 %).
         """
         n = int(np.count_nonzero(self.lags >= 0))
-        allowed = int(stats.binom.ppf(0.99, n, 1.0 - self.probability))
-        wide = self.bound * float(stats.norm.ppf(1.0 - 0.005 / n) / stats.norm.ppf(0.5 + 0.5 * self.probability))
+        allowed = int(scipy.stats.binom.ppf(0.99, n, 1.0 - self.probability))
+        wide = self.bound * float(
+            scipy.stats.norm.ppf(1.0 - 0.005 / n) / scipy.stats.norm.ppf(0.5 + 0.5 * self.probability)
+        )
         largest = float(np.abs(self.values[self.lags >= 0]).max(initial=0.0))
         return bool(len(self.outside) <= allowed and largest <= wide)
 
@@ -191,7 +192,7 @@ def analyse_residuals(
     covariance = sum((_correlate(r.residual, r.residual, n_lags)[n_lags:] for r in records), np.zeros(n_lags + 1))
     scale = covariance[0] if covariance[0] > 0.0 else 1.0
     r = covariance / scale
-    half = float(stats.norm.ppf(0.5 + 0.5 * probability))
+    half = float(scipy.stats.norm.ppf(0.5 + 0.5 * probability))
     whiteness = Correlation(
         name="residual", lags=lags[1:], values=r[1:], bound=half / np.sqrt(n), probability=probability
     )
@@ -201,7 +202,7 @@ def analyse_residuals(
         variance=float(covariance[0] / n),
         whiteness=whiteness,
         ljung_box=ljung_box,
-        ljung_box_p=float(stats.chi2.sf(ljung_box, n_lags)),
+        ljung_box_p=float(scipy.stats.chi2.sf(ljung_box, n_lags)),
         inputs=tuple(
             _with_input(records, j, name=name, n_lags=n_lags, half=half, probability=probability)
             for j, name in enumerate(model.mapping.inputs)
@@ -238,8 +239,8 @@ def _centred(records: Sequence[_Record]) -> list[_Record]:
 
 def _correlate(a: NDArray[np.float64], b: NDArray[np.float64], n_lags: int) -> NDArray[np.float64]:
     """``sum_t a(t) b(t - lag)`` for lags from ``-n_lags`` to ``n_lags``."""
-    size = next_fast_len(len(a) + n_lags + 1, real=True)
-    product = irfft(rfft(a, size) * np.conj(rfft(b, size)), size)
+    size = scipy.fft.next_fast_len(len(a) + n_lags + 1, real=True)
+    product = scipy.fft.irfft(scipy.fft.rfft(a, size) * np.conj(scipy.fft.rfft(b, size)), size)
     return np.concatenate([product[-n_lags:] if n_lags else product[:0], product[: n_lags + 1]])
 
 

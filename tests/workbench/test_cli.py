@@ -42,6 +42,19 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stdout.splitlines()[-1] == "[] 0"
 
 
+@pytest.mark.parametrize("command", ["simulate"])
+def test_short_commands_import_none_of_the_slow_libraries(command: str) -> None:
+    """What they need starts in 1.5 s of processor time; each of these takes a fifth of a second or more."""
+    script = (
+        f"import sys, sysid.workbench.commands.{command}; "
+        "slow = {'scipy.stats', 'scipy.signal', 'scipy.interpolate', 'scipy.optimize', 'scipy.fft', 'matplotlib', "
+        "'pandas', 'pyarrow', 'h5py', 'control', 'onnx', 'onnxruntime', 'mlflow', 'optuna', 'torch', 'pint'}; "
+        "print(sorted(slow & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_a_line_of_help_and_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run_cli([command, "--help"]) == 0

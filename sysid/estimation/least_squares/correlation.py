@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 
 def correlation_time(residual: NDArray[np.float64]) -> float:
@@ -26,9 +26,9 @@ def correlation_time(residual: NDArray[np.float64]) -> float:
         (True, True)
     """
     n = len(residual)
-    size = next_fast_len(2 * n, real=True)
-    spectrum = np.abs(rfft(residual, size)) ** 2
-    covariance = irfft(spectrum, size)[:n]
+    size = scipy.fft.next_fast_len(2 * n, real=True)
+    spectrum = np.abs(scipy.fft.rfft(residual, size)) ** 2
+    covariance = scipy.fft.irfft(spectrum, size)[:n]
     if not covariance[0] > 0.0 or not np.isfinite(covariance[0]):
         return 1.0
     tau = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0

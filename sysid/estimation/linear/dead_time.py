@@ -13,9 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.signal import lfilter
 
 from sysid.estimation.experiment import Experiment
 
@@ -70,12 +69,13 @@ def shares(
         for u, y in zip(inputs, targets, strict=True):
             x = u
             for _ in range(order):
-                x = lfilter([1.0 - p], [1.0, -p], x)
+                x = scipy.signal.lfilter([1.0 - p], [1.0, -p], x)
             n = len(x)
             x = x - x.mean()
-            size = next_fast_len(n + most + 1, real=True)
+            size = scipy.fft.next_fast_len(n + most + 1, real=True)
             lags = min(most, n - 1)
-            top[: lags + 1] += irfft(rfft(y, size) * np.conj(rfft(x, size)), size)[: lags + 1]
+            crossed = scipy.fft.rfft(y, size) * np.conj(scipy.fft.rfft(x, size))
+            top[: lags + 1] += scipy.fft.irfft(crossed, size)[: lags + 1]
             before = np.cumsum(x[::-1] ** 2)[::-1]  # energy of what is left after a shift pushes the end out
             whole = before[0] - np.concatenate([[0.0], np.cumsum(x[::-1] ** 2)])[: lags + 1]
             energy[: lags + 1] += whole
@@ -124,7 +124,7 @@ def _explained(u: NDArray[np.float64], y: NDArray[np.float64], k: int) -> NDArra
     """What responses with that dead time explain together."""
     delayed = np.concatenate([np.full(min(k, len(u)), u[0]), u[: max(len(u) - k, 0)]])
     poles = [float(np.exp(-1.0 / constant)) if constant else 0.0 for constant in TIME_CONSTANTS]
-    columns = np.column_stack([lfilter([1.0 - p], [1.0, -p], delayed) for p in poles])
+    columns = np.column_stack([scipy.signal.lfilter([1.0 - p], [1.0, -p], delayed) for p in poles])
     return np.asarray(columns @ np.linalg.lstsq(columns, y, rcond=1e-6)[0])
 
 

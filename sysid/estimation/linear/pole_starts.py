@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import linalg
-from scipy.signal import freqz
 
 from sysid.estimation.linear.poles import continuous_from, scattered, sections_of, stabilised
 from sysid.estimation.linear.records import TimeRecord
@@ -262,7 +262,7 @@ def _factor(gramian: NDArray[np.float64]) -> NDArray[np.float64]:
 def _response(model: LongArx, j: int, grid: NDArray[np.float64]) -> NDArray[np.complex128]:
     """The long model's response at some frequencies in rad per sample, its poles mirrored into the circle."""
     denominator = np.real(np.poly(model.poles))
-    return np.asarray(freqz(model.b[j], denominator, worN=grid)[1], dtype=np.complex128)
+    return np.asarray(scipy.signal.freqz(model.b[j], denominator, worN=grid)[1], dtype=np.complex128)
 
 
 def _sk(model: LongArx, j: int, n: int, n_zeros: int, records: Sequence[TimeRecord]) -> NDArray[np.complex128]:

@@ -22,9 +22,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import linalg
-from scipy.signal import lfilter
 
 from sysid.kernels import linear as kernel
 from sysid.models.realisation import Realisation
@@ -118,7 +118,7 @@ class MirroredPredictor:
 
     def filtered(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
         """A signal that stays bounded, such as the measured output, through ``N/N*``, along its first axis."""
-        return np.asarray(lfilter(np.real(np.poly(self.growing)), self._mirrored, signal, axis=0))
+        return np.asarray(scipy.signal.lfilter(np.real(np.poly(self.growing)), self._mirrored, signal, axis=0))
 
     def responses(self, j: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """All taps of an input through ``N/N*``.
@@ -146,8 +146,8 @@ class MirroredPredictor:
                 moment = A @ moment + a * B
                 fir.append(moment)
             taps = np.array(fir) @ C.T
-            driven = np.column_stack([lfilter(tap, [1.0], x) for tap in taps.T])
-            columns = columns + lfilter(others, self._mirrored, driven, axis=0)
+            driven = np.column_stack([scipy.signal.lfilter(tap, [1.0], x) for tap in taps.T])
+            columns = columns + scipy.signal.lfilter(others, self._mirrored, driven, axis=0)
         return columns
 
     def beginnings(self) -> NDArray[np.float64]:
@@ -164,4 +164,4 @@ class MirroredPredictor:
             kernel.state_space(A, np.zeros((len(A), 1)), np.eye(len(A)), np.zeros((len(A), 1)), zero, x, states)
             columns.append(self.filtered(states))
         pulses = np.eye(self.n_rows, len(self.growing))
-        return np.column_stack([*columns, lfilter([1.0], self._mirrored, pulses, axis=0)])
+        return np.column_stack([*columns, scipy.signal.lfilter([1.0], self._mirrored, pulses, axis=0)])

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.networks.basis import RegressorBasis
@@ -193,7 +193,7 @@ class JointLayout:
     """
 
     members: tuple[MemberLayout, ...]
-    to_plain: sparse.csr_array
+    to_plain: scipy.sparse.csr_array
 
     @classmethod
     def of(cls, models: Sequence[Member], records: Sequence[dict[str, NDArray[np.float64]]]) -> JointLayout:
@@ -214,7 +214,7 @@ class JointLayout:
                 basis = basis_of(model, layout, records)
                 layouts.append(layout)
                 blocks.append(layout.to_plain(basis))
-        return cls(members=tuple(layouts), to_plain=sparse.csr_array(sparse.block_diag(blocks)))
+        return cls(members=tuple(layouts), to_plain=scipy.sparse.csr_array(scipy.sparse.block_diag(blocks)))
 
     def in_basis(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Plain parameters as parameters in the basis.

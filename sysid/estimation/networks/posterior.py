@@ -42,8 +42,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import linalg
 
 from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment
@@ -218,7 +219,7 @@ def calibrate(posterior: Posterior, model: AbstractModel, experiments: Sequence[
     spreads = {}
     for loop in Loop:
         ratios = [_standardised(posterior, model, experiment, loop) for experiment in experiments]
-        promised = float(stats.norm.ppf(0.5 + 0.5 * CALIBRATED_AT))
+        promised = float(scipy.stats.norm.ppf(0.5 + 0.5 * CALIBRATED_AT))
         found = float(np.quantile(np.concatenate(ratios), CALIBRATED_AT)) / promised
         spreads[loop] = max(1.0, found) if np.isfinite(found) else 1.0
     return replace(posterior, spread=Noise(free_run=spreads[Loop.CLOSED], one_step=spreads[Loop.OPEN]))

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.nonparametric.evidence import CHUNK, Posterior, Triangle, posterior, triangle
@@ -95,7 +95,9 @@ class ImpulseResponse:
         """Standard deviation of the noise on the output, coloured as it is, in its unit."""
         pulse = np.zeros(2000)
         pulse[0] = 1.0
-        return float(np.sqrt(self.noise_variance * np.sum(lfilter([1.0], [1.0, *self.noise_ar], pulse) ** 2)))
+        return float(
+            np.sqrt(self.noise_variance * np.sum(scipy.signal.lfilter([1.0], [1.0, *self.noise_ar], pulse) ** 2))
+        )
 
     def step(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Response to a step of one unit in each input, and its standard deviation, shape ``(n_inputs, n_lags)``."""
@@ -140,7 +142,7 @@ class ImpulseResponse:
         held = np.concatenate([np.repeat(u[:1], deepest, axis=0), u])
         response = np.zeros((len(self.values), deepest + 1))
         response[:, self.lags] = self.values
-        made = [lfilter(g, [1.0], x)[deepest:] for g, x in zip(response, held.T, strict=True)]
+        made = [scipy.signal.lfilter(g, [1.0], x)[deepest:] for g, x in zip(response, held.T, strict=True)]
         return np.asarray(np.sum(made, axis=0))
 
     def to_frame(self) -> pd.DataFrame:
@@ -208,7 +210,7 @@ class Regression:
         for segment in self.segments:
             if len(segment) > first:
                 signals = np.column_stack([segment.inputs, segment.output]) / self.scale
-                by_trace.setdefault(segment.trace, []).append(lfilter(whiten, [1.0], signals, axis=0))
+                by_trace.setdefault(segment.trace, []).append(scipy.signal.lfilter(whiten, [1.0], signals, axis=0))
         lags = range(self.length)
         for stretches in by_trace.values():
             rows = sum(len(x) - first for x in stretches)
@@ -235,7 +237,7 @@ class Regression:
         for segment in self.segments:
             if len(segment) > self.length:
                 u, y = segment.inputs / self.scale[:-1], segment.output / self.scale[-1]
-                made = [lfilter(row, [1.0], x - x.mean()) for row, x in zip(g, u.T, strict=True)]
+                made = [scipy.signal.lfilter(row, [1.0], x - x.mean()) for row, x in zip(g, u.T, strict=True)]
                 left = (y - np.sum(made, axis=0))[self.length - 1 :]
                 found.append(left - left.mean())
         return found

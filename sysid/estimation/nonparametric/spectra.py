@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from sysid.estimation.nonparametric.segments import Segment
 
@@ -73,11 +73,11 @@ def spa(segments: Sequence[Segment], M: int, frequency: NDArray[np.float64], sam
     covariance = np.zeros((2 * M + 1, m, m))  # lags -M .. M: E x_i(t + lag) x_j(t)
     for segment in segments:
         x = _channels(segment)
-        size = next_fast_len(len(x) + M + 1, real=True)
-        X = rfft(x, size, axis=0)
+        size = scipy.fft.next_fast_len(len(x) + M + 1, real=True)
+        X = scipy.fft.rfft(x, size, axis=0)
         for i in range(m):
             for j in range(m):
-                c = irfft(X[:, i] * np.conj(X[:, j]), size)
+                c = scipy.fft.irfft(X[:, i] * np.conj(X[:, j]), size)
                 covariance[:, i, j] += np.concatenate([c[-M:], c[: M + 1]]) if M else c[:1]
     covariance /= total
     w = _hann(M)
@@ -112,7 +112,7 @@ def welch(segments: Sequence[Segment], length: int, sample_time: float) -> Spect
         x = np.column_stack([segment.inputs, segment.output])
         for start in range(0, len(x) - length + 1, hop):
             part = x[start : start + length]
-            X = rfft((part - part.mean(axis=0)) * window[:, None], axis=0)
+            X = scipy.fft.rfft((part - part.mean(axis=0)) * window[:, None], axis=0)
             sums = sums + X[:, :, None] * np.conj(X[:, None, :])
             parts += 1
     overlap = float((window[hop:] @ window[: length - hop]) / (window @ window)) if hop < length else 0.0
@@ -146,7 +146,7 @@ def etfe(segments: Sequence[Segment], length: int, sample_time: float, *, smooth
         x = np.column_stack([segment.inputs, segment.output])
         for start in range(0, len(x) - length + 1, length):
             part = x[start : start + length]
-            X = rfft(part - part.mean(axis=0), axis=0)
+            X = scipy.fft.rfft(part - part.mean(axis=0), axis=0)
             sums = sums + X[:, :, None] * np.conj(X[:, None, :])
             parts += 1
     matrices = np.asarray(sums, dtype=np.complex128)[1:] * (sample_time / length / max(parts, 1))

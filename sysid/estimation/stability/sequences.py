@@ -27,8 +27,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from sysid.errors import TraceError
 from sysid.models import History
@@ -330,7 +330,7 @@ def _plateaus(scaled: NDArray[np.float64], window: int) -> NDArray[np.bool_]:
     # The filter at t looks from t - size // 2 on; the window that ends at s is that of the filter a lead before s.
     size = min(window, len(scaled) - 1) + 1
     lead = size - 1 - size // 2
-    spread = maximum_filter1d(scaled, size, axis=0) - minimum_filter1d(scaled, size, axis=0)
+    spread = scipy.ndimage.maximum_filter1d(scaled, size, axis=0) - scipy.ndimage.minimum_filter1d(scaled, size, axis=0)
     still = np.zeros(len(scaled), dtype=bool)
     still[window:] = np.all(spread <= STILL, axis=1)[window - lead : len(scaled) - lead]
     return still

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.subspace.projections import arx_orders, regress
@@ -72,9 +72,9 @@ class LongARX:
 
     def innovations(self, piece: Segment) -> Array:
         """What the model does not explain; its first samples, which it cannot tell, are zero."""
-        e = lfilter(self.A, [1.0], piece.outputs[:, 0]) - self.constant
+        e = scipy.signal.lfilter(self.A, [1.0], piece.outputs[:, 0]) - self.constant
         for j, b in enumerate(self.B):
-            e = e - lfilter(b, [1.0], piece.inputs[:, j])
+            e = e - scipy.signal.lfilter(b, [1.0], piece.inputs[:, j])
         e[: len(self.A) - 1] = 0.0
         return np.asarray(e)
 
@@ -123,12 +123,14 @@ def box_jenkins_start(pieces: Sequence[Segment], orders: AbstractPolynomial, lon
     B, F, left = [], [], [piece.outputs[:, 0].copy() for piece in pieces]
     for j in range(len(orders.nb)):
         inputs = [piece.inputs[:, j] for piece in pieces]
-        driven = [lfilter(long.B[j], A, u) for u in inputs]
+        driven = [scipy.signal.lfilter(long.B[j], A, u) for u in inputs]
         b, f = _rational(inputs, driven, orders, j, A if whitened else np.ones(1))
         B.append(b)
         F.append(f)
         delayed = np.concatenate([np.zeros(orders.nk[j]), b])
-        left = [v - lfilter(delayed, np.concatenate([[1.0], f]), u) for v, u in zip(left, inputs, strict=True)]
+        left = [
+            v - scipy.signal.lfilter(delayed, np.concatenate([[1.0], f]), u) for v, u in zip(left, inputs, strict=True)
+        ]
     level = float(np.mean(np.concatenate(left)))
     noise = _noise([v - level for v in left], orders.order("nc"), orders.order("nd"))
     return np.concatenate([*B, *F, *noise, [level] * orders.level])
@@ -168,7 +170,7 @@ def _rational(
         prefilter = np.concatenate([[1.0], f])
         tables, targets = [], []
         for u, w in zip(inputs, driven, strict=True):
-            uf, wf = lfilter(through, prefilter, u), lfilter(through, prefilter, w)
+            uf, wf = scipy.signal.lfilter(through, prefilter, u), scipy.signal.lfilter(through, prefilter, w)
             columns = [_back(uf, k) for k in lags] + [-_back(wf, k) for k in range(1, nf + 1)]
             tables.append(np.column_stack(columns))
             targets.append(wf)
@@ -176,7 +178,14 @@ def _rational(
         found = inside(theta[len(lags) :])
         delayed = np.concatenate([np.zeros(lags[0]), theta[: len(lags)]])
         error = sum(
-            float(np.sum(lfilter(through, [1.0], lfilter(delayed, np.concatenate([[1.0], found]), u) - w) ** 2))
+            float(
+                np.sum(
+                    scipy.signal.lfilter(
+                        through, [1.0], scipy.signal.lfilter(delayed, np.concatenate([[1.0], found]), u) - w
+                    )
+                    ** 2
+                )
+            )
             for u, w in zip(inputs, driven, strict=True)
         )
         if error < best:
@@ -193,7 +202,7 @@ def _noise(series: Sequence[Array], nc: int, nd: int) -> tuple[Array, Array]:
     tables = [np.column_stack([_back(v, k) for k in range(1, order + 1)])[order:] for v in series]
     targets = np.concatenate([v[order:] for v in series])
     long = regress(np.concatenate(tables), targets[:, np.newaxis])[:, 0]
-    innovations = [lfilter(np.concatenate([[1.0], -long]), [1.0], v) for v in series]
+    innovations = [scipy.signal.lfilter(np.concatenate([[1.0], -long]), [1.0], v) for v in series]
     reach = order + max(nc, nd)
     tables = [
         np.column_stack([*[_back(e, k) for k in range(1, nc + 1)], *[-_back(v, k) for k in range(1, nd + 1)]])[reach:]
