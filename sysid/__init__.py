@@ -17,6 +17,7 @@ __version__ = "0.1.0"
 
 WORDS = (
     *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
+    *("advise", "excite", "frequency_response", "impulse_response"),
     *("OrderSearch", "ARX", "ARMAX", "OE", "BJ", "LinearStateSpace", "VectorStateSpace", "TransferFunction"),
     *("NARX", "NeuralStateSpace", "VectorNARX"),
     *("Training", "JointTraining", "TransferFunctionTraining", "StateSpaceTraining", "PolynomialTraining"),

@@ -46,6 +46,7 @@ def advise(traces: TraceSet, mapping: Mapping) -> Advice:
     chosen = traces.with_role(Role.ESTIMATION, Role.SELECTION) or traces.traces
     record = Record(traces=chosen, mapping=mapping)
     findings = tuple(finding for check in CHECKS for finding in check(record))
+    impulse = record.slowed[0].impulse
     return Advice(
         data=traces.name,
         mapping=mapping,
@@ -53,4 +54,6 @@ def advise(traces: TraceSet, mapping: Mapping) -> Advice:
         units={name: traces.traces[0].channel(name).unit for name in (*mapping.inputs, mapping.output)},
         findings=findings,
         suggestions=suggestions(record, findings),
+        impulse=None if isinstance(impulse, str) else impulse,
+        response=None if isinstance(record.response, str) else record.response,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,9 @@ COARSE = 0.1
 FEW_LEVELS = 20
 """A channel with fewer different values is a command and has no resolution of its own."""
 SPIKE_FACTOR, MOST_SPIKES = 4.0, 0.005
-AT_END, LONG_STAY = 0.002, 3
-"""Part of a channel's span that counts as its end, and samples in a row there that are a stay."""
+AT_END, LONG_STAY, VERY_LONG_STAY, STANDING = 0.002, 3, 10, 0.1
+"""Part of a channel's span that counts as its end, samples in a row there that are a stay (and where the channel stands
+still elsewhere too), and part of its usual roughness that it has at a limit."""
 TRENDS_FROM, TREND_SHARE = 60, 0.25
 """Samples from which a trend is looked for, and part of the output's standard deviation from which it is told."""
 
@@ -51,7 +52,12 @@ def _channel(record: Record, name: str) -> Iterator[Finding]:
         )  # fmt: skip
         return
     levels = np.unique(x)
-    if len(levels) <= FEW_LEVELS and name != record.mapping.output:
+    if len(levels) <= FEW_LEVELS and len(x) > 2 * FEW_LEVELS:
+        if name == record.mapping.output:
+            yield Finding(
+                topic=Topic.CHANNELS, code="channel.few_levels", verdict=Verdict.LOOK, subject=(name,),
+                figures={"levels": len(levels)},
+            )  # fmt: skip
         return
     yield from _resolution(name, x, levels)
     yield from _ends(name, parts, x)
@@ -79,30 +85,39 @@ def _resolution(name: str, x: NDArray[np.float64], levels: NDArray[np.float64]) 
 def _ends(name: str, parts: list[NDArray[np.float64]], x: NDArray[np.float64]) -> Iterator[Finding]:
     """Stays at an end of the range that begin abruptly: a limit, and not a level that was settled at."""
     span = float(np.ptp(x))
+    moves = [np.abs(np.diff(part)) for part in parts if len(part) > 1]
+    usual = float(np.sqrt(np.mean(np.concatenate(moves) ** 2))) if moves else 0.0
+    rough = _roughness(parts)
     for end, sign, code in (
         (float(x.max()), 1.0, "channel.clipped_above"),
         (float(x.min()), -1.0, "channel.clipped_below"),
     ):
-        stays, samples, abrupt = 0, 0, []
-        moves = [np.abs(np.diff(part)) for part in parts if len(part) > 1]
-        usual = float(np.sqrt(np.mean(np.concatenate(moves) ** 2))) if moves else 0.0
+        stays, abrupt = list[NDArray[np.float64]](), list[float]()
         for part in parts:
             near = sign * (end - part) <= AT_END * span
             edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(np.int8), [0]])))
             for a, b in zip(edges[::2], edges[1::2], strict=True):
-                if b - a >= LONG_STAY:
-                    stays, samples = stays + 1, samples + int(b - a)
+                if b - a >= (LONG_STAY if rough > 0.0 else VERY_LONG_STAY):
+                    stays.append(part[a:b])
                     # How fast it still was when it arrived: where it had settled, hardly at all.
                     abrupt += [abs(float(part[a] - part[a - 2])) / 2.0] if a >= 2 else []
-        share = samples / len(x)
-        if stays >= 1 and abrupt and share > 0.005 and usual > 0.0 and float(np.median(abrupt)) > 0.5 * usual:
+        share = sum(map(len, stays)) / len(x)
+        # Where it only lingers its noise goes on; at a limit it stands.
+        still = bool(stays) and _roughness(stays) <= STANDING * rough
+        if still and abrupt and share > 0.005 and usual > 0.0 and float(np.median(abrupt)) > 0.5 * usual:
             yield Finding(
                 topic=Topic.CHANNELS,
                 code=code,
                 verdict=Verdict.LOOK,
                 subject=(name,),
-                figures={"share": share, "stays": stays, "value": end},
+                figures={"share": share, "stays": len(stays), "value": end},
             )
+
+
+def _roughness(parts: Sequence[NDArray[np.float64]]) -> float:
+    """How much samples differ from the line through their neighbours, in the median."""
+    bends = [np.abs(np.diff(part, 2)) for part in parts if len(part) > 2]
+    return float(np.median(np.concatenate(bends))) if bends else 0.0
 
 
 def _spikes(

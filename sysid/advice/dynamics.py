@@ -158,7 +158,7 @@ def check_noise(record: Record) -> Iterator[Finding]:
     rest = max(1.0 - found.explained, 1e-16)
     ratio = 10.0 * np.log10(max(found.explained, 1e-16) / rest)
     figures = {
-        "explained": found.explained,
+        "explained": max(found.explained, 0.0),
         "decibel": float(ratio),
         "deviation": float(np.sqrt(np.mean([np.var(one.left) for one in record.residuals]))),
         "order": len(found.noise_ar),

@@ -8,6 +8,8 @@ from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field
 from typing import Any
 
+from sysid.estimation.nonparametric.impulse import ImpulseResponse
+from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.models import AbstractStructure, Mapping
 
 
@@ -79,11 +81,16 @@ class Suggestion:
     code: str
     at_edge: bool = False
 
+    @property
+    def label(self) -> str:
+        """The structure in a few characters."""
+        return self.structure.label
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON values."""
         return {
             "structure": self.structure.to_dict(),
-            "label": self.structure.label,
+            "label": self.label,
             "code": self.code,
             "at_edge": self.at_edge,
         }
@@ -100,6 +107,8 @@ class Advice:
         units: Unit of each channel of the mapping.
         findings: In the order of the topics.
         suggestions: The simplest first.
+        impulse: The impulse response that they go by; ``None`` where there is none.
+        response: The frequency response, likewise.
     """
 
     data: str
@@ -108,6 +117,8 @@ class Advice:
     units: Dict[str, str]
     findings: tuple[Finding, ...]
     suggestions: tuple[Suggestion, ...]
+    impulse: ImpulseResponse | None = None
+    response: FrequencyResponse | None = None
 
     def of(self, topic: Topic) -> tuple[Finding, ...]:
         """What was found on a topic."""
@@ -124,4 +135,32 @@ class Advice:
             "units": dict(self.units),
             "findings": [finding.to_dict() for finding in self.findings],
             "suggestions": [one.to_dict() for one in self.suggestions],
+            "impulse": None if self.impulse is None else _impulse(self.impulse),
+            "response": None if self.response is None else _response(self.response),
         }
+
+
+def _impulse(found: ImpulseResponse) -> dict[str, Any]:
+    return {
+        "time": found.time.tolist(),
+        "inputs": list(found.mapping.inputs),
+        "values": found.values.tolist(),
+        "deviation": found.deviation.tolist(),
+    }
+
+
+def _response(found: FrequencyResponse) -> dict[str, Any]:
+    """Every value that is there: what an input does not hold is left out of JSON as null."""
+    low, high = found.gain_band
+    parts = {"gain": found.gain.T, "low": low.T, "high": high.T, "coherence": found.coherence}
+    return {
+        "frequency": found.frequency.tolist(),
+        "inputs": list(found.mapping.inputs),
+        **{name: _finite(part.tolist()) for name, part in parts.items()},
+    }
+
+
+def _finite(values: Any) -> Any:
+    if isinstance(values, list):
+        return [_finite(value) for value in values]
+    return values if math.isfinite(values) else None

@@ -20,11 +20,10 @@ from numpy.typing import NDArray
 from sysid.advice.dynamics import BARELY
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, Residual
-from sysid.errors import UserError
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.impulse import ImpulseResponse
 from sysid.estimation.nonparametric.noise import whitener
-from sysid.estimation.nonparametric.response import FrequencyResponse, estimate_frequency_response
+from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.estimation.nonparametric.segments import Segment
 
 SURE, LIKELY = 1e-4, 1e-2
@@ -151,7 +150,7 @@ def _curvature(record: Record) -> Finding:
     if isinstance(found, str):
         return _unknown(found)
     if found.explained < BARELY:
-        figures = {"explained": found.explained}
+        figures = {"explained": max(found.explained, 0.0)}
         return Finding(topic=Topic.LINEARITY, code="linearity.nothing_explained", verdict=Verdict.LOOK, figures=figures)
     records = [one for one in record.residuals if len(one.left) > 40]
     rows = sum(len(one.left) for one in records)
@@ -228,11 +227,9 @@ def _explained(
 
 def _coherence(record: Record) -> Iterator[Finding]:
     """Up to which frequency the inputs account for the output."""
-    try:
-        slow = record.slowed[0].some
-        found = estimate_frequency_response(slow.traces, slow.mapping)
-    except UserError as error:
-        yield Finding(topic=Topic.LINEARITY, code="coherence.unknown", verdict=Verdict.UNKNOWN, reason=error.what)
+    found = record.response
+    if isinstance(found, str):
+        yield Finding(topic=Topic.LINEARITY, code="coherence.unknown", verdict=Verdict.UNKNOWN, reason=found)
         return
     seen = _weighted(found)
     if seen is None:

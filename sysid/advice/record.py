@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import UserError
 from sysid.estimation.nonparametric.impulse import ImpulseResponse, estimate_impulse_response
+from sysid.estimation.nonparametric.response import FrequencyResponse, estimate_frequency_response
 from sysid.estimation.nonparametric.segments import Segment, segments_of
 from sysid.models import Mapping
 from sysid.traces import Trace
@@ -79,6 +80,15 @@ class Record:
             return "the output never changes"
         try:
             return estimate_impulse_response(self.some.traces, self.some.mapping, longest=LONGEST_RESPONSE)
+        except UserError as error:
+            return error.what
+
+    @cached_property
+    def response(self) -> FrequencyResponse | str:
+        """The frequency response at the rate at which the impulse response settles, or why there is none."""
+        slow = self.slowed[0].some
+        try:
+            return estimate_frequency_response(slow.traces, slow.mapping)
         except UserError as error:
             return error.what
 

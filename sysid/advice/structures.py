@@ -56,7 +56,7 @@ def _arx(record: Record) -> tuple[ARX, int] | None:
     impulse = record.impulse
     m = len(some.mapping.inputs)
     dead = [] if isinstance(impulse, str) else [one.best for one in impulse.dead_times]
-    if m and not dead:
+    if m and (isinstance(impulse, str) or not any(one.acts for one in impulse.dead_times)):
         return None
     # The grid has the same range of dead times for each input: what they have in common is taken off the inputs.
     low = max(min(dead, default=0) - 1, 0)

@@ -20,6 +20,7 @@ Example:
 from sysid.api.comparison import Comparison, compare
 from sysid.api.fits import Fit, SystemFit
 from sysid.api.fitting import fit, load
+from sysid.api.looking import advise, excite, frequency_response, impulse_response
 from sysid.api.orders import OrderSearch, search_orders
 from sysid.api.saving import read_bundle, save
 from sysid.estimation import (
@@ -49,4 +50,5 @@ from sysid.traces import Role
 __all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "OrderSearch", "Role", "StabilityOptions", "Start"]
 __all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining", "VectorStateSpace"]
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
+__all__ += ["advise", "excite", "frequency_response", "impulse_response"]
 __all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]

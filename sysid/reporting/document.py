@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sysid.names import output_side
+from sysid.reporting.advice.section import advice_section
 from sysid.reporting.amplitude import amplitude_section
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
@@ -81,6 +82,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         timed = exported_run_times(results)
         parts = (exports,) if timed is None else (exports, timed)
         sections.append(Section(anchor="exports", title="Exported files", parts=parts))
+    sections += [advice_section(results.advice)] if results.advice else []
     sections += [_data(results), *_others(results, signals, columns)]
     comparability = "" if published is None else published.comparability
     found = verdict(results, instants, comparability)

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import Field
 
 from sysid.estimation import Loop, Status
+from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.records import (
     RESULTS_FILE,
     DataSetRecord,
@@ -286,6 +287,7 @@ class Results(RunResults):
     systems: list[SystemRecord] = Field(default=[], description="Fits of several outputs as wholes.")
     best: BestRecord | None = Field(default=None, description="Which fit was chosen.")
     linearity: LinearityRecord | None = Field(default=None, description="Whether a linear model is enough.")
+    advice: list[AdviceRecord] = Field(default=[], description="What is in the traces, output by output.")
     published: str | None = Field(default=None, description="Reference table to set beside ours.")
     sweep: SweepSummary | None = Field(default=None, description="How the fits were found, where a sweep found them.")
 

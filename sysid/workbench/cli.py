@@ -232,6 +232,55 @@ def orders(
     orders_command(source, mapping=mapping, max_na=max_na, max_nb=max_nb, max_nk=max_nk)
 
 
+@app.command(epilog='Example: sysid advise dryer --mapping "heater -> temperature"')
+def advise(
+    source: Annotated[str, typer.Argument(help="The name of a data set, or a file with traces.")],
+    mapping: Annotated[
+        str | None, typer.Option(help="Inputs and output, as u1+u2 -> y; not needed for two channels.")
+    ] = None,
+) -> None:
+    """What is in this record? Excitation, feedback, dead times, sampling, noise, linearity, and what to try."""
+    from sysid.workbench.commands.advise import advise_command
+
+    advise_command(source, mapping=mapping)
+
+
+@app.command(epilog="Example: sysid excite multisine --samples 4000 --sample-time 0.01 --range 0:10 --out u.csv")
+def excite(
+    kind: Annotated[str, typer.Argument(help="prbs, multisine, noise, chirp, staircase or aprbs.")],
+    *,
+    out: Annotated[Path, typer.Option(help="File to write, .csv or .parquet.")],
+    sample_time: Annotated[float, typer.Option(help="Seconds between samples.")],
+    samples: Annotated[int | None, typer.Option(help="Length in samples; or --duration.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Length in seconds; or --samples.")] = None,
+    span: Annotated[str, typer.Option("--range", help="Levels, never left: low:high.")] = "-1:1",
+    band: Annotated[str | None, typer.Option(help="Frequencies in Hz, low:high (multisine, noise, chirp).")] = None,
+    names: Annotated[str, typer.Option(help="Of the channels, by commas; each has a signal of its own.")] = "u",
+    units: Annotated[str, typer.Option(help="Of the channels: one for all, or by commas.")] = "1",
+    seed: Annotated[int, typer.Option(help="Of everything that is random.")] = 0,
+    clock: Annotated[int | None, typer.Option(help="prbs: samples that a level is held at least.")] = None,
+    order: Annotated[int | None, typer.Option(help="prbs: bits of the shift register; noise: of the filter.")] = None,
+    periods: Annotated[int | None, typer.Option(help="multisine: how many.")] = None,
+    lines: Annotated[str | None, typer.Option(help="multisine: full, odd or odd-random.")] = None,
+    iterations: Annotated[int | None, typer.Option(help="multisine: for a low peak; 0 keeps random phases.")] = None,
+    peak: Annotated[float | None, typer.Option(help="noise: standard deviations at which it is cut.")] = None,
+    sweep: Annotated[str | None, typer.Option(help="chirp: linear or logarithmic.")] = None,
+    levels: Annotated[int | None, typer.Option(help="staircase: how many.")] = None,
+    hold: Annotated[int | None, typer.Option(help="staircase, aprbs: samples at a level, at least.")] = None,
+    longest: Annotated[int | None, typer.Option(help="aprbs: samples at a level at most.")] = None,
+    direction: Annotated[str | None, typer.Option(help="staircase: up-down or random.")] = None,
+) -> None:
+    """Draw the inputs of an experiment: signals that stay within a range and hold the frequencies asked for."""
+    from sysid.workbench.commands.excite import excite_command
+
+    given = {
+        **{"samples": samples, "duration": duration, "sample_time": sample_time, "seed": seed, "clock": clock},
+        **{"order": order, "periods": periods, "lines": lines, "iterations": iterations, "peak": peak, "sweep": sweep},
+        **{"levels": levels, "hold": hold, "longest": longest, "direction": direction},
+    }
+    excite_command(kind, out, given=given, span=span, band=band, names=names, units=units)
+
+
 @app.command(
     epilog="Example: sysid simulate runs/service-brake new.csv --out simulated.csv --constant valve=3",
     cls=RecordCommand,

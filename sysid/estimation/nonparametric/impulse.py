@@ -289,9 +289,10 @@ def estimate_impulse_response(
     length = min(max(length, 0 if given is None else int(given.max()) + 2), max(most, 2))
     while True:
         problem = Regression(segments=segments, scale=scale, length=length)
-        found = _fitted(problem, given, kernel, noise_order)
+        kernels = tuple(Kernel) if kernel is None else (kernel,)
+        found = _stage(problem, np.ones(1), given, kernels, None)
         if length >= most or all(_settled(row) for row in found.response):
-            return _result(found, traces, mapping)
+            return _result(_whitened(found, given, kernels, noise_order), traces, mapping)
         length = min(2 * length, most)
 
 
@@ -376,12 +377,11 @@ def _full(mean: NDArray[np.float64], prior: Prior) -> NDArray[np.float64]:
     return g.reshape(len(prior.dead), prior.length)
 
 
-def _fitted(
-    problem: Regression, given: NDArray[np.int64] | None, kernel: Kernel | None, noise_order: int | None
+def _whitened(
+    found: _Fitted, given: NDArray[np.int64] | None, kernels: Sequence[Kernel], noise_order: int | None
 ) -> _Fitted:
-    """The responses of a length: under white noise, and then under the noise that they leave."""
-    kernels = tuple(Kernel) if kernel is None else (kernel,)
-    found = _stage(problem, np.ones(1), given, kernels, None)
+    """The same responses, estimated again under the noise that they leave."""
+    problem = found.problem
     if noise_order == 0:
         return found
     rows = problem.count(found.whiten)[0]

@@ -18,6 +18,8 @@ CONSTANTS = (0.05, 0.15, 0.4)
 """Time constants that it begins with, as parts of the length."""
 
 
+PLACES = 24
+"""Dead times that are looked at all over a record, before every sample about the best of them."""
 DOUBT = 3.0
 """Natural logarithm of the ratio of evidences up to which two answers are both possible: a factor of 20."""
 
@@ -143,18 +145,48 @@ def dead_times(data: Triangle, prior: Prior, *, most: int, rounds: int = 2) -> t
         The dead times, and the prior that begins at the earliest ones that the data allow.
     """
     found: list[DeadTime] = []
-    for _ in range(rounds):
+    for number in range(rounds):
         found = []
         for j in range(len(prior.dead)):
-            values = np.array([_value(data, prior.shifted(j, k)) for k in range(most + 1)])
-            near = np.flatnonzero(values >= values.max() - DOUBT)
-            odds = float(values.max()) - _value(data, prior.shifted(j, prior.length))
-            found.append(DeadTime(best=int(values.argmax()), low=int(near[0]), high=int(near[-1]), odds=float(odds)))
-            prior = prior.shifted(j, found[-1].best)
+            one = _scanned(data, prior, j, most, everywhere=number == 0)
+            found.append(one)
+            prior = prior.shifted(j, one.best)
         prior = tuned(data, prior.length, prior.dead, (prior.kernel,), start=prior)
     for j, one in enumerate(found):
         prior = prior.shifted(j, one.low)
     return tuple(found), prior
+
+
+def _scanned(data: Triangle, prior: Prior, j: int, most: int, *, everywhere: bool) -> DeadTime:
+    """The dead time of one input: at places all over if asked, and about the best of them at every sample."""
+    values = dict[int, float]()
+
+    def value(k: int) -> float:
+        if k not in values:
+            values[k] = _value(data, prior.shifted(j, k))
+        return values[k]
+
+    step = max(1, most // PLACES)
+    places = range(0, most + 1, step) if everywhere else [int(min(prior.dead[j], most))]
+    best = max(places, key=value)
+    low = high = best
+    # Outwards, as long as an answer there is possible, and past the places next to the best in any case.
+    for way in (-1, 1):
+        k = best
+        while 0 <= k + way <= most:
+            k += way
+            if value(k) < max(values.values()) - DOUBT and (not everywhere or abs(k - best) >= step):
+                break
+    best = max(values, key=value)
+    near = {k for k, one in values.items() if one >= values[best] - DOUBT}
+    low = high = best
+    while low - 1 in near:
+        low -= 1
+    while high + 1 in near:
+        high += 1
+    return DeadTime(
+        best=best, low=low, high=high, odds=float(values[best] - _value(data, prior.shifted(j, prior.length)))
+    )
 
 
 def _value(data: Triangle, prior: Prior) -> float:

@@ -8,8 +8,8 @@ from pathlib import Path
 from rich.table import Table
 
 from sysid.api.fitting import load
+from sysid.api.looking import mapping_of
 from sysid.api.orders import OrderSearch, search_orders
-from sysid.errors import ConfigError
 from sysid.estimation.linear.order_search import Criterion
 from sysid.names import slug
 from sysid.reporting.figures.style import styled
@@ -40,23 +40,13 @@ def orders_command(
         UserError: If the data cannot be read, or the mapping is missing or wrong.
     """
     traces = load(source)
-    names = [channel.name for channel in traces.channels]
-    if mapping is None and len(names) == 2:
-        mapping = f"{names[0]} -> {names[1]}"
-    if mapping is None:
-        raise ConfigError(
-            "nothing tells inputs and output apart",
-            where=f"data set {traces.name}",
-            expected="a mapping of its channels",
-            got=", ".join(names),
-            remedy=f'write for example --mapping "{"+".join(names[:-1])} -> {names[-1]}"',
-        )
-    found = search_orders(traces, mapping, max_na=max_na, max_nb=max_nb, max_nk=max_nk)
+    chosen = mapping_of(traces, mapping)
+    found = search_orders(traces, chosen, max_na=max_na, max_nb=max_nb, max_nk=max_nk)
     console().print(_table(found))
     for note in found.notes:
         console().print(f"note: {note}", soft_wrap=True)
     with styled():
-        drawing = svg(found.plot(), title="Orders", description=f"Loss against size, {mapping}", name="orders")
+        drawing = svg(found.plot(), title="Orders", description=f"Loss against size, {chosen}", name="orders")
     picture = Path(f"{slug(traces.name)}.orders.svg")
     write_bytes(picture, drawing.encode())
     console().print(f"picture: {nearby(picture)}", soft_wrap=True)

@@ -165,6 +165,7 @@ def results_document(
     fits: Sequence[FitReady],
     choice: Choice | None,
     exports: Sequence[Mapping[str, Any]],
+    advice: Sequence[Mapping[str, Any]] = (),
     sweep: SweepRecord | None = None,
 ) -> dict[str, Any]:
     """The contents of results.json; its contract is in ``docs/results.md``.
@@ -177,6 +178,7 @@ def results_document(
         fits: The fits that are ready.
         choice: Which of them is put first.
         exports: Exported files of that fit.
+        advice: What was found in the traces, output by output, once they were looked at.
         sweep: That found the fits, if one did.
 
     Returns:
@@ -221,6 +223,7 @@ def results_document(
         "systems": system_records(fits),
         "best": asdict(choice) | {"name": first} if choice else None,
         "linearity": linearity(fits),
+        "advice": list(advice),
         "published": config.report.published,
         "sweep": None if sweep is None else sweep.summary.model_dump(),
     }

@@ -36,12 +36,13 @@ from sysid.workbench.runner import events
 from sysid.workbench.runner.program import Closing, Program, carry_out
 from sysid.workbench.runner.run import REPORT, Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
-from sysid.workbench.runner.store import digest, strict, write_bytes
+from sysid.workbench.runner.store import digest, read_json, strict, write_bytes, write_json
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
     from sysid.workbench.kinds import RunRequest
 
+LOOKING = Outlined(name="advice", title="Looking at the traces", estimate=Estimate(seconds=2.0, basis="typical"))
 LOADING = Outlined(name="data", title="Loading the traces")
 EXPORT_TIME = Estimate(seconds=10.0, basis="typical")
 """Of two formats, as measured on two cores."""
@@ -240,7 +241,7 @@ class FitSteps:
             asked = self.config.export.fit
             name = "the best fit" if asked == "best" else asked
             found.append(Outlined(name="export", title=self._exporting(name), estimate=EXPORT_TIME))
-        return [*found, REPORT]
+        return [*found, LOOKING, REPORT]
 
     def run(self, run: Run, loaded: Done[Data] | None = None) -> Results:
         """Every step, in order.
@@ -273,7 +274,8 @@ class FitSteps:
             for ready in best.ready:
                 told = events.BundleReady(of=ready, folder=place, exports=exports, stored=stored)
                 run.then(partial(run.tell, told))
-        results = self._results(run, loaded.value, fitted, choice=choice, exports=exports)
+        advice = run.do(self._look(run, loaded))
+        results = self._results(run, loaded.value, fitted, choice=choice, exports=exports, advice=advice.value)
         page = run.report(results)
         for ready in best.ready:
             written = events.ReportReady(page=page.value, results=run.store.results, of=ready)
@@ -370,6 +372,25 @@ class FitSteps:
             typical=SCORING_TIME,
         )
 
+    def _look(self, run: Run, loaded: Done[Data]) -> Step[list[dict[str, Any]]]:
+        """What is in the traces; after the fits, which nobody shall wait for longer than they take."""
+        file = run.store.path / "advice.json"
+
+        def write(found: list[dict[str, Any]]) -> list[Path]:
+            write_json(file, found)
+            return [file]
+
+        return Step(
+            name=LOOKING.name,
+            title=LOOKING.title,
+            make=lambda _: steps.look(self.config, loaded.value),
+            key=lambda: steps.advice_key(self.config, loaded.value),
+            write=write,
+            read=lambda _: read_json(file),
+            outcome=_looked,
+            typical=LOOKING.estimate,
+        )
+
     def _export(self, run: Run, best: _Fitted, loaded: Done[Data]) -> Step[tuple[dict[str, Any], ...]]:
         config, folder, fits = self.config, run.store.path / "bundle", [one.value for one in best.models.values()]
         unit = ", ".join(dict.fromkeys(unit for fit in fits for unit in fit.model.ends.output_units))
@@ -420,6 +441,7 @@ class FitSteps:
         *,
         choice: steps.Choice | None,
         exports: Sequence[Mapping[str, Any]],
+        advice: Sequence[Mapping[str, Any]] = (),
     ) -> Results:
         document = results_document(
             config=self.config,
@@ -429,6 +451,7 @@ class FitSteps:
             fits=[ready for one in fitted.values() for ready in one.ready],
             choice=choice,
             exports=exports,
+            advice=advice,
             sweep=read_sweep(run.store.path) if has_sweep(run.store.path) else None,
         )
         new = parse_results(strict(document), where=run.store.results)
@@ -476,3 +499,8 @@ def _worst(scores: steps.Scores) -> str:
     """How a fit came out, in a line."""
     worst = max(scores.evaluation.cases.values(), key=lambda case: case.free_run.mse)
     return f"free run at worst {worst.free_run.mse:.3g} {worst.free_run.unit}² ({worst.case})"
+
+
+def _looked(found: Sequence[Mapping[str, Any]]) -> str:
+    verdicts = [one["verdict"] for advice in found for one in advice["findings"]]
+    return f"{verdicts.count('LOOK')} of {len(verdicts)} findings ask to be looked at"

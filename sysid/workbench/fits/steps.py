@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sysid.advice import advise
 from sysid.code_digest import code_digest
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
@@ -35,6 +36,33 @@ if TYPE_CHECKING:
 STORED_BY = "sysid.workbench.fits.record:write_fit"
 CONFIGURATION = ("sysid.workbench.fits.config", "sysid.workbench.fits.data", "sysid.workbench.fields")
 """How a YAML is read is no code that a result depends on: what was read is among the terms of its key."""
+
+
+def advice_key(config: PipelineConfig, data: Data) -> str:
+    """Digest of everything that the first look at the traces depends on.
+
+    Args:
+        config: The pipeline.
+        data: The traces.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    code = code_digest("sysid.advice:advise")
+    return digest({"mapping": str(config.mapping), "traces": data.traces.digest, "code": code})
+
+
+def look(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
+    """The first look at the traces, output by output: what is in them, before anything is fitted.
+
+    Args:
+        config: The pipeline.
+        data: The traces.
+
+    Returns:
+        JSON values, one object an output.
+    """
+    return [advise(data.traces, one).to_dict() for one in config.mapping.each]
 
 
 def fit_code(structure: AbstractStructure) -> str:

@@ -49,6 +49,7 @@ def test_what_is_done_is_stored(done: Path) -> None:
         ("fit-closed-loop", True),
         ("scores-closed-loop", True),
         ("export", True),
+        ("advice", True),
         ("report", True),
     ]
     assert not any(step.stored for step in planned(fresh=True))
@@ -74,7 +75,7 @@ def test_a_changed_fit_and_what_starts_from_it_are_done_again(done: Path) -> Non
     change("{loop: open, max_iterations: 8}", "{loop: open, max_iterations: 9}")
     assert [step.stored for step in of("Fitting")] == [True, False, False]
     assert [step.stored for step in of("Scoring")] == [True, False, False]
-    assert [step.basis for step in planned()[5:]] == ["as last time"] * 4
+    assert [step.basis for step in planned()[5:]] == ["as last time"] * 5
 
 
 def test_other_seeds_take_as_long_as_last_time(done: Path) -> None:

@@ -1,0 +1,303 @@
+"""What a finding says, and what to do about it, in plain words: one row for each code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from sysid.names import visible
+
+
+@dataclass(frozen=True)
+class Words:
+    """Of one code.
+
+    Args:
+        says: A sentence with the names of figures in braces; ``who`` is what it is about, ``unit`` the unit of the
+            first of it, ``why`` why it cannot be said.
+        do: What to do; empty where there is nothing to do.
+    """
+
+    says: str
+    do: str = ""
+
+
+SAID: Final[dict[str, Words]] = {
+    "amount": Words("{usable:.0f} samples in {experiments:.0f} experiments, {seconds:.4g} s in all."),
+    "amount.few": Words(
+        "Only {usable:.0f} samples count, the longest stretch has {longest:.0f}.",
+        "Record more: several times the settling time, and ten samples for each parameter at least.",
+    ),
+    "amount.masked": Words(
+        "{share:.1%} of the samples do not count; what is left is {stretches:.0f} stretches of at most {longest:.0f}.",
+        "Nothing, as long as the stretches are longer than the response. Each costs its first lags.",
+    ),
+    "amount.no_input": Words(
+        "There is no input: only the output's own past can be modelled.",
+        "Fit an AR or NAR model, or name the inputs in the mapping.",
+    ),
+    "channels.sound": Words("No constants, spikes, limits or drifts were found."),
+    "channel.constant_input": Words(
+        "{who} never changes.", "Leave it out: what it does cannot be found from this record. Or record it moving."
+    ),
+    "channel.constant_output": Words(
+        "{who} never changes.", "Check the sensor and the mapping: there is nothing to explain."
+    ),
+    "channel.few_levels": Words(
+        "{who} takes {levels:.0f} values only: a switch, or a converter that is far too coarse.",
+        "Model what drives it, or declare the switch; a smooth model can only round it off.",
+    ),
+    "channel.resolution": Words(
+        "{who} moves in steps of {step:.3g} {unit}, {share:.2%} of its standard deviation.",
+        "Where the steps are coarse: use a finer range of the converter; noise below a step cannot be modelled.",
+    ),
+    "channel.clipped_above": Words(
+        "{who} runs into {value:.4g} {unit} and stays there, for {share:.1%} of the samples: a limit above.",
+        "Mask these samples, declare the limit, or use a model that is not linear: a linear one is bent by them.",
+    ),
+    "channel.clipped_below": Words(
+        "{who} runs into {value:.4g} {unit} and stays there, for {share:.1%} of the samples: a limit below.",
+        "Mask these samples, declare the limit, or use a model that is not linear: a linear one is bent by them.",
+    ),
+    "channel.spikes": Words(
+        "{who} has {count:.0f} single samples that jump away and back, by up to {largest:.3g} {unit}.",
+        "Mask them, or fit with a robust loss: repairs: {{nan: mask}} after they are emptied in the file.",
+    ),
+    "output.jump": Words(
+        "{who}: at {seconds:.4g} s the level shifts by {size:.3g} {unit}, and no input did it.",
+        "Cut the record there into two experiments, or add what changed as an input.",
+    ),
+    "output.drift": Words(
+        "{who}: the output drifts by {size:.3g} {unit} over the stretch, and no input does it.",
+        "Remove the trend, add its cause as an input, or model the noise with an integrator.",
+    ),
+    "excitation.low": Words(
+        "{who} is exciting of order {order:.0f} only: too few frequencies, or too slow.",
+        "Move it more and faster: sysid excite prbs or multisine. With this record only a gain, or one time constant.",
+    ),
+    "excitation.few_moves": Words(
+        "{who} moves only {moves:.0f} times.",
+        "A few steps show gains and dead times; for a model move it some twenty times: sysid excite prbs.",
+    ),
+    "excitation.some": Words(
+        "{who} is exciting of order {order:.0f} (of {looked_for:.0f} looked for); 99 % of its power is below"
+        " {band:.3g} Hz.",
+        "Low orders can be fitted, with fewer parameters than that; what is faster than its band is not in the record.",
+    ),
+    "excitation.rich": Words(
+        "{who} is exciting of order {order:.0f} or more; 99 % of its power is below {band:.3g} Hz."
+    ),
+    "excitation.two_levels": Words(
+        "{who} has two levels in each experiment.",
+        "A curved gain cannot be seen with two levels: for a model that is not linear use sysid excite aprbs.",
+    ),
+    "collinearity.same": Words(
+        "{who} are one and the same for {share:.2%} of what moves the worst of them.",
+        "Leave one out: what each does cannot be told apart. Or move them independently.",
+    ),
+    "collinearity.alike": Words(
+        "{who} move together: the others hold {share:.0%} of the worst of them.",
+        "Expect wide bands for each by itself; prefer few parameters, or move them independently.",
+    ),
+    "collinearity.none": Words("{who} can be told apart: the others hold {share:.0%} of the worst of them."),
+    "collinearity.unknown": Words("Whether {who} can be told apart: the record is too short to say."),
+    "feedback.found": Words(
+        "The output acts on {who}: inputs to come hold {share:.0%} of what the past leaves open of the output"
+        " (at once: {share_at_once:.0%}).",
+        "Closed loop: use ARX or a network one step ahead, with enough noise model; instrumental variables and"
+        " correlations from these inputs are biased. Record with an external set point.",
+    ),
+    "feedback.slight": Words(
+        "Inputs to come hold {share:.1%} of what the past leaves open: slight feedback, or inputs that are not held"
+        " between samples.",
+        "Nothing for a first model. Are the inputs held constant between samples?",
+    ),
+    "feedback.none": Words("No sign that the output acts on the inputs (p = {p:.2g})."),
+    "feedback.unknown": Words("Whether the output acts on the inputs: {why}."),
+    "dynamics.unknown": Words("How the output answers: {why}."),
+    "effect.none": Words(
+        "{who} has no effect that can be measured.", "Leave it out, or move it more than the noise hides."
+    ),
+    "dead_time": Words(
+        "{who} acts after {best:.0f} samples ({seconds:.3g} s); from sample {visible:.0f} on it is plain to see."
+    ),
+    "dead_time.vague": Words(
+        "{who} acts after {low:.0f} to {high:.0f} samples, most likely {best:.0f} ({seconds:.3g} s).",
+        "Search the dead time together with the orders: sysid orders.",
+    ),
+    "dead_time.unknown": Words("When {who} begins to act cannot be told from the noise."),
+    "settling": Words(
+        "A step of {who} settles within {seconds:.3g} s ({samples:.0f} samples); its gain is {gain:.4g} ±"
+        " {gain_deviation:.2g}."
+    ),
+    "settling.short_record": Words(
+        "A step of {who} takes {seconds:.3g} s to settle; the record is only {length:.1f} times that.",
+        "Record ten times the settling time at least.",
+    ),
+    "settling.never": Words(
+        "A step of {who} does not settle within {lags_seconds:.3g} s.",
+        "An integrator, a very slow mode or a drift: fit with a pole near one, or record longer.",
+    ),
+    "settling.unknown": Words("How long a step of {who} takes: a linear response explains too little to say."),
+    "sampling.good": Words("A step response of {who} rises over {rise:.1f} samples."),
+    "sampling.fast": Words(
+        "A step response of {who} rises over {rise:.0f} samples: sampled faster than a model wants.",
+        "Resample to some {proposed:.3g} s, filtered before: poles near one are hard to fit, and lags reach too short.",
+    ),
+    "sampling.slow": Words(
+        "The output has answered {who} within a sample or two: sampled too slowly to see how.",
+        "Sample at {proposed:.3g} s or faster.",
+    ),
+    "sampling.unknown": Words("Whether the sample time is good: {why}."),
+    "noise.quiet": Words(
+        "A linear response explains {explained:.2%} of the output: {decibel:.0f} dB above what is left."
+    ),
+    "noise.some": Words(
+        "A linear response explains {explained:.1%} of the output; what is left is {deviation:.3g} {unit} in root mean"
+        " square, noise or what is not linear.",
+        "Validate by free run; fit more samples than parameters by far.",
+    ),
+    "noise.loud": Words(
+        "A linear response explains only {explained:.1%} of the output.",
+        "Noise, inputs that are missing, or a system that is not linear: see below which. More samples help against"
+        " noise alone.",
+    ),
+    "noise.coloured": Words(
+        "What is left is coloured: an autoregression of order {order:.0f}.",
+        "Use a structure with a noise model of its own, or judge ARX by its free run, not one step ahead.",
+    ),
+    "noise.unknown": Words("How much is noise: {why}."),
+    "linearity.exact": Words("A linear response leaves nothing to explain ({left:.1e} of the output)."),
+    "linearity.none_seen": Words(
+        "Curvature explains {share:.0%} of the {left:.1%} that a linear response leaves: none that is sure. It would"
+        " not show friction, play, or what two levels hide."
+    ),
+    "linearity.perhaps_curved": Words(
+        "Curvature may explain {share:.0%} of the {left:.1%} that a linear response leaves; the record is too short to"
+        " be sure (p = {p:.1g}).",
+        "Try a network beside the linear model, and compare them in free run.",
+    ),
+    "linearity.slightly_curved": Words(
+        "Curvature explains {share:.0%} of the {left:.1%} that a linear response leaves.",
+        "A linear model may do; compare it with a network in free run.",
+    ),
+    "linearity.curved": Words(
+        "Not linear: curvature explains {share:.0%} of the {left:.1%} that a linear response leaves.",
+        "Fit a network; the linear model is its start and its yardstick.",
+    ),
+    "linearity.nothing_explained": Words(
+        "A linear response explains {explained:.1%}: nothing can be said of curvature.",
+        "Inputs that are missing, or a system that answers to no sign of its input (a square, an absolute value): try"
+        " a network with few neurons.",
+    ),
+    "linearity.best_linear_is_enough": Words(
+        "Over {periods:.0f} periods of {period:.0f} samples distortion is at {distortion_db:.0f} dB, noise at"
+        " {noise_db:.0f} dB of the output: linear."
+    ),
+    "linearity.slightly_distorted": Words(
+        "Over {periods:.0f} periods of {period:.0f} samples distortion is at {distortion_db:.0f} dB of the output,"
+        " noise at {noise_db:.0f} dB.",
+        "A linear model is as good as that distortion at this amplitude.",
+    ),
+    "linearity.distorted": Words(
+        "Not linear: over {periods:.0f} periods of {period:.0f} samples distortion is at {distortion_db:.0f} dB of the"
+        " output, noise at {noise_db:.0f} dB.",
+        "Fit a network. A linear model is the best linear approximation at this amplitude, and no more.",
+    ),
+    "linearity.unknown": Words("Whether it is linear: {why}."),
+    "coherence": Words(
+        "The inputs account for {mean:.0%} of the output by frequency, up to {band:.3g} Hz for at least half of it."
+    ),
+    "coherence.low": Words(
+        "By frequency the inputs account for {mean:.0%} of the output; for at least half of it up to {band:.3g} Hz.",
+        "Above that a model has nothing to go by.",
+    ),
+    "coherence.unknown": Words("Coherence: {why}."),
+    "structure.arx": Words("{label}: the ARX model of least BIC.", "sysid orders shows the others."),
+    "structure.transfer_function": Words("{label}: a transfer function, whose noise is on the output."),
+    "structure.transfer_function_noise": Words(
+        "{label}: a transfer function; what is left is noise on the output, which ARX takes for dynamics."
+    ),
+    "structure.network": Words("{label}: a network, since a line is not enough."),
+}
+
+
+class Told(Protocol):
+    """A finding, or its record."""
+
+    @property
+    def code(self) -> str:
+        """What was found."""
+
+    @property
+    def subject(self) -> Sequence[str]:
+        """What it is about."""
+
+    @property
+    def figures(self) -> Mapping[str, float]:
+        """By name."""
+
+    @property
+    def reason(self) -> str:
+        """Why it cannot be said."""
+
+
+class Proposed(Protocol):
+    """A suggestion, or its record."""
+
+    @property
+    def code(self) -> str:
+        """Why."""
+
+    @property
+    def label(self) -> str:
+        """The structure in a few characters."""
+
+    @property
+    def at_edge(self) -> bool:
+        """Whether it may want more."""
+
+
+def said(finding: Told, units: Mapping[str, str]) -> tuple[str, str]:
+    """A finding in words.
+
+    Args:
+        finding: The finding.
+        units: Unit of each channel.
+
+    Returns:
+        What it says, and what to do; the second may be empty.
+    """
+    words = SAID.get(finding.code, Words("{code}: of a later release"))
+    channels = [name for name in finding.subject if name in units] or list(finding.subject)
+    unit = next((units[name] for name in channels if units.get(name, "1") != "1"), "")
+    others: dict[str, object] = {
+        "who": ", ".join(visible(name) for name in finding.subject),
+        "unit": unit,
+        "why": finding.reason,
+        "code": finding.code,
+    }
+    figures = _Figures(dict(finding.figures) | others)
+    return " ".join(words.says.format_map(figures).split()).replace(" ,", ","), words.do.format_map(figures)
+
+
+class _Figures(dict[str, object]):
+    """Figures by name; one that is not known is not a number."""
+
+    def __missing__(self, key: str) -> float:
+        return float("nan")
+
+
+def suggested(one: Proposed) -> tuple[str, str]:
+    """A structure that is worth a try, in words.
+
+    Args:
+        one: The suggestion.
+
+    Returns:
+        What it is, and what to do; the second may be empty.
+    """
+    words = SAID.get(one.code, Words("{label}"))
+    edge = "Its orders are the largest that were tried: allow more." if one.at_edge else ""
+    return words.says.format(label=one.label), " ".join([words.do, edge]).strip()

@@ -1,0 +1,82 @@
+"""The first look: impulse and frequency response of every input with bands, and the coherence."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from sysid.reporting.advice.record import AdviceRecord, ImpulseRecord, ResponseRecord
+from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
+
+MOST_INPUTS = 4
+"""Columns of a picture that is still read; further inputs are in the data."""
+BAND_COLOUR = "#DDDDDD"
+
+
+def advice_figure(advice: AdviceRecord) -> Figure | None:
+    """Draw what was found by estimates without a structure.
+
+    Args:
+        advice: The findings.
+
+    Returns:
+        One column an input, the coherence below them; ``None`` where there is nothing to draw.
+    """
+    impulse, response = advice.impulse, advice.response
+    shown = impulse or response
+    if shown is None or not shown.inputs:
+        return None
+    inputs = shown.inputs[:MOST_INPUTS]
+    with styled():
+        heights = [2.0] * (impulse is not None) + [2.0, 1.4] * (response is not None)
+        figure = new_figure(max(7.6, 2.4 * len(inputs)), sum(heights) + 0.4)
+        grid = figure.add_gridspec(len(heights), len(inputs), height_ratios=heights)
+        for j, name in enumerate(inputs):
+            if impulse is not None:
+                _impulse(figure.add_subplot(grid[0, j]), impulse, j, name)
+            if response is not None:
+                _gain(figure.add_subplot(grid[len(heights) - 2, j]), response, j, name)
+        if response is not None:
+            _coherence(figure.add_subplot(grid[-1, :]), response)
+        return figure
+
+
+def _array(values: list[float]) -> NDArray[np.float64]:
+    return np.asarray(values, dtype=np.float64)
+
+
+def _impulse(axes: Axes, impulse: ImpulseRecord, j: int, name: str) -> None:
+    time, values, spread = _array(impulse.time), _array(impulse.values[j]), 1.96 * _array(impulse.deviation[j])
+    axes.fill_between(time, values - spread, values + spread, color=BAND_COLOUR, label="95 %")
+    axes.axhline(0.0, color=TARGET, linewidth=0.6)
+    axes.plot(time, values, color=PALETTE[0], marker=".", markersize=3, label=name)
+    axes.set_xlabel("time after a pulse [s]")
+    axes.set_ylabel("impulse response")
+    axes.legend()
+
+
+def _gain(axes: Axes, response: ResponseRecord, j: int, name: str) -> None:
+    frequency, gain = _array(response.frequency) / (2.0 * np.pi), _array(response.gain[j])
+    low, high = _array(response.low[j]), _array(response.high[j])
+    seen = np.isfinite(gain) & (gain > 0.0)
+    if not seen.any():
+        axes.text(0.5, 0.5, "not in the input", ha="center", transform=axes.transAxes)
+        return
+    banded = seen & np.isfinite(high)
+    floor = 0.1 * float(gain[seen].min())
+    axes.fill_between(frequency[banded], np.maximum(low[banded], floor), high[banded], color=BAND_COLOUR, label="95 %")
+    axes.loglog(frequency[seen], gain[seen], color=PALETTE[0], label=name)
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_ylabel("gain")
+    axes.legend(loc="lower left")
+
+
+def _coherence(axes: Axes, response: ResponseRecord) -> None:
+    frequency, coherence = _array(response.frequency) / (2.0 * np.pi), _array(response.coherence)
+    known = np.isfinite(coherence)
+    axes.semilogx(frequency[known], coherence[known], color=PALETTE[2])
+    axes.set_ylim(0.0, 1.02)
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_ylabel("coherence")

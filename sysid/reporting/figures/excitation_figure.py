@@ -1,0 +1,42 @@
+"""Signals of an experiment: over time, and which frequencies they hold."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sysid.excitation import Excitation
+from sysid.reporting.figures.style import PALETTE, new_figure, styled
+from sysid.reporting.figures.thinning import thin
+
+_COLUMNS = 900
+MOST_CHANNELS = 8
+
+
+def excitation_figure(found: Excitation) -> Figure:
+    """Draw an excitation.
+
+    Args:
+        found: The signals.
+
+    Returns:
+        One row a channel: the signal, and its spectrum.
+    """
+    shown = list(zip(found.names, found.units, found.values.T, strict=True))[:MOST_CHANNELS]
+    base = 1.0 / (len(found) * found.plan.sample_time)
+    frequency = base * np.arange(1, len(found) // 2 + 1, dtype=np.float64)
+    with styled():
+        figure = new_figure(7.6, 0.8 + 1.5 * len(shown))
+        rows = figure.subplots(len(shown), 2, squeeze=False, sharex="col")
+        for number, ((left, right), (name, unit, x)) in enumerate(zip(rows, shown, strict=True)):
+            colour = PALETTE[number % len(PALETTE)]
+            left.plot(*thin(found.time, x, _COLUMNS), color=colour, drawstyle="steps-post")
+            left.set_ylabel(f"{name} [{unit}]")
+            size = np.abs(np.fft.rfft(x - x.mean()))[1:] / len(x)
+            seen = size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)
+            right.plot(*thin(frequency[seen], size[seen], _COLUMNS), color=colour)
+            right.set_yscale("log")
+            right.set_ylabel("amplitude")
+        rows[-1, 0].set_xlabel("time [s]")
+        rows[-1, 1].set_xlabel("frequency [Hz]")
+        return figure

@@ -1,0 +1,107 @@
+"""Pictures of estimates without a structure: impulse responses, and frequency responses with models over them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from sysid.estimation import FitResult
+from sysid.estimation.nonparametric.impulse import ImpulseResponse
+from sysid.estimation.nonparametric.response import FrequencyResponse
+from sysid.reporting.figures.style import DASHES, PALETTE, TARGET, new_figure, styled
+from sysid.reporting.linear_view import linear_views
+
+BAND_COLOUR = "#DDDDDD"
+
+
+def impulse_figure(found: ImpulseResponse) -> Figure:
+    """The impulse response of every input with its 95 % band.
+
+    Args:
+        found: The response.
+
+    Returns:
+        One panel an input.
+    """
+    with styled():
+        figure = new_figure(max(7.6, 2.4 * len(found.values)), 2.8)
+        row = figure.subplots(1, len(found.values), squeeze=False)[0]
+        for axes, name, unit, values, spread in zip(
+            row, found.mapping.inputs, found.input_units, found.values, 1.96 * found.deviation, strict=True
+        ):
+            axes.fill_between(found.time, values - spread, values + spread, color=BAND_COLOUR, label="95 %")
+            axes.axhline(0.0, color=TARGET, linewidth=0.6)
+            axes.plot(found.time, values, color=PALETTE[0], marker=".", markersize=3, label=f"pulse of {name}")
+            axes.set_xlabel("time [s]")
+            axes.set_ylabel(f"{found.mapping.output} [{found.output_unit}/{unit}]")
+            axes.legend()
+        return figure
+
+
+def response_figure(found: FrequencyResponse, fits: Sequence[FitResult] = ()) -> Figure:
+    """Gain, phase and coherence with their 95 % bands, models over them.
+
+    Args:
+        found: The response.
+        fits: Linear models; what has no frequency response, or another output, is left out.
+
+    Returns:
+        One column an input, the coherence below.
+    """
+    m = len(found.mapping.inputs)
+    with styled():
+        figure = new_figure(max(7.6, 2.6 * m), 5.6)
+        grid = figure.add_gridspec(3, m, height_ratios=[2.0, 1.6, 1.0])
+        for j, name in enumerate(found.mapping.inputs):
+            above = figure.add_subplot(grid[0, j])
+            below = figure.add_subplot(grid[1, j], sharex=above)
+            _measured(above, below, found, j)
+            for number, fit in enumerate(fits):
+                _model(above, below, found, fit, (name, number))
+            above.set_ylabel(f"gain [{found.output_unit}/{found.input_units[j]}]")
+            below.set_ylabel("phase [degrees]")
+            above.set_title(name)
+            above.legend(loc="lower left")
+        place = figure.add_subplot(grid[2, :])
+        place.semilogx(found.frequency, found.coherence, color=PALETTE[2])
+        place.set_ylim(0.0, 1.02)
+        place.set_ylabel("coherence")
+        place.set_xlabel("frequency [rad/s]")
+        return figure
+
+
+def _measured(above: Axes, below: Axes, found: FrequencyResponse, j: int) -> None:
+    gain, (low, high) = found.gain[:, j], found.gain_band
+    seen = np.isfinite(gain) & (gain > 0.0)
+    w = found.frequency[seen]
+    if not len(w):
+        above.text(0.5, 0.5, "not in the input", ha="center", transform=above.transAxes)
+        return
+    floor = 0.1 * float(gain[seen].min())
+    banded = seen & np.isfinite(high[:, j])
+    above.fill_between(
+        found.frequency[banded], np.maximum(low[banded, j], floor), high[banded, j], color=BAND_COLOUR, label="95 %"
+    )
+    above.loglog(w, gain[seen], color=TARGET, label=found.method.value)
+    phase, half = np.degrees(found.phase[:, j]), np.degrees(found.phase_band[:, j])
+    below.fill_between(found.frequency[banded], (phase - half)[banded], (phase + half)[banded], color=BAND_COLOUR)
+    below.semilogx(w, phase[seen], color=TARGET)
+
+
+def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, which: tuple[str, int]) -> None:
+    name, number = which
+    if fit.model.mapping.output != found.mapping.output or not hasattr(fit.model, "ratio"):
+        return
+    views = [view for view in linear_views(fit.model, None) if view.name == name]
+    w = found.frequency[found.frequency > 0.0]
+    look = {"color": PALETTE[number % len(PALETTE)], "linestyle": DASHES[number % len(DASHES)]}
+    for view in views:
+        response = view.responses(w)[0]
+        above.loglog(w, np.abs(response), label=fit.model.structure.label, **look)
+        phase = np.degrees(np.unwrap(np.angle(response)))
+        measured = np.degrees(found.phase[np.isfinite(found.phase[:, 0]), 0]) if len(found.phase) else phase
+        turns = 360.0 * np.round((measured[0] - phase[0]) / 360.0) if len(measured) else 0.0
+        below.semilogx(w, phase + turns, **look)

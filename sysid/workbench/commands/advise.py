@@ -1,0 +1,70 @@
+"""``sysid advise``: what is in a record, what is wrong with it, and what to try."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.padding import Padding
+from rich.text import Text
+
+from sysid.advice import Verdict
+from sysid.api.fitting import load
+from sysid.api.looking import Advice, SystemAdvice, advise
+from sysid.names import slug
+from sysid.reporting.advice.section import lines
+from sysid.reporting.figures.advice_figure import advice_figure
+from sysid.reporting.figures.style import styled
+from sysid.reporting.figures.svg import svg
+from sysid.workbench.runner.console import console
+from sysid.workbench.runner.naming import nearby
+from sysid.workbench.runner.store import write_bytes
+
+STYLES = {Verdict.LOOK.value: "bold yellow", Verdict.UNKNOWN.value: "dim", Verdict.FINE.value: "green"}
+
+
+def advise_command(source: str, *, mapping: str | None) -> None:
+    """Show what is in a data set, and draw it beside.
+
+    Args:
+        source: A data set's name or path, or a file with traces.
+        mapping: Inputs and output; needed where the data set has more than two channels.
+
+    Raises:
+        UserError: If the data cannot be read, or the mapping is missing or wrong.
+    """
+    traces = load(source)
+    found = advise(traces, mapping)
+    several = found.outputs.items() if isinstance(found, SystemAdvice) else [("", found)]
+    for name, one in several:
+        _show(one, f".{slug(name)}" if name else "")
+
+
+def _show(found: Advice, which: str) -> None:
+    target = console()
+    target.print(f"{found.data}: {found.mapping}, one sample every {found.sample_time:g} s", markup=False)
+    before = ""
+    for question, verdict, says, do in lines(found.record):
+        if question != before:
+            target.print(Text(question, style="bold"))
+            before = question
+        text = Text(f"[{verdict}] ", style=STYLES.get(verdict, "")) if verdict else Text()
+        target.print(Padding(text + Text(says), (0, 0, 0, 2)))
+        if do:
+            target.print(Padding(Text(do, style="italic"), (0, 0, 0, 6)))
+    target.print(f"picture: {_picture(found, which)}", soft_wrap=True, markup=False)
+
+
+def _picture(found: Advice, which: str) -> str:
+    """Draw into the current folder, and say where, or why not."""
+    figure = advice_figure(found.record)
+    if figure is None:
+        return "none, as there is no response to draw"
+    with styled():
+        drawing = svg(figure, title=f"First look at {found.data}", description=str(found.mapping), name="advice")
+    target = Path(f"{slug(found.data)}{which}.advice.svg")
+    try:
+        write_bytes(target, drawing.encode())
+    except OSError as error:
+        # A folder that is not ours to write in shall still be looked into.
+        return f"none, as {target} cannot be written ({error.strerror})"
+    return str(nearby(target))

@@ -1,0 +1,299 @@
+"""The look at data first: what is in a record is said, what is not is not, and what cannot be said is said to be so."""
+
+from __future__ import annotations
+
+import ast
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+import sysid.advice
+from sysid.advice import Advice, Finding, Topic, Verdict, advise
+from sysid.errors import ChannelError
+from sysid.excitation import KINDS, excite
+from sysid.models import ARX, NARX, Mapping, TransferFunction
+from sysid.reporting.advice.words import SAID, said
+from sysid.traces import Channel, Role, Trace, TraceSet
+
+Array = NDArray[np.float64]
+
+
+def trace(u: Array, y: Array, *, name: str = "a", sample_time: float = 0.5, usable: Any = None) -> Trace:
+    u = np.asarray(u, dtype=np.float64).reshape(len(y), -1)
+    channels = [Channel(name=f"u{j + 1}", unit="V") for j in range(u.shape[1])] + [Channel(name="y", unit="m")]
+    values = np.column_stack([u, y])
+    return Trace(name=name, sample_time=sample_time, channels=tuple(channels), values=values, usable=usable)
+
+
+def look(*traces: Trace, mapping: str = "u1 -> y") -> Advice:
+    roles = {one.name: Role.ESTIMATION for one in traces}
+    return advise(TraceSet(name="x", traces=traces, roles=roles), Mapping.parse(mapping))
+
+
+def plant(u: Array, dead: int = 2) -> Array:
+    return np.asarray(lfilter([*np.zeros(dead), 0.3], [1.0, -0.8], u))
+
+
+def noise(n: int, seed: int, size: float) -> Array:
+    return size * np.random.default_rng([7, seed]).standard_normal(n)
+
+
+def steps(n: int, seed: int, hold: int = 6) -> Array:
+    return np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, n // hold + 1), hold)[:n]
+
+
+def codes(found: Advice) -> set[str]:
+    return {one.code for one in found.findings}
+
+
+def looks(found: Advice) -> set[str]:
+    return {one.code for one in found.findings if one.verdict is Verdict.LOOK}
+
+
+def finding(found: Advice, code: str, *subject: str) -> Finding:
+    one = found.find(code, *subject)
+    assert one is not None, sorted(codes(found))
+    return one
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_good_linear_record_has_nothing_to_look_at(seed: int) -> None:
+    u = steps(1500, seed)
+    coloured = lfilter([1.0], [1.0, -0.6], noise(1500, seed, 0.02))
+    found = look(trace(u, plant(u) + coloured))
+    assert looks(found) == set()
+    assert {one.topic for one in found.findings} == set(Topic)
+    assert finding(found, "dead_time", "u1").figures["best"] == 2
+    settled = finding(found, "settling", "u1").figures
+    assert settled["gain"] == pytest.approx(1.5, abs=0.05)
+    assert 10 <= settled["samples"] <= 22
+    assert finding(found, "feedback.none").figures["p"] > 1e-5
+    assert any(isinstance(one.structure, ARX) for one in found.suggestions)
+    assert not any(isinstance(one.structure, NARX) for one in found.suggestions)
+
+
+def test_it_is_the_same_every_time() -> None:
+    u = steps(600, 1)
+    a = trace(u, plant(u) + noise(600, 1, 0.05))
+    assert look(a).to_dict() == look(a).to_dict()
+
+
+@pytest.mark.parametrize("gain", [1.0, 3.0])
+def test_feedback_is_found_and_the_same_plant_without_it_has_none(gain: float) -> None:
+    rng = np.random.default_rng(1)
+    n, e = 2000, noise(2000, 2, 0.3)
+    reference = np.repeat(rng.choice([-1.0, 1.0], n // 20), 20)
+    verdicts = []
+    for k in (0.0, gain):
+        x, u, y = 0.0, np.zeros(n), np.zeros(n)
+        for t in range(1, n):
+            x = 0.8 * x + 0.3 * u[t - 1]
+            y[t] = x + e[t] + 0.6 * e[t - 1]
+            u[t] = k * (reference[t] - y[t - 1]) if k else reference[t]
+        verdicts.append(finding(look(trace(u, y)), "feedback.found" if k else "feedback.none").verdict)
+    assert verdicts == [Verdict.FINE, Verdict.LOOK]
+
+
+def test_collinear_inputs_are_named() -> None:
+    a, b = steps(1200, 3), steps(1200, 4)
+    found = look(
+        trace(np.column_stack([a, b, np.roll(a, 2)]), plant(a) + plant(b) + noise(1200, 3, 0.05)),
+        mapping="u1+u2+u3 -> y",
+    )
+    assert set(finding(found, "collinearity.same").subject) == {"u1", "u3"}
+    apart = look(trace(np.column_stack([a, b]), plant(a) + plant(b)), mapping="u1+u2 -> y")
+    assert finding(apart, "collinearity.none").verdict is Verdict.FINE
+
+
+def test_a_slow_input_is_not_exciting_and_few_moves_are_counted() -> None:
+    t = np.arange(1000)
+    sine = np.sin(2 * np.pi * t / 200)
+    assert finding(look(trace(sine, plant(sine) + noise(1000, 1, 0.01))), "excitation.low").figures["order"] <= 3
+    step = (t > 300).astype(np.float64)
+    assert "excitation.few_moves" in looks(look(trace(step, plant(step) + noise(1000, 1, 0.01))))
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_every_excitation_passes(kind: str) -> None:
+    x = excite(kind, samples=2000, sample_time=0.5, seed=1, low=0.0, high=4.0)
+    found = look(trace(x.values, plant(x.values[:, 0]) + noise(2000, 4, 0.05)))
+    excitation = [one for one in found.of(Topic.EXCITATION) if one.code != "excitation.two_levels"]
+    assert [one.verdict for one in excitation] in ([Verdict.FINE], [Verdict.NOTE])
+    assert excitation[0].figures["order"] >= 4
+
+
+def test_dead_times_are_those_of_each_input() -> None:
+    u = np.random.default_rng(5).uniform(-1, 1, (1500, 2))
+    found = look(trace(u, plant(u[:, 0], 7) + plant(u[:, 1], 1) + noise(1500, 5, 0.1)), mapping="u1+u2 -> y")
+    assert [finding(found, "dead_time", name).figures["best"] for name in ("u1", "u2")] == [7, 1]
+
+
+def test_an_input_that_does_nothing_is_told() -> None:
+    u = np.column_stack([steps(1200, 6), steps(1200, 7)])
+    found = look(trace(u, plant(u[:, 0]) + noise(1200, 6, 0.1)), mapping="u1+u2 -> y")
+    assert finding(found, "effect.none").subject == ("u2",)
+
+
+def test_too_fast_and_too_slow_sampling() -> None:
+    u = steps(3000, 8, hold=150)
+    slow = lfilter([0.0, 0.01], [1.0, -0.99], u)
+    fast = finding(look(trace(u, slow + noise(3000, 8, 0.002))), "sampling.fast").figures
+    assert 150 <= fast["rise"] <= 280
+    assert 5.0 < fast["proposed"] < 20.0
+    v = steps(800, 8, hold=3)
+    assert "sampling.slow" in looks(look(trace(v, np.roll(v, 1) + noise(800, 8, 0.01))))
+
+
+def test_noise_is_measured() -> None:
+    u = steps(3000, 9)
+    y = plant(u)
+    found = look(trace(u, y + noise(3000, 9, 0.5 * y.std())))
+    assert finding(found, "noise.some").figures["deviation"] == pytest.approx(0.5 * y.std(), rel=0.1)
+    assert "noise.loud" in looks(look(trace(u, y + noise(3000, 9, 2.0 * y.std()))))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_curvature_is_found_without_periods(seed: int) -> None:
+    u = steps(2000, seed)
+    y = plant(u)
+    found = look(trace(u, y - 0.3 * y**3 + 0.2 * y**2 + noise(2000, seed, 0.02)))
+    assert finding(found, "linearity.curved").verdict is Verdict.LOOK
+    assert any(isinstance(one.structure, NARX) for one in found.suggestions)
+
+
+@pytest.mark.parametrize("lines", ["full", "odd-random"])
+def test_distortion_is_told_from_noise_with_periods(lines: str) -> None:
+    x = excite("multisine", samples=4096, sample_time=0.5, periods=4, lines=lines, band=(0.002, 0.4), seed=3).values
+    y = plant(x[:, 0])
+    linear = finding(look(trace(x, y + noise(4096, 1, 0.1))), "linearity.best_linear_is_enough")
+    bent = finding(look(trace(x, y + 0.3 * y**2 - 0.2 * y**3 + noise(4096, 1, 0.1))), "linearity.distorted")
+    assert linear.figures["noise_db"] == pytest.approx(bent.figures["noise_db"], abs=3.0)
+    assert bent.figures["distortion"] > 20 * linear.figures["distortion"]
+    assert bent.figures["period"] == 1024
+
+
+def test_an_even_system_is_not_called_linear() -> None:
+    u = np.repeat(np.random.default_rng(2).choice([-1.0, 1.0], 300), 5)
+    found = look(trace(u, np.abs(plant(u)) + noise(1500, 2, 0.01)))
+    assert "linearity.none_seen" not in codes(found)
+
+
+def test_limits_spikes_jumps_and_drifts() -> None:
+    u = steps(1500, 11)
+    y = plant(u) + noise(1500, 11, 0.01)
+    clipped = look(trace(u, np.minimum(y, 0.5)))
+    assert finding(clipped, "channel.clipped_above", "y").figures["value"] == pytest.approx(0.5)
+    spiked = y.copy()
+    spiked[[200, 700, 1100]] += 8.0
+    assert finding(look(trace(u, spiked)), "channel.spikes", "y").figures["count"] == 3
+    jumped = finding(look(trace(u, y + 1.0 * (np.arange(1500) >= 900))), "output.jump", "y").figures
+    assert jumped["size"] == pytest.approx(1.0, abs=0.1)
+    assert jumped["seconds"] == pytest.approx(450.0, abs=5.0)
+    drifted = finding(look(trace(u, y + np.linspace(0, 2, 1500))), "output.drift", "y").figures
+    assert drifted["size"] == pytest.approx(2.0, abs=0.3)
+    coarse = finding(look(trace(u, np.round(y / 0.08) * 0.08)), "channel.resolution", "y").figures
+    assert coarse["step"] == pytest.approx(0.08)
+
+
+def test_what_is_masked_and_what_scores_is_not_looked_at() -> None:
+    u = steps(1500, 12)
+    y = plant(u) + noise(1500, 12, 0.02)
+    usable = np.ones(1500, dtype=np.bool_)
+    usable[500:520] = False
+    spoiled = y.copy()
+    spoiled[500:520] = 1e9
+    found = look(trace(u, spoiled, usable=usable))
+    assert looks(found) == set()
+    assert finding(found, "amount.masked").figures["stretches"] == 2
+    other = trace(u, np.zeros(1500), name="b")
+    both = TraceSet(name="x", traces=(trace(u, y), other), roles={"a": Role.ESTIMATION, "b": Role.VALIDATION})
+    assert looks(advise(both, Mapping.parse("u1 -> y"))) == set()
+
+
+def test_several_experiments_have_levels_of_their_own() -> None:
+    parts = [steps(700, seed) for seed in (1, 2, 3)]
+    found = look(*(trace(u, plant(u) + level + noise(700, k, 0.02), name=str(k))
+                   for k, (u, level) in enumerate(zip(parts, (0.0, 50.0, -20.0), strict=True))))  # fmt: skip
+    assert looks(found) == set()
+    assert finding(found, "amount").figures["experiments"] == 3
+
+
+def test_records_without_input_and_without_change() -> None:
+    y = np.asarray(lfilter([1.0], [1.0, -1.2, 0.5], noise(800, 1, 1.0)))
+    found = look(trace(np.empty((800, 0)), y), mapping="-> y")
+    assert finding(found, "amount.no_input").verdict is Verdict.NOTE
+    (one,) = found.suggestions
+    assert isinstance(one.structure, ARX)
+    assert one.structure.na == 2
+    still = look(trace(np.ones(300), noise(300, 1, 1.0)))
+    assert {"channel.constant_input", "dynamics.unknown"} <= codes(still)
+    assert "channel.constant_output" in looks(look(trace(steps(300, 1), np.full(300, 4.0))))
+
+
+def test_noise_on_the_output_proposes_a_transfer_function_first() -> None:
+    u = steps(2000, 13)
+    found = look(trace(u, plant(u) + noise(2000, 13, 0.3)))
+    first = found.suggestions[0].structure
+    assert isinstance(first, TransferFunction)
+    assert first.delays == (2,)
+
+
+def test_a_missing_channel_is_refused() -> None:
+    with pytest.raises(ChannelError):
+        look(trace(steps(100, 1), steps(100, 2)), mapping="u3 -> y")
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(1, 60),
+    st.integers(0, 2),
+    st.sampled_from(["random", "constant", "ramp", "step", "tiny", "huge", "integers"]),
+    st.sampled_from([None, "some", "all", "one"]),
+    st.integers(0, 10**6),
+)
+def test_any_record_ends_in_words(n: int, m: int, kind: str, mask: str | None, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.arange(n, dtype=np.float64)
+    u, y = rng.standard_normal((n, m)), rng.standard_normal(n)
+    if kind == "constant":
+        u, y = np.ones((n, m)), np.full(n, -3.0)
+    elif kind in {"ramp", "step"}:
+        u = np.tile((t if kind == "ramp" else t > n / 2)[:, None], (1, m)).astype(np.float64)
+        y = 2.0 * t + 1.0
+    elif kind in {"tiny", "huge"}:
+        scale = 1e-60 if kind == "tiny" else 1e60
+        u, y = u * scale, y * scale
+    elif kind == "integers":
+        u, y = np.round(u), np.round(y)
+    usable = {None: None, "some": t % 7 > 0, "all": np.zeros(n, dtype=np.bool_), "one": t == 0}[mask]
+    mapping = {0: "-> y", 1: "u1 -> y", 2: "u1+u2 -> y"}[m]
+    found = look(trace(u, y, usable=usable), mapping=mapping)
+    assert all(said(one, dict(found.units))[0] for one in found.findings)
+    assert all("nan" not in said(one, dict(found.units))[0] for one in found.findings if one.figures)
+
+
+def test_every_code_that_is_written_has_words() -> None:
+    folder = Path(sysid.advice.__file__).parent
+    tree = [node for file in folder.glob("*.py") for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
+    texts = {node.value for node in tree if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    topics = {code.partition(".")[0] for code in SAID}
+    written = {text for text in texts if re.fullmatch(r"[a-z_]+\.[a-z_]+", text) and text.partition(".")[0] in topics}
+    assert len(written) > 40
+    assert written <= set(SAID)
+
+
+def test_ten_thousand_samples_take_less_than_three_seconds_of_processor_time() -> None:
+    u = np.column_stack([steps(10_000, 1), steps(10_000, 2)])
+    a = trace(u, plant(u[:, 0]) + plant(u[:, 1], 5) + noise(10_000, 1, 0.1))
+    look(a, mapping="u1+u2 -> y")
+    began = time.process_time()
+    look(a, mapping="u1+u2 -> y")
+    assert time.process_time() - began < 3.0
