@@ -19,8 +19,8 @@ from sysid.estimation.nonparametric.spectra import SpectralMethod
 from sysid.excitation import AbstractExcitation, excitation
 from sysid.ingest.writers import write_trace
 from sysid.models import Mapping
-from sysid.reporting.advice.record import AdviceRecord
-from sysid.reporting.advice.section import lines
+from sysid.reporting.advice_record import AdviceRecord
+from sysid.reporting.advice_section import lines
 from sysid.traces import Role, TraceSet
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sysid.names import output_side
-from sysid.reporting.advice.section import advice_section
+from sysid.reporting.advice_section import advice_section
 from sysid.reporting.amplitude import amplitude_section
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures

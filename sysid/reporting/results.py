@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import Field
 
 from sysid.estimation import Loop, Status
-from sysid.reporting.advice.record import AdviceRecord
+from sysid.reporting.advice_record import AdviceRecord
 from sysid.reporting.records import (
     RESULTS_FILE,
     DataSetRecord,

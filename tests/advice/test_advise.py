@@ -20,7 +20,7 @@ from sysid.advice import Advice, Finding, Topic, Verdict, advise
 from sysid.errors import ChannelError
 from sysid.excitation import KINDS, excite
 from sysid.models import ARX, NARX, Mapping, TransferFunction
-from sysid.reporting.advice.words import SAID, said
+from sysid.reporting.advice_words import SAID, said
 from sysid.traces import Channel, Role, Trace, TraceSet
 
 Array = NDArray[np.float64]

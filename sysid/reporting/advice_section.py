@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sysid.advice import Topic, Verdict
-from sysid.reporting.advice.record import AdviceRecord
-from sysid.reporting.advice.words import said, suggested
+from sysid.reporting.advice_record import AdviceRecord
+from sysid.reporting.advice_words import said, suggested
 from sysid.reporting.figures.advice_figure import advice_figure
 from sysid.reporting.parts import Part, Section, picture
 from sysid.reporting.tables import Cell, Table

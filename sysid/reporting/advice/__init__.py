@@ -1,1 +1,0 @@
-"""What is in a record, for people: words, a section of the report, a picture."""
