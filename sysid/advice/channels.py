@@ -55,7 +55,7 @@ def _channel(record: Record, name: str) -> Iterator[Finding]:
     if len(levels) <= FEW_LEVELS and len(x) > 2 * FEW_LEVELS:
         if name == record.mapping.output:
             yield Finding(
-                topic=Topic.CHANNELS, code="channel.few_levels", verdict=Verdict.LOOK, subject=(name,),
+                topic=Topic.CHANNELS, code="channel.few_levels", verdict=Verdict.NOTE, subject=(name,),
                 figures={"levels": len(levels)},
             )  # fmt: skip
         return

@@ -203,7 +203,7 @@ def advise(traces: TraceSet, mapping: Given | None = None) -> Advice | SystemAdv
         >>> traces = sysid.data((u, np.convolve(u, [0.0, 0.0, 0.5, 0.25])[:100]), sample_time=0.1)
         >>> found = sysid.advise(traces, "u -> y")
         >>> found.find("excitation.few_moves", "u").figures["moves"]
-        4.0
+        4
     """
     chosen = mapping_of(traces, mapping)
     found = {one.output: _advice(room.advise(traces, one)) for one in chosen.each}
