@@ -158,13 +158,10 @@ class AbstractModel(ABC):
         return None
 
     @property
-    def ratios(self) -> tuple[tuple[str, str, Ratio], ...]:
-        """What a linear model is from each input to each output: a name and the input's unit with each ratio."""
-        found = [
-            (name, unit, self.ratio(j))
-            for j, (name, unit) in enumerate(zip(self.mapping.inputs, self.input_units, strict=True))
-        ]
-        return tuple((name, unit, ratio) for name, unit, ratio in found if ratio is not None)
+    def ratios(self) -> dict[tuple[int, int], Ratio]:
+        """What a linear model is from each input to each output, by the places of output and input."""
+        found = {(0, j): self.ratio(j) for j in range(len(self.mapping.inputs))}
+        return {places: ratio for places, ratio in found.items() if ratio is not None}
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:

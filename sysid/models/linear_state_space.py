@@ -272,19 +272,19 @@ class VectorStateSpaceModel(SeveralOutputs):
         return self.system.radius
 
     @property
-    def ratios(self) -> tuple[tuple[str, str, Ratio], ...]:
+    def ratios(self) -> dict[tuple[int, int], Ratio]:
         """From each input to each output, in ``1/z``; all share the denominator."""
         F, numerators, _ = polynomials(self.system)
-        first, found = (0 if self.orders.feedthrough else 1), []
-        for o, output in enumerate(self.mapping.outputs):
-            for j, (name, unit) in enumerate(zip(self.mapping.inputs, self.input_units, strict=True)):
-                gain = self.scaling.output_scale[o] / self.scaling.input_scale[j]
-                ratio = Ratio(
-                    B=gain * numerators[o, j, first:], F=F, delay=first, discrete=True,
-                    of_numerator=f"B({output}, {name}, ", of_denominator="F(",
-                )  # fmt: skip
-                found.append((f"{output} from {name}", unit, ratio))
-        return tuple(found)
+        first = 0 if self.orders.feedthrough else 1
+        gains = np.array(self.scaling.output_scale)[:, np.newaxis] / np.array(self.scaling.input_scale)
+        return {
+            (o, j): Ratio(
+                B=gains[o, j] * numerators[o, j, first:], F=F, delay=first, discrete=True,
+                of_numerator=f"B({output}, {name}, ", of_denominator="F(",
+            )
+            for o, output in enumerate(self.mapping.outputs)
+            for j, name in enumerate(self.mapping.inputs)
+        }  # fmt: skip
 
     def to_control(self) -> Any:
         """The model as a discrete ``control.StateSpace`` in the channels' units, from deviations to deviations."""

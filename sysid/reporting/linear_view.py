@@ -20,8 +20,10 @@ class LinearView:
     """From one input to the output: ``B / F`` after a dead time, polynomials ascending in ``1/z``, or in ``s``.
 
     Args:
-        name: The input.
-        unit: Its unit.
+        name: The input; of several outputs, the output from the input.
+        unit: The input's unit.
+        source: Which input.
+        target: Which output.
         discrete: Whether the polynomials are in ``1/z``.
         sample_time: Seconds.
         delay: Dead time in samples.
@@ -31,6 +33,8 @@ class LinearView:
 
     name: str
     unit: str
+    source: int
+    target: int
     discrete: bool
     sample_time: float
     delay: int
@@ -70,17 +74,19 @@ def linear_views(model: AbstractModel, uncertainty: Uncertainty | None, seed: in
         One view per input that has parameters.
     """
     views = []
-    for name, unit, ratio in model.ratios:
+    ends, several = model.ends, len(model.mapping.outputs) > 1
+    for (o, j), ratio in model.ratios.items():
         if not len(ratio.B):
             continue
+        name = f"{ends.outputs[o]} from {ends.inputs[j]}" if several else ends.inputs[j]
         Bs, Fs = ratio.B[np.newaxis], ratio.F[np.newaxis]
         if uncertainty is not None:
             drawn_B, drawn_F = _drawn(uncertainty, ratio, seed)
             Bs, Fs = np.concatenate([Bs, drawn_B]), np.concatenate([Fs, drawn_F])
         views.append(
             LinearView(
-                name=name, unit=unit, discrete=ratio.discrete, sample_time=model.sample_time, delay=ratio.delay,
-                B=Bs, F=Fs,
+                name=name, unit=ends.input_units[j], source=j, target=o, discrete=ratio.discrete,
+                sample_time=model.sample_time, delay=ratio.delay, B=Bs, F=Fs,
             )
         )  # fmt: skip
     return views

@@ -55,7 +55,7 @@ def bode_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, seed: 
                 below.fill_between(frequency, *np.degrees(around), color=BAND_COLOUR)
             above.loglog(frequency, np.abs(shown), color=PALETTE[0], label=view.name)
             below.semilogx(frequency, np.degrees(phase), color=PALETTE[0])
-            above.set_ylabel(f"gain [{model.output_unit}/{view.unit}]")
+            above.set_ylabel(f"gain [{model.ends.output_units[view.target]}/{view.unit}]")
             below.set_ylabel("phase [degrees]")
             below.set_xlabel("frequency [rad/s]")
             above.legend(loc="lower left")
@@ -76,7 +76,7 @@ def step_figure(
     Returns:
         One panel per input.
     """
-    A, B, C, D = cast("Linear", model).matrices
+    (A, B, C, D), ends = cast("Linear", model).matrices, model.ends
     views = linear_views(model, uncertainty, seed)
     with styled():
         figure = new_figure(max(7.6, 2.2 * len(views)), 2.8)
@@ -84,8 +84,8 @@ def step_figure(
         for place, view in zip(axes, views, strict=True):
             n = samples or _settling(view)
             time = np.arange(n) * model.sample_time
-            one = slice(at := model.mapping.inputs.index(view.name), at + 1)
-            _, (response,) = signal.dstep((A, B[:, one], C, D[:, one], model.sample_time), n=n)
+            at, of = slice(view.source, view.source + 1), slice(view.target, view.target + 1)
+            _, (response,) = signal.dstep((A, B[:, at], C[of], D[of, at], model.sample_time), n=n)
             y = response[:, 0]
             every = -(-n // SHOWN)
             if len(view.B) > 1:
@@ -99,7 +99,7 @@ def step_figure(
                 time[::every], y[::every], drawstyle=shape, color=PALETTE[0], label=f"{view.name}, 1 {view.unit}"
             )
             place.set_xlabel("time [s]")
-            place.set_ylabel(f"{model.mapping.output} [{model.output_unit}]")
+            place.set_ylabel(f"{ends.outputs[view.target]} [{ends.output_units[view.target]}]")
             place.legend()
         return figure
 

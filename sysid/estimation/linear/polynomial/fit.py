@@ -29,8 +29,8 @@ from sysid.traces import Trace
 
 Array = NDArray[np.float64]
 
-SHORT = 8
-"""Steps from every start, before the best one goes on."""
+SHORT, TRIED = 6, 2
+"""Steps from the best starts, before the best end goes on; and how many of these there are."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,11 +137,12 @@ def _search(
         stable=stable and not orders.drifts,
     )
     short = replace(training, max_iterations=min(SHORT, training.max_iterations))
+    starts = [theta for theta in _starts(pieces, orders) if np.isfinite(theta).all()]
+    ranked = sorted((loss, at) for at, theta in enumerate(starts) if np.isfinite(loss := errors.loss(theta)))
     found: list[tuple[float, int, Solution]] = []
-    for theta in _starts(pieces, orders):
-        if np.isfinite(theta).all() and np.isfinite(errors.loss(theta)):
-            solution = _run(errors, theta, short)
-            found.append((solution.at.loss, len(found), solution))
+    for _, at in ranked[:TRIED]:
+        solution = _run(errors, starts[at], short)
+        found.append((solution.at.loss, at, solution))
     if not found:
         raise FitDivergedError(
             f"no start of {orders.label} gives a finite prediction",

@@ -26,8 +26,9 @@ from sysid.models.polynomial import AbstractPolynomial
 
 Array = NDArray[np.float64]
 
-LONGEST, ROUNDS, INSIDE = 40, 12, 0.98
-"""Lags of a long ARX model at most; filtering rounds; and how far inside the unit circle a root is put."""
+LONGEST, ROUNDS, INSIDE, SETTLED = 40, 12, 0.98, 1e-3
+"""Lags of a long ARX model at most; filtering rounds; how far inside the unit circle a root is put; and a change of
+coefficients at which filtering may end."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -190,7 +191,10 @@ def _rational(
         )
         if error < best:
             best, b, f_best = error, theta[: len(lags)], found
+        settled = bool(np.abs(found - f).max(initial=0.0) < SETTLED)
         f = found
+        if settled:
+            break
     return (b, f_best) if np.isfinite(best) else (b, np.zeros(nf))
 
 

@@ -66,6 +66,7 @@ class PredictionErrors(AbstractProvider):
     whitening: Array
     stable: bool
     n_samples: int = field(init=False)
+    _last: dict[bytes, tuple[Run, ...]] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         counted = sum(int(np.count_nonzero(segment.root_weights)) for segment in self.segments)
@@ -77,10 +78,19 @@ class PredictionErrors(AbstractProvider):
         if not self.allowed(system):
             return np.inf
         total = 0.0
-        for segment in self.segments:
-            weighted = self._weighted(self.run(system, segment).residual, segment)
-            total += 0.5 * float(np.sum(weighted**2))
+        with np.errstate(all="ignore"):
+            for segment, run in zip(self.segments, self._runs(theta, system), strict=True):
+                total += 0.5 * float(np.sum(self._weighted(run.residual, segment) ** 2))
         return total if np.isfinite(total) else np.inf
+
+    def _runs(self, theta: Array, system: Innovations) -> tuple[Run, ...]:
+        """The predictions over all records; of a step that is tried and then taken they are made once."""
+        key = theta.tobytes()
+        if key not in self._last:
+            found = tuple(self.run(system, segment) for segment in self.segments)
+            self._last.clear()
+            self._last[key] = found
+        return self._last[key]
 
     def allowed(self, system: Innovations) -> bool:
         """Whether a system may be a step: its predictor is stable and, where that is asked, the system too."""
@@ -95,9 +105,8 @@ class PredictionErrors(AbstractProvider):
         loss, g, H = 0.0, np.zeros(P), np.zeros((P, P))
         reach = _Reach.of(self.chart.directions(theta), system)
         with np.errstate(all="ignore"):
-            for segment in self.segments:
-                run = self.run(system, segment)
-                seen = np.zeros((run.span.shape[1], P))
+            for segment, run in zip(self.segments, self._runs(theta, system), strict=True):
+                weighted, seen = self._weighted(run.residual, segment), np.zeros((run.span.shape[1], P))
                 z, width = np.zeros((system.n_outputs, reach.n_sources, system.n_state)), system.n_outputs
                 for first in range(0, len(segment), ROWS):
                     rows = slice(first, min(first + ROWS, len(segment)))
@@ -105,7 +114,7 @@ class PredictionErrors(AbstractProvider):
                     J = np.einsum("ij,tjk->tik", self.whitening, J) if width > 1 else J * self.whitening[0, 0]
                     J *= segment.root_weights[rows, np.newaxis, np.newaxis]
                     J = J.reshape(-1, P)
-                    r = self._weighted(run.residual, segment)[rows].ravel()
+                    r = weighted[rows].ravel()
                     loss += 0.5 * float(r @ r)
                     g += J.T @ r
                     H += J.T @ J

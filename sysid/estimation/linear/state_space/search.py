@@ -25,7 +25,7 @@ from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.subspace.projections import Weighting
-from sysid.estimation.linear.subspace.starts import Subspace
+from sysid.estimation.linear.subspace.starts import ENOUGH, Subspace
 from sysid.estimation.linear.subspace.system import stabilised
 from sysid.estimation.result import Status
 from sysid.models import LinearStateSpace
@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 METHODS = ("prediction-error", "subspace")
 BEST = "best"
 WEIGHTINGS = (BEST, *(one.value for one in Weighting))
+LONG = 100_000
+"""Samples beyond which one solution is enough: rounding is far below the noise there."""
 CHARTS = 6
 """Charts that are laid at most."""
 
@@ -157,12 +159,13 @@ class _Problem:
         """The subspace estimate with the least prediction error, its ``B``, ``D`` and constant fitted to that."""
         chosen = list(Weighting) if weighting == BEST else [Weighting(weighting)]
         found: list[tuple[float, int, Innovations, Weighting]] = []
+        judge = self.begun() if len(chosen) > 1 and sum(map(len, self.segments)) > LONG else self
         for one in chosen:
             try:
                 system = subspace.estimate(self.orders.states, one)
             except (linalg.LinAlgError, ValueError):  # not finite, or no decomposition: another one may do
                 continue
-            fitted = self._with_inputs(system)
+            fitted = judge._with_inputs(system)
             if fitted is not None:
                 found.append((fitted[0], len(found), fitted[1], one))
         if not found:
@@ -171,14 +174,19 @@ class _Problem:
                 remedy="ask for fewer states, or for noise: true where the plant is unstable",
             )
         _, _, system, one = min(found, key=lambda entry: entry[:2])
-        return system, one
+        fitted = None if judge is self else self._with_inputs(system)
+        return (system if fitted is None else fitted[1]), one
+
+    def begun(self) -> _Problem:
+        """The same problem over the first samples of each record, which are enough to choose by."""
+        return replace(self, segments=tuple(segment.first(ENOUGH) for segment in self.segments))
 
     def _with_inputs(self, system: Innovations) -> tuple[float, Innovations] | None:
         """The loss and the system with the ``B``, ``D`` and constant that fit best; twice, for rounding."""
         if self.stable:
             system = stabilised(system)
         system = system.balanced()
-        for _ in range(2):
+        for _ in range(2 if sum(map(len, self.segments)) <= LONG else 1):
             errors = self.errors(self.linear(system), np.eye(system.n_outputs))
             at = errors.linearise(np.zeros(errors.chart.n_parameters))
             if not errors.allowed(system) or not np.isfinite(at.loss) or not at.finite:
@@ -234,7 +242,11 @@ class _Problem:
         system = system.balanced()
         chart = self.around(system)
         errors = self.errors(chart, self._whitening(system))
-        at = errors.linearise(np.zeros(errors.chart.n_parameters))
+        zero = np.zeros(chart.n_parameters)
+        if iterations == 0:  # nothing was minimised, and nothing is said of uncertainty
+            at = Linearisation(loss=errors.loss(zero), gradient=zero, gauss_newton=np.eye(len(zero)))
+        else:
+            at = errors.linearise(zero)
         if status in {Status.NOT_IMPROVED, Status.STALLED} and curve:
             status = Status.CONVERGED  # a later chart found nothing more to gain
         mse = 2.0 * at.loss / max(errors.n_samples, 1)

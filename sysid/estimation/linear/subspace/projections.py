@@ -98,7 +98,7 @@ def regress(columns: Array, targets: Array) -> Array:
     """
     norms = np.linalg.norm(columns, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
-    found = linalg.lstsq(columns / scale, targets, cond=1e-11, check_finite=False, lapack_driver="gelsd")[0]
+    found = linalg.lstsq(columns / scale, targets, cond=1e-11, check_finite=False, lapack_driver="gelsy")[0]
     return np.asarray(found / scale[:, np.newaxis])
 
 

@@ -159,7 +159,8 @@ def test_several_outputs_are_one_model_that_stores_and_predicts_itself() -> None
     known = dict(zip(fit.uncertainty.names, fit.uncertainty.standard_deviations, strict=True))
     assert {"B(y, a, 1)", "B(z, b, 3)", "F(3)", "C(z, y, 1)", "constant(z)"} <= set(known)
     assert all(0.0 < value < np.inf for value in known.values())
-    assert [name for name, _, _ in fit.model.ratios] == ["y from a", "y from b", "z from a", "z from b"]
+    ratios = {at: ratio.of_numerator for at, ratio in fit.model.ratios.items()}
+    assert ratios == {(0, 0): "B(y, a, ", (0, 1): "B(y, b, ", (1, 0): "B(z, a, ", (1, 1): "B(z, b, "}
     control = fit.model.to_control()
     np.testing.assert_allclose(control.dcgain(), gain, rtol=0.1, atol=0.5)
 
