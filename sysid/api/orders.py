@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.extras import need
 from sysid.models import ARX, Mapping, Start
-from sysid.traces import Role, TraceSet
+from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.metrics import percent
 from sysid.validation.order_finalists import Finalist, run_finalists
 
@@ -137,9 +138,14 @@ class OrderSearch:
         Returns:
             A figure of matplotlib's.
         """
-        from sysid.reporting.figures.order_figure import order_figure
+        from sysid.reporting.figures.order_figure import OrderCurve, order_figure
 
-        return order_figure(self.losses, unit=self.traces[self.traces.names[0]].channel(self.mapping.output).unit)
+        return order_figure(OrderCurve.of(self.losses), unit=self.unit)
+
+    @property
+    def unit(self) -> str:
+        """The output's unit."""
+        return self.traces[self.traces.names[0]].channel(self.mapping.output).unit
 
     def __str__(self) -> str:
         head = f"{'structure':<24}{'parameters':>11}{'one-step mse':>14}{'BIC':>12}{'free run, fit %':>17}"
@@ -172,6 +178,7 @@ def search_orders(
     max_nb: int | None = None,
     max_nk: int | None = None,
     start: Start = ESTIMATED,
+    selection: Sequence[Trace] | None = None,
     workers: int = 2,
 ) -> OrderSearch:
     """Search the orders of an ARX model: the exact loss of every candidate, and the free run of the best of each size.
@@ -184,6 +191,7 @@ def search_orders(
         max_nb: Largest number of past values of each input, likewise.
         max_nk: Largest dead time, likewise.
         start: How each free run begins.
+        selection: Traces that choose, in place of those of the data set.
         workers: Threads.
 
     Returns:
@@ -216,7 +224,7 @@ def search_orders(
         )
     grid = _grid(sum(len(trace) for trace in estimation), len(chosen.inputs), (max_na, max_nb, max_nk))
     losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
-    selection = traces.with_role(Role.SELECTION)
+    selection = traces.with_role(Role.SELECTION) if selection is None else tuple(selection)
     found = run_finalists(
         losses, estimation, chosen, selection or estimation, count=FINALISTS, start=start, workers=workers
     ).ranked

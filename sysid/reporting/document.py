@@ -15,6 +15,7 @@ from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.judging.document import judgement_sections
 from sysid.reporting.numbers import number
+from sysid.reporting.orders_view import orders_section
 from sysid.reporting.overview import overview_section
 from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
 from sysid.reporting.published.tables import PublishedTable
@@ -70,6 +71,8 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         seen = {name: signals[best.slug][name] for name in scored_cases(best) or best.cases}
         by_level = amplitude_section(best, seen, suffix=suffix)
         sections += [] if by_level is None else [by_level]
+    orders = orders_section(results)
+    sections += [] if orders is None else [orders]
     sections += [*trust_sections(results), *evidence_sections(folder, results)]
     states = state_section(results)
     sections += ([] if states is None else [states]) + judgement_sections(folder)

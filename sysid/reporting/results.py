@@ -249,6 +249,42 @@ class AmplitudeRecord(Record):
     network_fit: Number = Field(description="That free-run fit in percent.")
 
 
+class OrderRow(Record):
+    """One structure of an order search."""
+
+    label: str = Field(description="Structure in a few characters.")
+    n_parameters: int = Field(description="Fitted parameters.")
+    one_step_mse: Number = Field(description="On the estimation traces, in the output's unit squared.")
+    aicc: Number = Field(description="AICc; smaller is better.")
+    bic: Number = Field(description="BIC; smaller is better.")
+    free_run_fit: Number = Field(description="Mean fit of the free run in percent; null where it diverges.")
+
+
+class OrderCurveRecord(Record):
+    """Loss against size."""
+
+    candidates: int = Field(description="Structures that were tried.")
+    sizes: list[int] = Field(description="Numbers of parameters, rising.")
+    lowest: list[Number] = Field(description="Least mean squared one-step error of each size.")
+    highest: list[Number] = Field(description="The greatest.")
+    choices: list[tuple[str, str, int, Number]] = Field(
+        description="Criterion, the structure that it chooses, its parameters and its error."
+    )
+
+
+class OrdersRecord(Record):
+    """What a search over the orders of ARX models found for one output."""
+
+    mapping: str = Field(description="Written as in 'BP+AR -> BC'.")
+    unit: str = Field(description="The output's unit.")
+    best: dict[str, Any] = Field(description="All fields of the best structure.")
+    label: str = Field(description="The same in a few characters.")
+    chosen_by: str = Field(description="By what it is the best.")
+    notes: list[str] = Field(default=[], description="Such as that it stands at the end of what was tried.")
+    curve: OrderCurveRecord
+    rows: list[OrderRow] = Field(description="The first structures, best first.")
+
+
 class SystemCaseRecord(Record):
     """A fit of several outputs on one case."""
 
@@ -285,6 +321,7 @@ class Results(RunResults):
     selection: SelectionRecord | None = Field(default=None, description="The traces that chose between fits.")
     fits: list[FitRecord] = Field(min_length=1, description="One object a fit and output.")
     systems: list[SystemRecord] = Field(default=[], description="Fits of several outputs as wholes.")
+    orders: list[OrdersRecord] = Field(default=[], description="What a search of the orders found, by output.")
     best: BestRecord | None = Field(default=None, description="Which fit was chosen.")
     linearity: LinearityRecord | None = Field(default=None, description="Whether a linear model is enough.")
     advice: list[AdviceRecord] = Field(default=[], description="What is in the traces, output by output.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,47 +11,76 @@ from matplotlib.figure import Figure
 from sysid.estimation.linear.order_search import Criterion, OrderLosses
 from sysid.reporting.figures.style import MARKERS, PALETTE, new_figure, styled
 
+CRITERIA = (Criterion.BIC, Criterion.AICC, Criterion.AIC)
+"""Whose choices are marked."""
 
-def order_figure(
-    losses: OrderLosses,
-    *,
-    unit: str,
-    criteria: Sequence[Criterion] = (Criterion.BIC, Criterion.AICC, Criterion.AIC),
-    title: str = "One-step loss of every candidate",
-) -> Figure:
+
+@dataclass(frozen=True, kw_only=True)
+class OrderCurve:
+    """What is drawn of a search.
+
+    Args:
+        candidates: How many there were.
+        sizes: Numbers of parameters, rising.
+        lowest: The least mean squared one-step error of each size.
+        highest: The greatest.
+        choices: For each criterion its name, the structure that it chooses, that one's size and error.
+    """
+
+    candidates: int
+    sizes: tuple[int, ...]
+    lowest: tuple[float, ...]
+    highest: tuple[float, ...]
+    choices: tuple[tuple[str, str, int, float], ...]
+
+    @classmethod
+    def of(cls, losses: OrderLosses, criteria: Sequence[Criterion] = CRITERIA) -> OrderCurve:
+        """The curve of a search.
+
+        Args:
+            losses: All candidates.
+            criteria: Whose choices are marked.
+
+        Returns:
+            The curve.
+        """
+        p, mse = losses.n_parameters, losses.mse
+        sizes = np.unique(p)
+        order = np.argsort(p, kind="stable")
+        starts = np.searchsorted(p[order], sizes)
+        chosen = [(one, int(np.argmin(losses.score(one)))) for one in criteria]
+        return cls(
+            candidates=len(losses),
+            sizes=tuple(sizes.tolist()),
+            lowest=tuple(np.minimum.reduceat(mse[order], starts).tolist()),
+            highest=tuple(np.maximum.reduceat(mse[order], starts).tolist()),
+            choices=tuple((one.value, losses.orders(i).label, int(p[i]), float(mse[i])) for one, i in chosen),
+        )
+
+
+def order_figure(curve: OrderCurve, *, unit: str, title: str = "One-step loss of every candidate") -> Figure:
     """Loss against number of parameters: the range of all candidates, the best of each size, and the choices.
 
     Args:
-        losses: All candidates of a search.
+        curve: What is drawn.
         unit: The output's unit.
-        criteria: Whose choices are marked.
         title: Stands above.
 
     Returns:
         The figure; nothing outside it was touched.
     """
-    p, mse = losses.n_parameters, losses.mse
-    sizes = np.unique(p)
-    order = np.argsort(p, kind="stable")
-    starts = np.searchsorted(p[order], sizes)
-    lowest, highest = np.minimum.reduceat(mse[order], starts), np.maximum.reduceat(mse[order], starts)
     with styled():
         figure = new_figure(7.6, 3.6)
         axes = figure.subplots()
         axes.set_title(title)
-        axes.fill_between(sizes, lowest, highest, color="#DDDDDD", label=f"all {len(losses):,} candidates")
-        axes.plot(sizes, lowest, color=PALETTE[0], label="best of each size")
-        for i, criterion in enumerate(criteria):
-            index = int(np.argmin(losses.score(criterion)))
-            axes.plot(
-                [p[index]],
-                [mse[index]],
-                linestyle="none",
-                marker=MARKERS[i],
-                color=PALETTE[1 + i],
-                label=f"{criterion.value}: {losses.orders(index).label}",
-            )
-        if lowest.min() > 0.0:
+        axes.fill_between(
+            curve.sizes, curve.lowest, curve.highest, color="#DDDDDD", label=f"all {curve.candidates:,} candidates"
+        )
+        axes.plot(curve.sizes, curve.lowest, color=PALETTE[0], label="best of each size")
+        for i, (criterion, label, size, mse) in enumerate(curve.choices):
+            said = f"{criterion}: {label}"
+            axes.plot([size], [mse], linestyle="none", marker=MARKERS[i], color=PALETTE[1 + i], label=said)
+        if min(curve.lowest) > 0.0:
             axes.set_yscale("log")
         axes.set_xlabel("number of parameters")
         axes.set_ylabel(f"mean squared one-step error [{unit}²]")

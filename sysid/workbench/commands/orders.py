@@ -56,11 +56,10 @@ def orders_command(
 
 
 def _table(found: OrderSearch) -> Table:
-    unit = found.traces[found.traces.names[0]].channel(found.mapping.output).unit
     title = f"{len(found.losses):,} structures of {found.mapping}, {found.chosen_by}"
     table = Table(title=title, title_justify="left")
     table.add_column("structure")
-    for head in ("parameters", f"one-step mse [{unit}²]", "AICc", "BIC", "free run, fit %"):
+    for head in ("parameters", f"one-step mse [{found.unit}²]", "AICc", "BIC", "free run, fit %"):
         table.add_column(head, justify="right")
     for one in found.finalists[:ROWS]:
         aicc, bic = (found.score(one, criterion) for criterion in (Criterion.AICC, Criterion.BIC))

@@ -34,6 +34,7 @@ from sysid.workbench.fields import (
     given_options,
     options_config,
 )
+from sysid.workbench.fits.orders import OrdersConfig
 from sysid.workbench.old_words import STRICT
 from sysid.workbench.stability import StabilityConfig
 from sysid.yaml_files import FieldError, check, parse_yaml, read_yaml
@@ -130,6 +131,7 @@ class PipelineConfig(BaseModel):
         export: What leaves the workbench; ``null`` for nothing.
         report: What the report shows.
         stability: Over which sequences a network's free run has to stay bounded and to settle.
+        orders: A search over the orders of ARX models for the report; ``null`` for none.
         annotate: Who says in which state each sample is, for errors by state and weights.
     """
 
@@ -148,6 +150,7 @@ class PipelineConfig(BaseModel):
     export: ExportConfig | None = ExportConfig()
     report: ReportConfig = ReportConfig()
     stability: StabilityConfig = StabilityConfig()
+    orders: OrdersConfig | None = None
     annotate: AnnotateConfig | None = None
 
     @field_validator("fits")

@@ -166,6 +166,7 @@ def results_document(
     choice: Choice | None,
     exports: Sequence[Mapping[str, Any]],
     advice: Sequence[Mapping[str, Any]] = (),
+    orders: Sequence[Mapping[str, Any]] = (),
     sweep: SweepRecord | None = None,
 ) -> dict[str, Any]:
     """The contents of results.json; its contract is in ``docs/results.md``.
@@ -179,6 +180,7 @@ def results_document(
         choice: Which of them is put first.
         exports: Exported files of that fit.
         advice: What was found in the traces, output by output, once they were looked at.
+        orders: What a search of the orders found, by output.
         sweep: That found the fits, if one did.
 
     Returns:
@@ -221,6 +223,7 @@ def results_document(
         "start": {"kind": start.kind.value, "n_measured": start.n_measured},
         "fits": [fit_record(ready, exports if ready.config.name == first else ()) for ready in fits],
         "systems": system_records(fits),
+        "orders": [dict(one) for one in orders],
         "best": asdict(choice) | {"name": first} if choice else None,
         "linearity": linearity(fits),
         "advice": list(advice),

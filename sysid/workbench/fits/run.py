@@ -20,6 +20,7 @@ from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, Pipel
 from sysid.workbench.fits.data import Data, load_data, unmade_data
 from sysid.workbench.fits.estimates import how_long
 from sysid.workbench.fits.evidence import residuals
+from sysid.workbench.fits.orders import orders_key, said, search
 from sysid.workbench.fits.outputs import FitModel, FitOutput, models_of
 from sysid.workbench.fits.record import (
     export_record,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 LOOKING = Outlined(name="advice", title="Looking at the traces", estimate=Estimate(seconds=2.0, basis="typical"))
 LOADING = Outlined(name="data", title="Loading the traces")
+ORDERS = Outlined(name="orders", title="Searching the orders", estimate=Estimate(seconds=10.0, basis="typical"))
 EXPORT_TIME = Estimate(seconds=10.0, basis="typical")
 """Of two formats, as measured on two cores."""
 SCORING_TIME = Estimate(seconds=1.0, basis="typical")
@@ -230,7 +232,7 @@ class FitSteps:
 
     def outline(self) -> list[Outlined]:
         """All steps, as far as they are known before the traces are."""
-        found = [LOADING]
+        found = [LOADING] + ([ORDERS] if self.config.orders is not None else [])
         for model in (model for fit in self.config.fits for model in models_of(fit, self.config)):
             found.append(Outlined(name=f"fit-{model.fit.slug}", title=fit_title(model.fit), called=model.fit.name))
             found += [
@@ -259,6 +261,7 @@ class FitSteps:
 
     def _run(self, run: Run, loaded: Done[Data]) -> Results:
         run.then(lambda: run.tell(_loaded(loaded.value)))
+        orders = run.do(self._orders(run, loaded)) if self.config.orders is not None else None
         fitted: dict[str, _Fitted] = {}
         for fit in self.config.fits:
             fitted[fit.name] = self._fitted(run, fit, loaded, fitted)
@@ -275,7 +278,10 @@ class FitSteps:
                 told = events.BundleReady(of=ready, folder=place, exports=exports, stored=stored)
                 run.then(partial(run.tell, told))
         advice = run.do(self._look(run, loaded))
-        results = self._results(run, loaded.value, fitted, choice=choice, exports=exports, advice=advice.value)
+        found = () if orders is None else orders.value
+        results = self._results(
+            run, loaded.value, fitted, choice=choice, exports=exports, advice=advice.value, orders=found
+        )
         page = run.report(results)
         for ready in best.ready:
             written = events.ReportReady(page=page.value, results=run.store.results, of=ready)
@@ -299,6 +305,25 @@ class FitSteps:
             outcome=_cases,
             at_hand=lambda: unmade_data(self._names, beside=beside) is None,
             how_long=lambda: unmade_data(self._names, beside=beside) or NOT_KNOWN,
+        )
+
+    def _orders(self, run: Run, loaded: Done[Data]) -> Step[list[dict[str, Any]]]:
+        """The step that searches the orders."""
+        file = run.store.path / "orders.json"
+
+        def write(found: list[dict[str, Any]]) -> list[Path]:
+            write_json(file, {"orders": found})
+            return [file]
+
+        return Step(
+            name=ORDERS.name,
+            title=ORDERS.title,
+            make=lambda _: search(self.config, loaded.value),
+            key=lambda: orders_key(self.config, loaded.value),
+            write=write,
+            read=lambda _: list(read_json(file)["orders"]),
+            outcome=said,
+            typical=ORDERS.estimate,
         )
 
     def _fitted(self, run: Run, fit: FitConfig, loaded: Done[Data], earlier: Mapping[str, _Fitted]) -> _Fitted:
@@ -442,6 +467,7 @@ class FitSteps:
         choice: steps.Choice | None,
         exports: Sequence[Mapping[str, Any]],
         advice: Sequence[Mapping[str, Any]] = (),
+        orders: Sequence[Mapping[str, Any]] = (),
     ) -> Results:
         document = results_document(
             config=self.config,
@@ -452,6 +478,7 @@ class FitSteps:
             choice=choice,
             exports=exports,
             advice=advice,
+            orders=orders,
             sweep=read_sweep(run.store.path) if has_sweep(run.store.path) else None,
         )
         new = parse_results(strict(document), where=run.store.results)

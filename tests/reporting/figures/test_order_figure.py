@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sysid.estimation.linear.order_search import OrderLosses
-from sysid.reporting.figures.order_figure import order_figure
+from sysid.reporting.figures.order_figure import OrderCurve, order_figure
 
 
 def losses() -> OrderLosses:
@@ -16,7 +16,7 @@ def losses() -> OrderLosses:
 
 
 def test_the_best_of_each_size_and_the_choices_are_drawn() -> None:
-    (axes,) = order_figure(losses(), unit="psi").axes
+    (axes,) = order_figure(OrderCurve.of(losses()), unit="psi").axes
     best = axes.lines[0].get_xydata()
     np.testing.assert_allclose(best, [[3, 1.0], [4, 0.5], [5, 0.495]])
     assert [line.get_xydata().tolist() for line in axes.lines[1:]] == [[[4, 0.5]]] * 3

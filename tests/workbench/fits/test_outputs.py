@@ -40,6 +40,7 @@ mapping: u+w -> level+heat
 start: rest
 rest: {heat: 1.0}
 stability: {count: 5}
+orders: {max_na: 2, max_nb: 2, max_nk: 1, criterion: BIC}
 fits:
   - {name: ARX, structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}}
   - name: alone
@@ -134,12 +135,22 @@ def test_what_is_chosen_is_chosen_and_exported_as_a_whole(place: Path, results: 
     assert_allclose(bundle.simulate(u), np.column_stack(alone), rtol=1e-9, atol=1e-9)
 
 
+def test_orders_are_searched_for_every_output(results: Results) -> None:
+    level, heat = results.orders
+    assert (level.mapping, heat.mapping) == ("u+w -> level", "u+w -> heat")
+    assert (level.best["kind"], level.best["nk"][0]) == ("ARX", 1)  # without noise the other orders are rounding's
+    assert level.chosen_by == "least BIC"
+    assert level.curve.candidates == 2 * (2 * 2) ** 2
+    assert {choice[0] for choice in level.curve.choices} == {"BIC", "AIC", "AICc"}
+    assert level.label in {row.label for row in level.rows}
+
+
 def test_the_report_has_the_whole_and_every_output(place: Path, results: Results) -> None:
     page = (place / "runs" / "both" / "report" / "index.html").read_text(encoding="utf-8")
     assert results.best_name in page
     anchors = re.findall(r'<section[^>]* id="([^"]+)"', page)
     assert len(anchors) == len(set(anchors))
-    assert {"best", "best-2"} <= set(anchors)
+    assert {"best", "best-2", "orders"} <= set(anchors)
     ids = re.findall(r' id="([^"]+)"', page)
     assert len(ids) == len(set(ids))
 
