@@ -6,7 +6,7 @@ from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -68,9 +68,7 @@ class OrderSearch:
             ConfigError: If there is no such criterion.
         """
         if criterion is None:
-            structure = self.finalists[0].fit.model.structure
-            assert isinstance(structure, ARX)  # noqa: S101 - the search fits nothing else
-            return structure
+            return _orders(self.finalists[0])
         known = {one.value.lower(): one for one in Criterion}
         if criterion.lower() not in known:
             raise ConfigError(
@@ -162,8 +160,7 @@ class OrderSearch:
         return f"<pre>{escape(str(self))}</pre>"
 
     def _index(self, finalist: Finalist) -> int:
-        orders = finalist.fit.model.structure
-        assert isinstance(orders, ARX)  # noqa: S101 - the search fits nothing else
+        orders = _orders(finalist)
         same = (
             (self.losses.na == orders.na) & (self.losses.nb == orders.nb).all(1) & (self.losses.nk == orders.nk).all(1)
         )
@@ -258,3 +255,8 @@ def _grid(samples: int, inputs: int, asked: tuple[int | None, int | None, int | 
             remedy="lower the orders, or search the inputs one by one",
         )
     return grid
+
+
+def _orders(finalist: Finalist) -> ARX:
+    """The structure; the search fits nothing but these."""
+    return cast("ARX", finalist.fit.model.structure)

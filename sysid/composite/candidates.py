@@ -12,7 +12,7 @@ import numpy as np
 from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_members import fixed_model
 from sysid.composite.keeper import Decision, Keeper, MakeAll, Report, Sample, Task
-from sysid.composite.members import Members, assembled, geometric_mean, own_traces
+from sysid.composite.members import Members, assembled, geometric_mean, network_of, own_traces
 from sysid.composite.plan import TrainingPlan
 from sysid.composite.stages import Choice, choose_together, fit_member, model_of, one_step_of
 from sysid.errors import ConfigError
@@ -160,7 +160,7 @@ def _asked(member: Member, given: Sequence[FitResult]) -> list[_Asked]:
     seeds = [member.training.seed + SEEDS_OF_A_CANDIDATE * number for number in range(member.candidates)]
     own = [_Asked(member=variant.trained(seed=seed)) for variant in member.variants for seed in seeds]
     for fit in given:
-        if not isinstance(fit.model, NARXModel) or fit.model.mapping != member.mapping:
+        if network_of(fit.model) is None or fit.model.mapping != member.mapping:
             raise ConfigError(
                 f"a candidate that is given is no network {member.mapping}",
                 where="given",
@@ -168,7 +168,7 @@ def _asked(member: Member, given: Sequence[FitResult]) -> list[_Asked]:
                 got=str(fit.model.mapping),
                 remedy="leave it out",
             )
-        own.append(_Asked(member=member.of_structure(fit.model.network).trained(seed=fit.seed or 0), given=fit))
+        own.append(_Asked(member=member.of_structure(model_of(fit).network).trained(seed=fit.seed or 0), given=fit))
     if not own:
         raise ConfigError(
             f"{member.mapping} has no candidates",

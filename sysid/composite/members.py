@@ -7,12 +7,13 @@ from collections.abc import Mapping as Dict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import zip_longest
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sysid.composite.composite import Composite, FixedMember, Standing
+from sysid.estimation.estimators import JOINING
 from sysid.models import Cascade, Limit, Mapping, NARXModel
 from sysid.traces import Trace
 
@@ -32,6 +33,19 @@ def bounds_of(fixed: Sequence[FixedMember]) -> dict[str, Limit]:
         The limit of each of their outputs, in all their instances.
     """
     return {name: Limit(low=one.low, high=one.high) for one in fixed for name in one.outputs}
+
+
+def network_of(model: object) -> NARXModel | None:
+    """A model as a member that is trained with others.
+
+    Args:
+        model: Any model.
+
+    Returns:
+        The same; ``None`` where the table of estimators says that such models are not trained together.
+    """
+    kind = getattr(getattr(model, "structure", None), "kind", None)
+    return cast("NARXModel", model) if kind in JOINING else None
 
 
 def placed(member: Standing, model: NARXModel, instance: str) -> NARXModel:

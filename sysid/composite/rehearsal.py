@@ -28,7 +28,7 @@ def rehearse(composite: Composite, plan: TrainingPlan, like: Trace) -> None:
             writes; or a round cannot share weights.
         ChannelError: If the trace lacks a channel of a member's first instance.
     """
-    models = {member.output: _untaught(member, like) for member in composite.members}
+    models = {member.output: untaught(member, like) for member in composite.members}
     models |= {fixed.output: fixed_model(fixed, like) for fixed in composite.fixed}
     whole = assembled(composite, models)
     for output in plan.retrain.members if plan.retrain else ():
@@ -62,8 +62,16 @@ def _check_known(outputs: tuple[str, ...], where: str, names: tuple[str, ...]) -
         )
 
 
-def _untaught(member: Member, like: Trace) -> NARXModel:
-    """A member with parameters of zero."""
+def untaught(member: Member, like: Trace) -> NARXModel:
+    """A member with parameters of zero.
+
+    Args:
+        member: The member.
+        like: A trace of the training data, for units and the sample time.
+
+    Returns:
+        Its model.
+    """
     structure, inputs = member.structure, member.mapping.inputs
     count = parameter_count(
         structure.lags(len(inputs)), structure.neurons, linear=structure.feedthrough, gated=structure.gated

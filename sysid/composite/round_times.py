@@ -10,9 +10,9 @@ from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_members import fixed_model
 from sysid.composite.members import assembled
 from sysid.composite.plan import RoundPlan
+from sysid.composite.rehearsal import untaught
 from sysid.composite.round import JointRound
-from sysid.composite.stages import fit_member, model_of, reading_more
-from sysid.estimation import Loop, Training
+from sysid.composite.stages import reading_more
 from sysid.models import Cascade
 from sysid.traces import Trace
 
@@ -44,30 +44,24 @@ class RoundTime:
         return min(self.iterations * self.iteration_s + (self.checkpoints + 2) * self.choosing_s, self.limit_s)
 
 
-def stand_in(composite: Composite, estimation: Sequence[Trace], selection: Sequence[Trace]) -> Cascade:
-    """A whole of the right size, of members that were hardly trained.
+def stand_in(composite: Composite, like: Trace) -> Cascade:
+    """A whole of the right size, of members that know nothing.
 
     Args:
         composite: What is declared.
-        estimation: Traces of the whole to fit.
-        selection: Traces of the whole that choose.
+        like: A trace of the training data, for units and the sample time.
 
     Returns:
         The whole; it is good for nothing but being timed.
     """
-    models = {
-        one.output: model_of(fit_member(_hardly_trained(one), estimation[:1], selection[:1]))
-        for one in composite.members
-    }
-    fixed = {one.output: fixed_model(one, estimation[0]) for one in composite.fixed}
-    return assembled(composite, {**models, **fixed})
+    models = {one.output: untaught(_full_size(one), like) for one in composite.members}
+    return assembled(composite, models | {one.output: fixed_model(one, like) for one in composite.fixed})
 
 
-def _hardly_trained(member: Member) -> Member:
-    # An ensemble has the neurons of all its members.
-    size = replace(member.structure, neurons=member.structure.neurons * member.training.ensemble)
-    training = Training(loop=Loop.OPEN, max_iterations=1, basis=member.training.basis, workers=1)
-    return replace(member.of_structure(size), training=training, traces=1, stability=None)
+def _full_size(member: Member) -> Member:
+    # An ensemble has the neurons of all that it unites.
+    neurons = member.structure.neurons * member.training.ensemble
+    return member.of_structure(replace(member.structure, neurons=neurons))
 
 
 def time_round(

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sysid.composite.composite import Composite, Member
-from sysid.composite.members import placed, seen_from, simulated_inputs
+from sysid.composite.members import network_of, placed, seen_from, simulated_inputs
 from sysid.composite.plan import RoundPlan
 from sysid.errors import ConfigError
-from sysid.models import Cascade, NARXModel
+from sysid.models import Cascade
 from sysid.traces import Trace
 
 
@@ -109,8 +109,8 @@ class SharedWeights:
         """
         whole = self.whole
         for one in self.members:
-            model = part.member(one.output)
-            if not isinstance(model, NARXModel):
+            model = network_of(part.member(one.output))
+            if model is None:
                 raise TypeError(f"{one.mapping} is no NARX")
             for instance in self.instances:
                 whole = whole.with_member(placed(one, model, instance))

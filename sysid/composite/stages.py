@@ -16,6 +16,7 @@ from sysid.composite.keeper import Report
 from sysid.composite.members import (
     Members,
     assembled,
+    network_of,
     own_traces,
     simulated_inputs,
     whole_score,
@@ -86,9 +87,10 @@ def one_step_of(member: Member, asked: OneStep) -> Member:
 
 def model_of(fit: FitResult) -> NARXModel:
     """The network of a member's fit."""
-    if not isinstance(fit.model, NARXModel):
+    model = network_of(fit.model)
+    if model is None:
         raise TypeError(f"{fit.model.mapping} is no NARX")
-    return fit.model
+    return model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,7 +208,8 @@ def reading_more(cascade: Cascade, reads: Mapping[str, Mapping[str, tuple[int, .
     """
     for output, more in reads.items():
         models = {name: cascade.member(name) for name in (output, *more)}
-        networks = {name: model for name, model in models.items() if isinstance(model, NARXModel)}
+        asked = {name: network_of(model) for name, model in models.items()}
+        networks = {name: model for name, model in asked.items() if model is not None}
         if len(networks) < len(models):
             raise ConfigError(
                 f"{', '.join(sorted(set(models) - set(networks)))} cannot take part in a circle",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_members import fixed_model
-from sysid.composite.members import placed, wired
+from sysid.composite.members import network_of, placed, wired
 from sysid.errors import ConfigError
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
@@ -51,8 +51,8 @@ def started_from(composite: Composite, given: Cascade, like: Trace) -> Cascade:
 def _network(given: Cascade, member: Member, instance: str) -> NARXModel:
     """The given network of a member in one of its instances."""
     output, asked = member.channel(member.output, instance), member.structure
-    found = given.member(output) if output in given.outputs else None
-    if isinstance(found, NARXModel):
+    found = network_of(given.member(output)) if output in given.outputs else None
+    if found is not None:
         own = found.network
         inputs = {member.channel(name, instance) for name in member.mapping.inputs}
         if (own.neurons, own.gated) == (asked.neurons, asked.gated) and inputs <= set(found.mapping.inputs):
@@ -61,7 +61,7 @@ def _network(given: Cascade, member: Member, instance: str) -> NARXModel:
         f"the whole to begin from has no such {output}",
         where="begin",
         expected=f"a network {member.mapping} with {_said(asked)}, which may read more",
-        got="none" if not isinstance(found, NARXModel) else f"{found.mapping} with {_said(found.network)}",
+        got="none" if found is None else f"{found.mapping} with {_said(found.network)}",
         remedy="name a whole that has it, or fit this one anew without begin",
     )
 

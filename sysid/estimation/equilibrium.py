@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def _plain_models(traces: Sequence[Trace], model: AbstractModel) -> list[Abstrac
             found = fit_arx(traces, mapping, orders, start=ESTIMATED).model
         except TraceError:
             continue
-        if isinstance(found, ARXModel) and np.abs(found.poles).max(initial=0.0) < 1.0:
+        if np.abs(cast("ARXModel", found).poles).max(initial=0.0) < 1.0:
             models.append(found)
     return models
 

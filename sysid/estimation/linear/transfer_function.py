@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -87,9 +88,9 @@ def fit_transfer_function(
     scaling = unit_range(whole)
 
     def of_all_inputs(model: AbstractModel) -> AbstractModel:
-        if own is orders or not isinstance(model, TransferFunctionModel):
+        if own is orders:
             return model
-        return determined.widened(model, orders, mapping, scaling)
+        return determined.widened(cast("TransferFunctionModel", model), orders, mapping, scaling)
 
     def score(model: AbstractModel) -> float:
         return _mean_mse(of_all_inputs(model), selection, start)

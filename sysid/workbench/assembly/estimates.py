@@ -86,7 +86,7 @@ class RoundEstimates:
         plan, composite = self.config.plan, self.config.composite
         if not plan.rounds:
             return
-        whole = stand_in(composite, data.estimation, data.selection)
+        whole = stand_in(composite, data.estimation[0])
         for number, one in enumerate(plan.rounds, start=1):
             timed, whole = time_round(composite, one, whole, estimation=_traces(one, data), selection=data.selection)
             yield ("together" if number == 1 else f"together-{number}"), timed
@@ -119,4 +119,4 @@ def _samples(traces: Sequence[Trace]) -> int:
 
 def _estimate(timed: RoundTime) -> Estimate:
     each = f"{timed.iterations} iterations of {1e3 * timed.iteration_s:.3g} ms"
-    return Estimate(seconds=timed.seconds, basis=f"at most: {each}, timed with members that were hardly trained")
+    return Estimate(seconds=timed.seconds, basis=f"at most: {each}, timed with untrained members")

@@ -71,5 +71,5 @@ def test_members_that_were_never_fitted_are_timed(workspace: Path) -> None:
     together = planned["together"]
     assert together.seconds
     assert together.basis.startswith("at most: ")
-    assert together.basis.endswith("timed with members that were hardly trained")
+    assert together.basis.endswith("timed with untrained members")
     assert not (workspace / "runs").exists()
