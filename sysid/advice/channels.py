@@ -59,8 +59,10 @@ def _channel(record: Record, name: str) -> Iterator[Finding]:
                 figures={"levels": len(levels)},
             )  # fmt: skip
         return
-    yield from _resolution(name, x, levels)
-    yield from _ends(name, parts, x)
+    # An input whose levels are held is a command: where it stands, and in which steps, was somebody's choice.
+    if name == record.mapping.output or _roughness(parts) > 0.0:
+        yield from _resolution(name, x, levels)
+        yield from _ends(name, parts, x)
     yield from _spikes(name, parts, x, levels)
 
 

@@ -131,6 +131,9 @@ def check_sampling(record: Record) -> Iterator[Finding]:
     if samples > TOO_FAST:
         code, verdict = "sampling.fast", Verdict.LOOK if samples > FAR_TOO_FAST else Verdict.NOTE
         figures["proposed"] = record.sample_time * max(int(samples / GOOD), 2)
+    elif found.settling()[j] <= 1 and found.dead_times[j].best == 0:
+        code, verdict = "sampling.at_once", Verdict.NOTE
+        figures["proposed"] = record.sample_time / 5.0
     elif samples < TOO_SLOW and found.settling()[j] - found.dead_times[j].best <= 3:
         code, verdict = "sampling.slow", Verdict.LOOK
         figures["proposed"] = record.sample_time / 5.0

@@ -39,7 +39,7 @@ def suggestions(record: Record, findings: Sequence[Finding]) -> tuple[Suggestion
         m = len(arx.nb)
         delays = tuple(max(int(k), 0) for k in arx.nk)
         transfer = TransferFunction(poles=(poles,) * m, zeros=(poles - 1,) * m, delays=delays)
-        if codes & {"noise.some", "noise.loud", "noise.coloured"} and "feedback.found" not in codes:
+        if codes & {"noise.some", "noise.loud", "noise.coloured"} and not codes & {"feedback.found", *NOT_LINEAR}:
             found.insert(0, Suggestion(structure=transfer, code="structure.transfer_function_noise"))
         else:
             found.append(Suggestion(structure=transfer, code="structure.transfer_function"))

@@ -24,7 +24,7 @@ class Words:
 
 
 SAID: Final[dict[str, Words]] = {
-    "amount": Words("{usable:.0f} samples in {experiments:.0f} experiments, {seconds:.4g} s in all."),
+    "amount": Words("{usable:.0f} samples that count; experiments: {experiments:.0f}; {seconds:.4g} s in all."),
     "amount.few": Words(
         "Only {usable:.0f} samples count, the longest stretch has {longest:.0f}.",
         "Record more: several times the settling time, and ten samples for each parameter at least.",
@@ -148,6 +148,10 @@ SAID: Final[dict[str, Words]] = {
     "sampling.slow": Words(
         "The output has answered {who} within a sample or two: sampled too slowly to see how.",
         "Sample at {proposed:.3g} s or faster.",
+    ),
+    "sampling.at_once": Words(
+        "The output answers {who} within the sample: a fixed ratio, and no dynamics to model.",
+        "Is one made from the other? Otherwise sample at {proposed:.3g} s or faster.",
     ),
     "sampling.unknown": Words("Whether the sample time is good: {why}."),
     "noise.quiet": Words(

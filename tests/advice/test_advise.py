@@ -203,6 +203,11 @@ def test_limits_spikes_jumps_and_drifts() -> None:
     assert coarse["step"] == pytest.approx(0.08)
 
 
+def test_levels_of_a_command_are_no_fault_of_a_channel() -> None:
+    u = np.round(np.clip(3.0 * steps(1500, 14), -2.0, 2.0), 2)
+    assert looks(look(trace(u, plant(u) + noise(1500, 14, 0.02)))) == set()
+
+
 def test_what_is_masked_and_what_scores_is_not_looked_at() -> None:
     u = steps(1500, 12)
     y = plant(u) + noise(1500, 12, 0.02)

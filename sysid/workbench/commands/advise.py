@@ -48,9 +48,9 @@ def _show(found: Advice, which: str) -> None:
             target.print(Text(question, style="bold"))
             before = question
         text = Text(f"[{verdict}] ", style=STYLES.get(verdict, "")) if verdict else Text()
-        target.print(Padding(text + Text(says), (0, 0, 0, 2)))
+        target.print(Padding(text + Text(says), (0, 0, 0, 2), expand=False))
         if do:
-            target.print(Padding(Text(do, style="italic"), (0, 0, 0, 6)))
+            target.print(Padding(Text(do, style="italic"), (0, 0, 0, 6), expand=False))
     target.print(f"picture: {_picture(found, which)}", soft_wrap=True, markup=False)
 
 
