@@ -85,6 +85,16 @@ def test_an_example_of_the_python_page_runs_in_a_few_lines(
     assert (tmp_path / Path(name).stem / "model.json").is_file()
 
 
+def test_the_example_of_linear_models_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    ((name, block),) = blocks_of("linear-models.md")
+    exec(compile(block, name, "exec"), {})  # noqa: S102 - our own page
+    told = capsys.readouterr().out.splitlines()
+    assert [line.split("  ")[0] for line in told[1:3]] == ["SS 3", "BJ [2; 1; 1; 2; 1]"]
+    assert all(float(line.split()[-1]) > 80.0 for line in told[1:3])
+    low, high = ast.literal_eval(told[-1])["B(u, 1)"]
+    assert low < 0.1 < high
+
+
 def test_the_examples_of_composites_run_one_after_the_other(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, object] = {}
     for name, block in blocks_of("composites.md"):

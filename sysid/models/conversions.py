@@ -1,0 +1,216 @@
+"""Linear systems in other forms: sampled, continuous, at another rate, smaller; on objects of python-control.
+
+A model becomes such an object by its ``to_control()``, or with its states by
+:func:`sysid.models.to_control.state_space`. The package is imported when a function is called.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.errors import ConfigError
+
+Array = NDArray[np.float64]
+
+
+def c2d(system: Any, sample_time: float, method: str = "zoh") -> Any:
+    """A continuous system sampled.
+
+    Args:
+        system: A ``control.StateSpace`` or ``control.TransferFunction`` in continuous time.
+        sample_time: Seconds.
+        method: ``zoh``, inputs held between samples, or another one of ``control.sample_system``, such as ``tustin``.
+
+    Returns:
+        The system in discrete time, in the form of the given one.
+
+    Example:
+        >>> import control
+        >>> float(c2d(control.tf([1.0], [1.0, 1.0]), 0.1).poles()[0].real.round(6))
+        0.904837
+    """
+    import control
+
+    _check_time(system, discrete=False)
+    return control.sample_system(system, _positive(sample_time), method=method)
+
+
+def d2c(system: Any) -> Any:
+    """The continuous system that gives a discrete one when its inputs are held between samples.
+
+    Args:
+        system: A ``control.StateSpace`` or ``control.TransferFunction`` in discrete time.
+
+    Returns:
+        A ``control.StateSpace``.
+
+    Raises:
+        ConfigError: If a pole is zero or negative: no continuous system of the same order gives it.
+
+    Example:
+        >>> import control
+        >>> float(d2c(c2d(control.tf([1.0], [1.0, 1.0]), 0.1)).poles()[0].real.round(6))
+        -1.0
+    """
+    import control
+
+    _check_time(system, discrete=True)
+    given = state_space(system)
+    poles = given.poles()
+    bad = poles[(np.abs(poles.imag) < 1e-12) & (poles.real <= 1e-12)]
+    if len(bad):
+        raise ConfigError(
+            "no continuous system of this order gives the discrete one",
+            where="a pole",
+            expected="no pole on the negative real axis, nor at zero, which is a dead time",
+            got=", ".join(f"{pole.real:.4g}" for pole in bad),
+            remedy="take a dead time out of the model first, or fit a continuous transfer function",
+        )
+    n, m = given.nstates, given.ninputs
+    block = np.eye(n + m)
+    block[:n, :n], block[:n, n:] = given.A, given.B
+    rates = np.real(linalg.logm(block)) / given.dt
+    return control.StateSpace(rates[:n, :n], rates[:n, n:], given.C, given.D, 0, **_names(given))
+
+
+def d2d(system: Any, sample_time: float) -> Any:
+    """A discrete system at another sample time, inputs held between samples.
+
+    Args:
+        system: In discrete time.
+        sample_time: The other one in seconds.
+
+    Returns:
+        A ``control.StateSpace``.
+
+    Raises:
+        ConfigError: If the discrete system has no continuous one; see :func:`d2c`.
+    """
+    return c2d(d2c(system), sample_time)
+
+
+def state_space(system: Any) -> Any:
+    """A system as ``control.StateSpace``.
+
+    Args:
+        system: An object of python-control.
+
+    Returns:
+        The state space.
+    """
+    import control
+
+    return control.ss(system)
+
+
+def transfer_function(system: Any) -> Any:
+    """A system as ``control.TransferFunction``; with many states its coefficients carry fewer digits.
+
+    Args:
+        system: An object of python-control.
+
+    Returns:
+        One row of transfer functions an output, one column an input.
+    """
+    import control
+
+    return control.tf(system)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reduction:
+    """A smaller system, and how far off it can be.
+
+    Args:
+        system: A ``control.StateSpace`` with fewer states.
+        singular_values: Hankel singular values of the given one, descending.
+        bound: What the gain between the two is at most at any frequency: twice the sum of the singular values left out.
+    """
+
+    system: Any
+    singular_values: Array
+    bound: float
+
+
+def reduced(system: Any, states: int) -> Reduction:
+    """A system with fewer states, by balanced truncation (Moore 1981; the bound of Enns and Glover).
+
+    Args:
+        system: A stable system of python-control.
+        states: How many states are kept.
+
+    Returns:
+        The reduction.
+
+    Raises:
+        ConfigError: If the system is not stable, or the number is not between 0 and that of its states.
+
+    Example:
+        >>> import control
+        >>> found = reduced(control.tf([1.0, 10.1], [1.0, 11.0, 10.0]), 1)
+        >>> found.system.nstates, bool(found.bound < 0.02)
+        (1, True)
+    """
+    import control
+
+    given = state_space(system)
+    discrete = given.isdtime(strict=True)
+    poles = given.poles()
+    if len(poles) and not (np.abs(poles).max() < 1.0 if discrete else poles.real.max() < 0.0):
+        raise ConfigError(
+            "only a stable system can be balanced",
+            expected="all poles inside the unit circle" if discrete else "all poles left of the imaginary axis",
+            got=f"the slowest at {max(poles, key=abs if discrete else np.real):.6g}",
+            remedy="reduce its stable part, or fit a smaller model with stable: true",
+        )
+    if not 0 <= states <= given.nstates:
+        raise ConfigError(
+            "not a number of states to keep",
+            where="states",
+            expected=f"0 to {given.nstates}",
+            got=states,
+            remedy="keep as many as there are large singular values",
+        )
+    solve = linalg.solve_discrete_lyapunov if discrete else (lambda A, Q: linalg.solve_continuous_lyapunov(A, -Q))
+    P, Q = _root(solve(given.A, given.B @ given.B.T)), _root(solve(given.A.T, given.C.T @ given.C))
+    U, sizes, Vt = linalg.svd(Q.T @ P)
+    # Projections of the square-root method: nothing is inverted but the singular values that are kept.
+    scale = 1.0 / np.sqrt(sizes[:states])
+    left, right = (U[:, :states] * scale).T @ Q.T, P @ Vt[:states].T * scale
+    small = control.StateSpace(
+        left @ given.A @ right, left @ given.B, given.C @ right, given.D, given.dt, **_names(given)
+    )
+    return Reduction(system=small, singular_values=sizes, bound=float(2.0 * sizes[states:].sum()))
+
+
+def _root(gramian: Array) -> Array:
+    sizes, vectors = linalg.eigh(0.5 * (gramian + gramian.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))
+
+
+def _names(system: Any) -> dict[str, list[str]]:
+    return {"inputs": list(system.input_labels), "outputs": list(system.output_labels)}
+
+
+def _positive(sample_time: float) -> float:
+    if not np.isfinite(sample_time) or sample_time <= 0.0:
+        raise ConfigError(
+            "not a sample time", where="sample_time", expected="seconds above 0", got=sample_time, remedy="correct it"
+        )
+    return float(sample_time)
+
+
+def _check_time(system: Any, *, discrete: bool) -> None:
+    if system.isdtime(strict=True) is not discrete:
+        known = "discrete" if discrete else "continuous"
+        raise ConfigError(
+            f"the system is not in {known} time",
+            expected=f"a system in {known} time",
+            got=f"dt = {system.dt}",
+            remedy="use d2d from one sample time to another, c2d from continuous time, d2c into it",
+        )

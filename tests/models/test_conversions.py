@@ -1,0 +1,68 @@
+"""Conversions: the same system at its samples, and a smaller one within its bound."""
+
+from __future__ import annotations
+
+import control
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.models.conversions import c2d, d2c, d2d, reduced, state_space, transfer_function
+
+
+def plant(dt: float = 0) -> control.StateSpace:
+    rng = np.random.default_rng(0)
+    A = np.array([[-0.3, 2.0, 0.0], [-2.0, -0.3, 0.1], [0.0, 0.0, -8.0]])
+    system = control.StateSpace(A, rng.normal(size=(3, 2)), rng.normal(size=(2, 3)), 0.1 * rng.normal(size=(2, 2)), 0)
+    return c2d(system, dt) if dt else system
+
+
+def test_a_sampled_system_comes_back() -> None:
+    one, again = plant(), d2c(plant(0.1))
+    w = np.array([0.1, 1.0, 3.0])
+    np.testing.assert_allclose(again(1j * w), one(1j * w), rtol=1e-8, atol=1e-10)
+    assert again.input_labels == one.input_labels
+
+
+def test_another_rate_gives_the_same_steps_at_common_samples() -> None:
+    fast, slow = plant(0.05), d2d(plant(0.05), 0.1)
+    y, z = (control.step_response(one, T=np.arange(n) * one.dt).outputs for one, n in ((fast, 41), (slow, 21)))
+    np.testing.assert_allclose(y[..., ::2], z, rtol=1e-8, atol=1e-9)
+
+
+@pytest.mark.parametrize("dt", [0, 0.1])
+@pytest.mark.parametrize("states", [0, 1, 2, 3])
+def test_a_smaller_system_is_within_its_bound(dt: float, states: int) -> None:
+    one = plant(dt)
+    found = reduced(one, states)
+    w = np.logspace(-2, np.log10(np.pi / 0.1), 300)
+    x = np.exp(1j * w * 0.1) if dt else 1j * w
+    off = [np.linalg.norm(m, 2) for m in np.moveaxis(one(x) - found.system(x), -1, 0)]
+    assert found.system.nstates == states
+    assert max(off) <= found.bound + 1e-9
+    assert (np.diff(found.singular_values) <= 0.0).all()
+
+
+def test_transfer_functions_and_state_spaces_are_the_same_system() -> None:
+    one = control.tf([1.0, 0.5], [1.0, -1.5, 0.7], 0.1)
+    z = np.exp(0.3j)
+    assert state_space(one)(z) == pytest.approx(one(z))
+    assert transfer_function(state_space(one))(z) == pytest.approx(one(z))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: d2c(control.tf([1.0], [1.0, 0.5], 0.1)),
+        lambda: d2c(plant()),
+        lambda: c2d(plant(0.1), 0.2),
+        lambda: c2d(plant(), 0.0),
+        lambda: reduced(control.tf([1.0], [1.0, -1.0]), 1),
+        lambda: reduced(plant(), 4),
+    ],
+    ids=["negative pole", "continuous", "discrete", "no time", "unstable", "more states"],
+)
+def test_what_cannot_be_is_refused_with_a_remedy(wrong) -> None:
+    with pytest.raises(ConfigError) as caught:
+        wrong()
+    assert caught.value.remedy
