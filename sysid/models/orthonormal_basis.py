@@ -1,4 +1,4 @@
-r"""Ladders: a rational function as a chain of sections of first or second order, tapped between them.
+r"""Orthonormal (Kautz) bases: a rational function as a chain of sections of first or second order, tapped between them.
 
 A transfer function :math:`B/F` with :math:`n_p` poles and :math:`n_z \le n_p` zeros is written
 
@@ -7,7 +7,7 @@ A transfer function :math:`B/F` with :math:`n_p` poles and :math:`n_z \le n_p` z
 
 where the :math:`\psi_k` span exactly the functions with that :math:`F` and a numerator of degree :math:`n_z`. With all
 numerators allowed they are the Takenaka-Malmquist (for pairs of poles: Kautz) functions, orthonormal on the unit circle
-or the imaginary axis: each rung is tapped and handed on through its all-pass :math:`\tilde F_j/F_j` (Ninness and
+or the imaginary axis: each section is tapped and handed on through its all-pass :math:`\tilde F_j/F_j` (Ninness and
 Gustafsson 1997, "A unifying construction of orthonormal bases for system identification"; the basis of the
 Sanathanan-Koerner iterations in Drmač et al. 2015). Fewer zeros are had by handing on through :math:`1/F_j`, untapped,
 at the head of the chain; as many zeros as poles by tapping the input itself.
@@ -40,8 +40,8 @@ class Domain(enum.Enum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rung:
-    """One section of a ladder, with numerators over its own denominator.
+class BasisSection:
+    """One section of a basis, with numerators over its own denominator.
 
     Args:
         denominator: Shape ``(order + 1,)``.
@@ -75,8 +75,8 @@ def section_orders(n_poles: int) -> tuple[int, ...]:
     return (2,) * (n_poles // 2) + (1,) * (n_poles % 2)
 
 
-def rungs(denominators: Sequence[NDArray[np.float64]], n_zeros: int, domain: Domain) -> tuple[Rung, ...]:
-    """The ladder of some sections whose taps span all numerators of a degree.
+def basis_of(denominators: Sequence[NDArray[np.float64]], n_zeros: int, domain: Domain) -> tuple[BasisSection, ...]:
+    """The basis of some sections whose taps span all numerators of a degree.
 
     Args:
         denominators: Of each section: ``[1, c1, c2]`` in powers of ``1/q``, or ``[c0, c1, 1]`` in powers of ``s``.
@@ -84,7 +84,7 @@ def rungs(denominators: Sequence[NDArray[np.float64]], n_zeros: int, domain: Dom
         domain: Which of the two.
 
     Returns:
-        One rung per section; their taps number ``n_zeros + 1``.
+        One section per section; their taps number ``n_zeros + 1``.
 
     Raises:
         ConfigError: If there are more zeros than poles.
@@ -98,7 +98,7 @@ def rungs(denominators: Sequence[NDArray[np.float64]], n_zeros: int, domain: Dom
             got=f"{left} poles and {n_zeros} zeros",
             remedy="lower the number of zeros, or raise the number of poles",
         )
-    ladder = []
+    basis = []
     for denominator in denominators:
         order = len(denominator) - 1
         taps, all_pass = _orthonormal(denominator, domain)
@@ -106,17 +106,17 @@ def rungs(denominators: Sequence[NDArray[np.float64]], n_zeros: int, domain: Dom
         plain = np.zeros(order + 1)
         plain[0] = max(abs(pole_gain), _TINY)
         if wanted <= left - order:
-            rung = Rung(denominator=denominator, taps=np.empty((0, order + 1)), onward=plain)
-        elif wanted > left:  # the first rung: its own denominator as a numerator hands the input through
-            rung = Rung(denominator=denominator, taps=np.vstack([denominator, taps]), onward=all_pass)
+            section = BasisSection(denominator=denominator, taps=np.empty((0, order + 1)), onward=plain)
+        elif wanted > left:  # the first section: its own denominator as a numerator hands the input through
+            section = BasisSection(denominator=denominator, taps=np.vstack([denominator, taps]), onward=all_pass)
         elif wanted == left:
-            rung = Rung(denominator=denominator, taps=taps, onward=all_pass)
+            section = BasisSection(denominator=denominator, taps=taps, onward=all_pass)
         else:
-            rung = Rung(denominator=denominator, taps=plain[np.newaxis], onward=plain)
-        wanted -= len(rung.taps)
+            section = BasisSection(denominator=denominator, taps=plain[np.newaxis], onward=plain)
+        wanted -= len(section.taps)
         left -= order
-        ladder.append(rung)
-    return tuple(ladder)
+        basis.append(section)
+    return tuple(basis)
 
 
 def _orthonormal(d: NDArray[np.float64], domain: Domain) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -140,39 +140,39 @@ def _root(square: float) -> float:
     return float(np.sqrt(max(abs(square), _TINY)))
 
 
-def numerators(ladder: Sequence[Rung]) -> NDArray[np.float64]:
+def numerators(basis: Sequence[BasisSection]) -> NDArray[np.float64]:
     """The numerator of every tap over the whole denominator.
 
     Args:
-        ladder: The rungs.
+        basis: The sections.
 
     Returns:
         Shape ``(n_taps, n_poles + 1)``, ascending powers.
     """
-    n = sum(rung.order for rung in ladder)
+    n = sum(section.order for section in basis)
     rows = []
     before = np.ones(1)
-    for i, rung in enumerate(ladder):
-        after = denominator(ladder[i + 1 :])
-        for tap in rung.taps:
+    for i, section in enumerate(basis):
+        after = denominator(basis[i + 1 :])
+        for tap in section.taps:
             product = np.convolve(np.convolve(before, tap), after)[: n + 1]
             rows.append(np.pad(product, (0, n + 1 - len(product))))
-        before = np.convolve(before, rung.onward)
+        before = np.convolve(before, section.onward)
     return np.array(rows)
 
 
-def denominator(ladder: Sequence[Rung]) -> NDArray[np.float64]:
+def denominator(basis: Sequence[BasisSection]) -> NDArray[np.float64]:
     """The product of the sections' denominators.
 
     Args:
-        ladder: The rungs.
+        basis: The sections.
 
     Returns:
         Shape ``(n_poles + 1,)``, ascending powers.
     """
     product = np.ones(1)
-    for rung in ladder:
-        product = np.convolve(product, rung.denominator)
+    for section in basis:
+        product = np.convolve(product, section.denominator)
     return product
 
 
@@ -189,11 +189,11 @@ def section_poles(d: NDArray[np.float64], domain: Domain) -> NDArray[np.complex1
     return np.asarray(np.roots(d if domain is Domain.DISCRETE else d[::-1]), dtype=np.complex128)
 
 
-def responses(ladder: Sequence[Rung], variable: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def responses(basis: Sequence[BasisSection], variable: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Every tap's value on a grid of ``1/z`` or ``s``.
 
     Args:
-        ladder: The rungs.
+        basis: The sections.
         variable: Shape ``(n_points,)``.
 
     Returns:
@@ -201,9 +201,9 @@ def responses(ladder: Sequence[Rung], variable: NDArray[np.complex128]) -> NDArr
     """
     columns = []
     x = np.ones(len(variable), dtype=np.complex128)
-    for rung in ladder:
-        powers = variable[:, np.newaxis] ** np.arange(rung.order + 1)
-        v = x / (powers @ rung.denominator)
-        columns.append((powers @ rung.taps.T) * v[:, np.newaxis])
-        x = (powers @ rung.onward) * v
+    for section in basis:
+        powers = variable[:, np.newaxis] ** np.arange(section.order + 1)
+        v = x / (powers @ section.denominator)
+        columns.append((powers @ section.taps.T) * v[:, np.newaxis])
+        x = (powers @ section.onward) * v
     return np.concatenate(columns, axis=1)

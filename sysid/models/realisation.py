@@ -1,4 +1,4 @@
-"""State spaces of ladders, and the exact sampling of continuous ones."""
+"""State spaces of bases, and the exact sampling of continuous ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.models.orthonormal_basis import Domain, Rung
+from sysid.models.orthonormal_basis import BasisSection, Domain
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,36 +56,36 @@ class Realisation:
         return np.asarray(linalg.lstsq(matrix, self.B * u)[0])
 
 
-def realise(ladder: Sequence[Rung], domain: Domain) -> Realisation:
-    """A state space of a ladder, in its own domain: section by section, lower block triangular.
+def realise(basis: Sequence[BasisSection], domain: Domain) -> Realisation:
+    """A state space of a basis, in its own domain: section by section, lower block triangular.
 
     The state of a discrete section is its all-pole output one and two samples ago; that of a continuous one is its
     all-pole output, times the natural frequency, and the derivative, so that both are of one size.
 
     Args:
-        ladder: The rungs.
+        basis: The sections.
         domain: Their domain.
 
     Returns:
         The realisation.
     """
-    n = sum(rung.order for rung in ladder)
+    n = sum(section.order for section in basis)
     A, B = np.zeros((n, n)), np.zeros(n)
     C: list[NDArray[np.float64]] = []
     D: list[float] = []
     x_row, x_direct, at = np.zeros(n), 1.0, 0  # the signal handed on, as a combination of state and input
-    for rung in ladder:
-        place = slice(at, at + rung.order)
-        section = _discrete_section(rung) if domain is Domain.DISCRETE else _continuous_section(rung)
-        A[place] = np.outer(section.drive, x_row)
-        A[place, place] += section.matrix
-        B[place] = section.drive * x_direct
-        for numerator in rung.taps:
-            row, direct = section.output(numerator, x_row, x_direct, at)
+    for section in basis:
+        place = slice(at, at + section.order)
+        built = _discrete_section(section) if domain is Domain.DISCRETE else _continuous_section(section)
+        A[place] = np.outer(built.drive, x_row)
+        A[place, place] += built.matrix
+        B[place] = built.drive * x_direct
+        for numerator in section.taps:
+            row, direct = built.output(numerator, x_row, x_direct, at)
             C.append(row)
             D.append(direct)
-        x_row, x_direct = section.output(rung.onward, x_row, x_direct, at)
-        at += rung.order
+        x_row, x_direct = built.output(section.onward, x_row, x_direct, at)
+        at += section.order
     return Realisation(A=A, B=B, C=np.array(C).reshape(-1, n), D=np.array(D))
 
 
@@ -115,17 +115,17 @@ class _Section:
         return row, through * x_direct
 
 
-def _discrete_section(rung: Rung) -> _Section:
-    c = rung.denominator[1:]
+def _discrete_section(section: BasisSection) -> _Section:
+    c = section.denominator[1:]
     n = len(c)
     matrix = np.vstack([-c, np.eye(n)[:-1]])
     powers = np.vstack([-c, np.eye(n)])
     return _Section(matrix=matrix, drive=np.eye(n)[0], powers=powers, direct=np.eye(n + 1)[0])
 
 
-def _continuous_section(rung: Rung) -> _Section:
-    d = rung.denominator
-    if rung.order == 1:
+def _continuous_section(section: BasisSection) -> _Section:
+    d = section.denominator
+    if section.order == 1:
         powers = np.array([[1.0], [-d[0]]])
         return _Section(matrix=np.array([[-d[0]]]), drive=np.ones(1), powers=powers, direct=np.array([0.0, 1.0]))
     w = float(np.sqrt(abs(d[0]))) or 1.0

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import ConfigError, shortened
-from sysid.models import orthonormal_basis as ladders
+from sysid.models import orthonormal_basis as bases
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.lags import MOST, per_input, whole
 from sysid.models.mapping import Mapping
-from sysid.models.orthonormal_basis import Domain, Rung
+from sysid.models.orthonormal_basis import BasisSection, Domain
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
 from sysid.models.realisation import Realisation, realise
@@ -119,7 +119,7 @@ class TransferFunctionModel(AbstractModel):
         orders: The structure, with its dead times.
         sections: For each input the denominators of its sections, ``[1, c1, c2]`` in powers of ``1/q`` or
             ``[c0, c1, 1]`` in powers of ``s``; see :mod:`sysid.models.orthonormal_basis`.
-        taps: For each input the weights of its ladder's taps, in scaled numbers, shapes ``(zeros_j + 1,)``.
+        taps: For each input the weights of its basis's taps, in scaled numbers, shapes ``(zeros_j + 1,)``.
         constant: Scaled output without inputs.
         scaling: Between units and scaled numbers.
         mapping: Which channels go in, which comes out.
@@ -155,16 +155,16 @@ class TransferFunctionModel(AbstractModel):
         """Dead time of each input in samples."""
         return self.orders.delays or (0,) * len(self.orders.poles)
 
-    def ladder(self, j: int) -> tuple[Rung, ...]:
-        """The ladder of one input.
+    def basis(self, j: int) -> tuple[BasisSection, ...]:
+        """The basis of one input.
 
         Args:
             j: Which input.
 
         Returns:
-            Its rungs.
+            Its sections.
         """
-        return ladders.rungs(self.sections[j], self.orders.zeros[j], self.orders.domain)
+        return bases.basis_of(self.sections[j], self.orders.zeros[j], self.orders.domain)
 
     def numerator(self, j: int) -> NDArray[np.float64]:
         """``B`` of one input, from its unit to the output's.
@@ -177,7 +177,7 @@ class TransferFunctionModel(AbstractModel):
             product have fewer correct digits than its factors; the model itself runs on the factors.
         """
         gain = self.scaling.output_scale / self.scaling.input_scale[j]
-        return np.asarray(gain * (self.taps[j] @ ladders.numerators(self.ladder(j))))[: self.orders.zeros[j] + 1]
+        return np.asarray(gain * (self.taps[j] @ bases.numerators(self.basis(j))))[: self.orders.zeros[j] + 1]
 
     def denominator(self, j: int) -> NDArray[np.float64]:
         """``F`` of one input.
@@ -188,7 +188,7 @@ class TransferFunctionModel(AbstractModel):
         Returns:
             Shape ``(poles_j + 1,)``, ascending powers; the first (discrete) or last (continuous) one is 1.
         """
-        return ladders.denominator(self.ladder(j))
+        return bases.denominator(self.basis(j))
 
     def poles(self, j: int) -> NDArray[np.complex128]:
         """Poles of one input, in the z or the s plane.
@@ -199,7 +199,7 @@ class TransferFunctionModel(AbstractModel):
         Returns:
             Shape ``(poles_j,)``.
         """
-        return np.concatenate([ladders.section_poles(d, self.orders.domain) for d in self.sections[j]])
+        return np.concatenate([bases.section_poles(d, self.orders.domain) for d in self.sections[j]])
 
     def zeros(self, j: int) -> NDArray[np.complex128]:
         """Zeros of one input, in the z or the s plane, those at infinity (or z = 0) left out.
@@ -250,11 +250,11 @@ class TransferFunctionModel(AbstractModel):
         variable = np.asarray(np.exp(-s * self.sample_time) if discrete else s, dtype=np.complex128)
         gain = self.scaling.output_scale / self.scaling.input_scale[j]
         dead = np.exp(-s * self.sample_time * self.delays[j])
-        return np.asarray(gain * dead * (ladders.responses(self.ladder(j), variable) @ self.taps[j]))
+        return np.asarray(gain * dead * (bases.responses(self.basis(j), variable) @ self.taps[j]))
 
     @cached_property
     def recursion(self) -> StateSpace:
-        """The state space that is run and exported: block by block, each input's dead time, then its ladder."""
+        """The state space that is run and exported: block by block, each input's dead time, then its basis."""
         parts = [self._block(j) for j in range(len(self.sections))]
         B = np.zeros((sum(len(part.A) for part in parts), len(parts)))
         at = 0
@@ -271,8 +271,8 @@ class TransferFunctionModel(AbstractModel):
         )
 
     def _block(self, j: int) -> Realisation:
-        """One input's dead time and ladder, with the weighted taps as its output."""
-        part = realise(self.ladder(j), self.orders.domain)
+        """One input's dead time and basis, with the weighted taps as its output."""
+        part = realise(self.basis(j), self.orders.domain)
         if self.orders.domain is Domain.CONTINUOUS:
             part = part.sampled(self.sample_time)
         row, direct = self.taps[j] @ part.C, float(self.taps[j] @ part.D)

@@ -96,8 +96,8 @@ def gradient() -> None:
         raise RuntimeError("the benchmark's model runs away")
     columns, weights = solution.columns[0], solution.weights[:-1]
     passes = POLES  # two inputs, a section of second order for every two poles
-    output = median(lambda _: record.columns(solution.ladders), 21) / passes
-    tangents = median(lambda _: record.tangents(solution.ladders, columns, weights), 21) / passes
+    output = median(lambda _: record.columns(solution.bases), 21) / passes
+    tangents = median(lambda _: record.tangents(solution.bases, columns, weights), 21) / passes
     scipy = median(lambda _: lfilter([1.0], [1.0, -0.5, 0.2], u[:, 0]), 101)
     note = f"output {1e6 * output:.0f}, gradient {1e6 * tangents:.0f}, lfilter {1e6 * scipy:.0f} µs a pass"
     found("gradient, divided by SciPy's lfilter, per filter pass", tangents / scipy, "x", target=2.0, note=note)

@@ -23,7 +23,7 @@ from sysid.models import (
     simulate_family,
 )
 from sysid.models.cascade_batch import MIN_LANES
-from sysid.models.orthonormal_basis import numerators, rungs
+from sysid.models.orthonormal_basis import basis_of, numerators
 from sysid.testing import simulate_cascade
 from sysid.traces import Channel, Trace
 from tests.models.cascades import CASCADES, block, command, linear, network, service
@@ -199,7 +199,7 @@ class TestLimits:
 def lag(text: str) -> TransferFunctionModel:
     """A first-order lag of gain 1 as a transfer function: a model with a state of its own."""
     section = (np.array([1.0, -0.8]),)
-    table = numerators(rungs(section, 0, Domain.DISCRETE))[:, :1]
+    table = numerators(basis_of(section, 0, Domain.DISCRETE))[:, :1]
     return TransferFunctionModel(
         orders=TransferFunction(poles=(1,), zeros=(0,), delays=(0,)),
         sections=(section,),

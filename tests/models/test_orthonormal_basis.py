@@ -1,4 +1,4 @@
-"""Ladders: they span the right functions, are orthonormal, and are realised exactly."""
+"""Bases: they span the right functions, are orthonormal, and are realised exactly."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from scipy import signal
 from sysid.errors import ConfigError
 from sysid.models.orthonormal_basis import (
     Domain,
+    basis_of,
     denominator,
     numerators,
     responses,
-    rungs,
     section_orders,
     section_poles,
 )
@@ -42,7 +42,7 @@ shapes = st.integers(1, 7).flatmap(lambda n: st.tuples(st.just(n), st.integers(0
 @given(shape=shapes, seed=st.integers(0, 1000))
 def test_taps_span_all_numerators_of_their_degree(domain: Domain, shape: tuple[int, int], seed: int) -> None:
     n_poles, n_zeros = shape
-    table = numerators(rungs(sections(n_poles, domain, seed), n_zeros, domain))
+    table = numerators(basis_of(sections(n_poles, domain, seed), n_zeros, domain))
     assert table.shape == (n_zeros + 1, n_poles + 1)
     np.testing.assert_array_equal(table[:, n_zeros + 1 :], 0.0)
     assert np.linalg.matrix_rank(table, tol=1e-9 * np.abs(table).max()) == n_zeros + 1
@@ -51,42 +51,42 @@ def test_taps_span_all_numerators_of_their_degree(domain: Domain, shape: tuple[i
 @DOMAINS
 @given(shape=shapes, seed=st.integers(0, 1000))
 def test_responses_are_the_polynomials(domain: Domain, shape: tuple[int, int], seed: int) -> None:
-    ladder = rungs(sections(shape[0], domain, seed), shape[1], domain)
+    basis = basis_of(sections(shape[0], domain, seed), shape[1], domain)
     w = np.linspace(0.05, 3.0, 20)
     x = np.exp(-1j * w) if domain is Domain.DISCRETE else 1j * w
     powers = x[:, None] ** np.arange(shape[0] + 1)
-    expected = (powers @ numerators(ladder).T) / (powers @ denominator(ladder))[:, None]
-    np.testing.assert_allclose(responses(ladder, x), expected, rtol=1e-6, atol=1e-9)
+    expected = (powers @ numerators(basis).T) / (powers @ denominator(basis))[:, None]
+    np.testing.assert_allclose(responses(basis, x), expected, rtol=1e-6, atol=1e-9)
 
 
 @DOMAINS
 @given(shape=shapes, seed=st.integers(0, 1000))
 def test_realisations_have_that_response(domain: Domain, shape: tuple[int, int], seed: int) -> None:
-    ladder = rungs(sections(shape[0], domain, seed), shape[1], domain)
-    system = realise(ladder, domain)
+    basis = basis_of(sections(shape[0], domain, seed), shape[1], domain)
+    system = realise(basis, domain)
     w = np.linspace(0.05, 3.0, 20)
     z = np.exp(1j * w) if domain is Domain.DISCRETE else 1j * w
     found = np.array([system.C @ np.linalg.solve(p * np.eye(shape[0]) - system.A, system.B) + system.D for p in z])
     x = 1.0 / z if domain is Domain.DISCRETE else z
-    np.testing.assert_allclose(found, responses(ladder, x), rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(found, responses(basis, x), rtol=1e-7, atol=1e-9)
 
 
-def test_full_ladders_are_orthonormal_on_the_unit_circle() -> None:
-    ladder = rungs(sections(9, Domain.DISCRETE, 3), 8, Domain.DISCRETE)
+def test_full_bases_are_orthonormal_on_the_unit_circle() -> None:
+    basis = basis_of(sections(9, Domain.DISCRETE, 3), 8, Domain.DISCRETE)
     grid = np.exp(-2j * np.pi * np.arange(4096) / 4096)
-    table = responses(ladder, grid)
+    table = responses(basis, grid)
     np.testing.assert_allclose(table.conj().T @ table / 4096, np.eye(9), atol=1e-9)
 
 
-def test_full_ladders_are_orthogonal_on_the_imaginary_axis() -> None:
-    ladder = rungs(sections(5, Domain.CONTINUOUS, 3), 4, Domain.CONTINUOUS)
+def test_full_bases_are_orthogonal_on_the_imaginary_axis() -> None:
+    basis = basis_of(sections(5, Domain.CONTINUOUS, 3), 4, Domain.CONTINUOUS)
     w = np.tan(np.pi * (np.arange(200_000) + 0.5) / 200_000 - np.pi / 2)
-    table = responses(ladder, 1j * w) * np.sqrt((1 + w**2) * np.pi / 200_000 / (2 * np.pi))[:, None]
+    table = responses(basis, 1j * w) * np.sqrt((1 + w**2) * np.pi / 200_000 / (2 * np.pi))[:, None]
     np.testing.assert_allclose(table.conj().T @ table, np.eye(5), atol=1e-4)
 
 
 def test_sampling_is_that_of_scipy() -> None:
-    system = realise(rungs(sections(5, Domain.CONTINUOUS, 1), 4, Domain.CONTINUOUS), Domain.CONTINUOUS)
+    system = realise(basis_of(sections(5, Domain.CONTINUOUS, 1), 4, Domain.CONTINUOUS), Domain.CONTINUOUS)
     ours = system.sampled(0.2)
     A, B, *_ = signal.cont2discrete((system.A, system.B[:, None], system.C, system.D[:, None]), 0.2, "zoh")
     np.testing.assert_allclose(ours.A, A, atol=1e-12)
@@ -97,14 +97,14 @@ def test_twenty_poles_near_one_keep_their_places() -> None:
     """A product polynomial of these has lost them: its roots lie outside the circle."""
     radii = np.linspace(0.95, 0.98, 10)
     made = [np.array([1.0, -2 * r * np.cos(0.02), r * r]) for r in radii]
-    ladder = rungs(made, 19, Domain.DISCRETE)
-    exact = np.array([abs(section_poles(rung.denominator, Domain.DISCRETE)[0]) for rung in ladder])
+    basis = basis_of(made, 19, Domain.DISCRETE)
+    exact = np.array([abs(section_poles(section.denominator, Domain.DISCRETE)[0]) for section in basis])
     np.testing.assert_allclose(exact, radii, rtol=1e-9)
-    assert np.abs(np.roots(denominator(ladder))).max() > 1.0
-    assert np.isfinite(realise(ladder, Domain.DISCRETE).C).all()
+    assert np.abs(np.roots(denominator(basis))).max() > 1.0
+    assert np.isfinite(realise(basis, Domain.DISCRETE).C).all()
 
 
 @pytest.mark.parametrize("n_zeros", [-1, 3, 5])
 def test_more_zeros_than_poles_are_refused(n_zeros: int) -> None:
     with pytest.raises(ConfigError, match="no more zeros"):
-        rungs(sections(2, Domain.DISCRETE, 0), n_zeros, Domain.DISCRETE)
+        basis_of(sections(2, Domain.DISCRETE, 0), n_zeros, Domain.DISCRETE)

@@ -11,7 +11,7 @@ from scipy import linalg, signal
 
 from sysid.errors import ConfigError, TraceError
 from sysid.models import ARX, ARXModel, Domain, History, Mapping, Scaling, TransferFunction, model_from_dict
-from sysid.models.orthonormal_basis import numerators, rungs
+from sysid.models.orthonormal_basis import basis_of, numerators
 from sysid.models.to_control import state_space
 from sysid.models.transfer_function import TransferFunctionModel
 
@@ -27,7 +27,7 @@ def build(
     taps, sections = [], []
     for num, den in zip(b, f, strict=True):
         section = (np.array(den),)
-        table = numerators(rungs(section, len(num) - 1, domain))[:, : len(num)]
+        table = numerators(basis_of(section, len(num) - 1, domain))[:, : len(num)]
         taps.append(np.linalg.solve(table.T, np.array(num)))
         sections.append(section)
     return TransferFunctionModel(

@@ -17,7 +17,7 @@ from sysid.estimation.linear.refined_iv import refined_sections
 from sysid.estimation.linear.regression import solve
 from sysid.estimation.linear.sanathanan_koerner import sk_poles
 from sysid.estimation.linear.variable_projection import Sections
-from sysid.models.orthonormal_basis import Domain, rungs
+from sysid.models.orthonormal_basis import Domain, basis_of
 from sysid.models.realisation import realise
 
 LONGEST_ARX = 40
@@ -227,13 +227,13 @@ def _padded(poles: NDArray[np.complex128], n: int) -> NDArray[np.complex128]:
 def _balanced(model: LongArx, j: int, n: int) -> NDArray[np.complex128]:
     """Poles of one input's response reduced to ``n`` states by balanced truncation (Moore 1981).
 
-    The Gramians are those of the long model in the ladder of its own poles, which is nearly orthonormal.
+    The Gramians are those of the long model in the basis of its own poles, which is nearly orthonormal.
     """
     poles = model.poles
     if n >= len(poles):
         return _padded(poles, n)
     sections = sections_of(poles, Domain.DISCRETE)
-    system = realise(rungs(sections, len(poles) - 1, Domain.DISCRETE), Domain.DISCRETE)
+    system = realise(basis_of(sections, len(poles) - 1, Domain.DISCRETE), Domain.DISCRETE)
     grid = np.linspace(0.0, np.pi, 4 * len(poles) + 1)[1:]
     wanted = _response(model, j, grid)
     z = np.exp(1j * grid)

@@ -1,6 +1,6 @@
 r"""Records that a transfer function is fitted to, in the time or the frequency domain.
 
-A record turns the ladders of all inputs into columns, and the model's output is linear in them. The derivative of an
+A record turns the bases of all inputs into columns, and the model's output is linear in them. The derivative of an
 output :math:`y_j = B/F\,u_j` with respect to the denominator of section :math:`i`, at a fixed numerator, is one more
 pass through that section alone,
 
@@ -21,11 +21,11 @@ from scipy import linalg
 
 from sysid.estimation.linear.predictor import MirroredPredictor
 from sysid.kernels import linear as kernel
-from sysid.models.orthonormal_basis import Domain, Rung, responses, rungs
+from sysid.models.orthonormal_basis import BasisSection, Domain, basis_of, responses
 from sysid.models.realisation import Realisation, realise
 
-Ladders = tuple[tuple[Rung, ...], ...]
-"""The ladder of each input."""
+Bases = tuple[tuple[BasisSection, ...], ...]
+"""The basis of each input."""
 
 
 class AbstractRecord(ABC):
@@ -37,32 +37,32 @@ class AbstractRecord(ABC):
     """Square root of each row's weight, shape ``(n_rows,)``."""
 
     @abstractmethod
-    def private(self, ladders: Ladders) -> int:
+    def private(self, bases: Bases) -> int:
         """Number of columns that belong to this record alone, such as its initial state.
 
         Args:
-            ladders: One per input.
+            bases: One per input.
 
         Returns:
             The number.
         """
 
     @abstractmethod
-    def columns(self, ladders: Ladders) -> NDArray[np.float64]:
+    def columns(self, bases: Bases) -> NDArray[np.float64]:
         """Every tap of every input, then the record's own columns.
 
         Args:
-            ladders: One per input.
+            bases: One per input.
 
         Returns:
             Shape ``(n_rows, n_taps_of_all + n_private)``, unweighted.
         """
 
-    def predictor(self, ladders: Ladders) -> MirroredPredictor | None:  # noqa: ARG002 - asked of records over time
+    def predictor(self, bases: Bases) -> MirroredPredictor | None:  # noqa: ARG002 - asked of records over time
         """Through what the errors are computed where poles are so unstable that a free run is lost.
 
         Args:
-            ladders: One per input.
+            bases: One per input.
 
         Returns:
             The predictor; ``None`` where errors are those of the free run.
@@ -70,13 +70,11 @@ class AbstractRecord(ABC):
         return None
 
     @abstractmethod
-    def tangents(
-        self, ladders: Ladders, columns: NDArray[np.float64], weights: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def tangents(self, bases: Bases, columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives of the output with respect to the sections' coefficients, at fixed numerators.
 
         Args:
-            ladders: One per input.
+            bases: One per input.
             columns: From :meth:`columns`.
             weights: What the columns are multiplied with, shape ``(n_taps_of_all + n_private,)``.
 
@@ -85,32 +83,32 @@ class AbstractRecord(ABC):
         """
 
 
-def full(ladders: Ladders, domain: Domain) -> Ladders:
+def full(bases: Bases, domain: Domain) -> Bases:
     """The same sections with all numerators below the number of poles: the space of free responses.
 
     Args:
-        ladders: One per input.
+        bases: One per input.
         domain: Their domain.
 
     Returns:
-        One ladder per input.
+        One basis per input.
     """
     return tuple(
-        rungs([rung.denominator for rung in ladder], sum(rung.order for rung in ladder) - 1, domain)
-        for ladder in ladders
+        basis_of([section.denominator for section in basis], sum(section.order for section in basis) - 1, domain)
+        for basis in bases
     )
 
 
-def tap_slices(ladders: Ladders) -> list[slice]:
+def tap_slices(bases: Bases) -> list[slice]:
     """Where each input's taps stand among all columns.
 
     Args:
-        ladders: One per input.
+        bases: One per input.
 
     Returns:
         One slice per input.
     """
-    ends = np.cumsum([sum(len(rung.taps) for rung in ladder) for ladder in ladders])
+    ends = np.cumsum([sum(len(section.taps) for section in basis) for basis in bases])
     return [slice(int(end - n), int(end)) for end, n in zip(ends, np.diff([0, *ends]), strict=True)]
 
 
@@ -123,8 +121,8 @@ class TimeRecord(AbstractRecord):
         past: Value that each input has had for ever before, shape ``(n_inputs,)``.
         target: Measured output, shape ``(n_rows,)``.
         root_weights: Square root of each sample's weight, shape ``(n_rows,)``.
-        domain: Of the ladders.
-        sample_time: Seconds; used for continuous ladders.
+        domain: Of the bases.
+        sample_time: Seconds; used for continuous bases.
         free_start: Whether the state before the first row is fitted, rather than the equilibrium at ``past``.
     """
 
@@ -136,11 +134,11 @@ class TimeRecord(AbstractRecord):
     sample_time: float
     free_start: bool
 
-    def predictor(self, ladders: Ladders) -> MirroredPredictor | None:
+    def predictor(self, bases: Bases) -> MirroredPredictor | None:
         """From a fitted initial state alone; see the base class."""
         if not self.free_start:
             return None
-        systems = [realise(ladder, self.domain) for ladder in ladders]
+        systems = [realise(basis, self.domain) for basis in bases]
         if self.domain is Domain.CONTINUOUS:
             rates = max((float(np.abs(system.A).max(initial=0.0)) for system in systems), default=0.0)
             if not rates * self.sample_time <= _FASTEST:
@@ -150,43 +148,41 @@ class TimeRecord(AbstractRecord):
             return None
         return MirroredPredictor.of(systems, len(self.target))
 
-    def private(self, ladders: Ladders) -> int:
+    def private(self, bases: Bases) -> int:
         """The initial state, if it is fitted; see the base class."""
-        return sum(rung.order for ladder in ladders for rung in ladder) if self.free_start else 0
+        return sum(section.order for basis in bases for section in basis) if self.free_start else 0
 
-    def columns(self, ladders: Ladders) -> NDArray[np.float64]:
+    def columns(self, bases: Bases) -> NDArray[np.float64]:
         """Responses to the inputs, then to a pulse before the record; see the base class."""
-        through = self.predictor(ladders)
+        through = self.predictor(bases)
         if through is not None:
-            found = [through.responses(j, self.inputs[:, j]) for j in range(len(ladders))]
+            found = [through.responses(j, self.inputs[:, j]) for j in range(len(bases))]
             return np.concatenate([*found, through.beginnings()], axis=1)
-        parts = [self._pass(ladder, self.inputs[:, j], self.past[j]) for j, ladder in enumerate(ladders)]
+        parts = [self._pass(basis, self.inputs[:, j], self.past[j]) for j, basis in enumerate(bases)]
         if self.free_start:
             pulse = self._pulse()
-            parts += [self._pass(ladder, pulse, 0.0)[-len(self.target) :] for ladder in full(ladders, self.domain)]
+            parts += [self._pass(basis, pulse, 0.0)[-len(self.target) :] for basis in full(bases, self.domain)]
         return np.concatenate(parts, axis=1)
 
-    def tangents(
-        self, ladders: Ladders, columns: NDArray[np.float64], weights: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def tangents(self, bases: Bases, columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """One more pass through each section; see the base class."""
         parts = []
-        own = tap_slices(ladders)
-        free = tap_slices(full(ladders, self.domain)) if self.free_start else []
+        own = tap_slices(bases)
+        free = tap_slices(full(bases, self.domain)) if self.free_start else []
         shared = own[-1].stop
-        for j, ladder in enumerate(ladders):
+        for j, basis in enumerate(bases):
             if self.domain is Domain.DISCRETE:
                 y = columns[:, own[j]] @ weights[own[j]]
-                past = float(_static_taps(ladder, self.past[j]) @ weights[own[j]])
+                past = float(_static_taps(basis, self.past[j]) @ weights[own[j]])
                 if free:
                     at = slice(shared + free[j].start, shared + free[j].stop)
                     y = y + columns[:, at] @ weights[at]
-                parts.append(_discrete_tangents(ladder, y, past))
+                parts.append(_discrete_tangents(basis, y, past))
             else:
-                part = self._continuous_tangents(ladder, self.inputs[:, j], self.past[j], weights[own[j]])
+                part = self._continuous_tangents(basis, self.inputs[:, j], self.past[j], weights[own[j]])
                 if free:
                     at = slice(shared + free[j].start, shared + free[j].stop)
-                    begun = self._continuous_tangents(full((ladder,), self.domain)[0], self._pulse(), 0.0, weights[at])
+                    begun = self._continuous_tangents(full((basis,), self.domain)[0], self._pulse(), 0.0, weights[at])
                     part = part + begun[-len(self.target) :]
                 parts.append(part)
         return np.concatenate(parts, axis=1)
@@ -195,17 +191,17 @@ class TimeRecord(AbstractRecord):
         """A pulse that leaves any state behind: in the first row, or before it where the output takes a sample."""
         return np.eye(len(self.target) + (self.domain is Domain.CONTINUOUS), 1)[:, 0]
 
-    def _pass(self, ladder: tuple[Rung, ...], x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+    def _pass(self, basis: tuple[BasisSection, ...], x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
         if self.domain is Domain.DISCRETE:
-            return _discrete_columns(ladder, x, past)
-        return _run_sampled(realise(ladder, self.domain), self.sample_time, x, past)
+            return _discrete_columns(basis, x, past)
+        return _run_sampled(realise(basis, self.domain), self.sample_time, x, past)
 
     def _continuous_tangents(
-        self, ladder: tuple[Rung, ...], x: NDArray[np.float64], past: float, weights: NDArray[np.float64]
+        self, basis: tuple[BasisSection, ...], x: NDArray[np.float64], past: float, weights: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """The ladder with every section once more behind its output, sampled as one system."""
-        main = realise(ladder, self.domain)
-        again = [realise((_bare(rung),), self.domain) for rung in ladder]
+        """The basis with every section once more behind its output, sampled as one system."""
+        main = realise(basis, self.domain)
+        again = [realise((_bare(section),), self.domain) for section in basis]
         n = len(main.A)
         A = linalg.block_diag(main.A, *(part.A for part in again))
         B = np.concatenate([main.B, np.zeros(n)])
@@ -220,10 +216,10 @@ class TimeRecord(AbstractRecord):
         return _run_sampled(whole, self.sample_time, x, past)
 
 
-def _bare(rung: Rung) -> Rung:
+def _bare(section: BasisSection) -> BasisSection:
     """The section alone, tapped at ``s`` and 1 over its denominator, the coefficients ``c1`` and ``c0``."""
-    taps = np.array([[1.0, 0.0]]) if rung.order == 1 else np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-    return Rung(denominator=rung.denominator, taps=taps, onward=np.eye(rung.order + 1)[0])
+    taps = np.array([[1.0, 0.0]]) if section.order == 1 else np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    return BasisSection(denominator=section.denominator, taps=taps, onward=np.eye(section.order + 1)[0])
 
 
 _FASTEST = 1e8
@@ -244,34 +240,34 @@ def _run_sampled(system: Realisation, sample_time: float, x: NDArray[np.float64]
     return y
 
 
-def _coefficients(rung: Rung) -> tuple[float, float]:
-    d = rung.denominator
+def _coefficients(section: BasisSection) -> tuple[float, float]:
+    d = section.denominator
     return float(d[1]), float(d[2]) if len(d) == 3 else 0.0
 
 
-def _discrete_columns(ladder: Sequence[Rung], x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+def _discrete_columns(basis: Sequence[BasisSection], x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
     n = len(x)
-    columns = np.empty((n, sum(len(rung.taps) for rung in ladder)), order="F")
+    columns = np.empty((n, sum(len(section.taps) for section in basis)), order="F")
     x = np.ascontiguousarray(x)
     v = np.empty(n + 2)
     at = 0
-    for i, rung in enumerate(ladder):
-        before = _held(past, rung)
+    for i, section in enumerate(basis):
+        before = _held(past, section)
         v[:2] = before
-        kernel.all_pole(x, *_coefficients(rung), before, v[2:])
+        kernel.all_pole(x, *_coefficients(section), before, v[2:])
         delayed = (v[2:], v[1:-1], v[:-2])
-        for numerator in rung.taps:
+        for numerator in section.taps:
             columns[:, at] = _combined(numerator, delayed)
             at += 1
-        if i + 1 < len(ladder):
-            x = _combined(rung.onward, delayed)
-            past = before * float(rung.onward.sum())
+        if i + 1 < len(basis):
+            x = _combined(section.onward, delayed)
+            past = before * float(section.onward.sum())
     return columns
 
 
-def _held(past: float, rung: Rung) -> float:
+def _held(past: float, section: BasisSection) -> float:
     """A section's all-pole output while its input is held; zero for no input, also where the section integrates."""
-    return past / float(rung.denominator.sum()) if past != 0.0 else 0.0
+    return past / float(section.denominator.sum()) if past != 0.0 else 0.0
 
 
 def _combined(numerator: NDArray[np.float64], delayed: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
@@ -282,27 +278,27 @@ def _combined(numerator: NDArray[np.float64], delayed: tuple[NDArray[np.float64]
     return result
 
 
-def _static_taps(ladder: Sequence[Rung], past: float) -> NDArray[np.float64]:
+def _static_taps(basis: Sequence[BasisSection], past: float) -> NDArray[np.float64]:
     """Every tap while the input is held."""
     values: list[float] = []
-    for rung in ladder:
-        v = _held(past, rung)
-        values += [v * float(numerator.sum()) for numerator in rung.taps]
-        past = v * float(rung.onward.sum())
+    for section in basis:
+        v = _held(past, section)
+        values += [v * float(numerator.sum()) for numerator in section.taps]
+        past = v * float(section.onward.sum())
     return np.array(values)
 
 
-def _discrete_tangents(ladder: Sequence[Rung], y: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+def _discrete_tangents(basis: Sequence[BasisSection], y: NDArray[np.float64], past: float) -> NDArray[np.float64]:
     n = len(y)
-    result = np.empty((n, sum(rung.order for rung in ladder)), order="F")
+    result = np.empty((n, sum(section.order for section in basis)), order="F")
     y = np.ascontiguousarray(-y)
     v = np.empty(n + 2)
     at = 0
-    for rung in ladder:
-        before = -_held(past, rung)
+    for section in basis:
+        before = -_held(past, section)
         v[:2] = before
-        kernel.all_pole(y, *_coefficients(rung), before, v[2:])
-        for lag in range(1, rung.order + 1):
+        kernel.all_pole(y, *_coefficients(section), before, v[2:])
+        for lag in range(1, section.order + 1):
             result[:, at] = v[2 - lag : n + 2 - lag]
             at += 1
     return result
@@ -317,7 +313,7 @@ class SpectralRecord(AbstractRecord):
         variable: ``1/z`` or ``s`` at each point, shape ``(n_points,)``.
         target: Output spectrum, real then imaginary parts, shape ``(2 n_points,)``.
         root_weights: Square root of each row's weight, shape ``(2 n_points,)``.
-        domain: Of the ladders.
+        domain: Of the bases.
     """
 
     inputs: NDArray[np.complex128]
@@ -326,33 +322,31 @@ class SpectralRecord(AbstractRecord):
     root_weights: NDArray[np.float64]
     domain: Domain
 
-    def private(self, ladders: Ladders) -> int:  # noqa: ARG002 - spectra are those of a steady state
+    def private(self, bases: Bases) -> int:  # noqa: ARG002 - spectra are those of a steady state
         """None; see the base class."""
         return 0
 
-    def columns(self, ladders: Ladders) -> NDArray[np.float64]:
+    def columns(self, bases: Bases) -> NDArray[np.float64]:
         """Frequency responses of the taps; see the base class."""
-        return _stacked(np.concatenate([self._taps(j, ladder) for j, ladder in enumerate(ladders)], axis=1))
+        return _stacked(np.concatenate([self._taps(j, basis) for j, basis in enumerate(bases)], axis=1))
 
-    def tangents(
-        self, ladders: Ladders, columns: NDArray[np.float64], weights: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def tangents(self, bases: Bases, columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """One more factor per section; see the base class."""
         parts = []
         n = len(self.variable)
-        for ladder, at in zip(ladders, tap_slices(ladders), strict=True):
+        for basis, at in zip(bases, tap_slices(bases), strict=True):
             y = columns[:, at] @ weights[at]
             complex_y = y[:n] + 1j * y[n:]
-            for rung in ladder:
-                powers = self.variable[:, np.newaxis] ** np.arange(rung.order + 1)
-                v = -complex_y / (powers @ rung.denominator)
+            for section in basis:
+                powers = self.variable[:, np.newaxis] ** np.arange(section.order + 1)
+                v = -complex_y / (powers @ section.denominator)
                 discrete = self.domain is Domain.DISCRETE
-                chosen = range(1, rung.order + 1) if discrete else range(rung.order - 1, -1, -1)
+                chosen = range(1, section.order + 1) if discrete else range(section.order - 1, -1, -1)
                 parts += [v * powers[:, k] for k in chosen]
         return _stacked(np.column_stack(parts))
 
-    def _taps(self, j: int, ladder: tuple[Rung, ...]) -> NDArray[np.complex128]:
-        return responses(ladder, self.variable) * self.inputs[:, j : j + 1]
+    def _taps(self, j: int, basis: tuple[BasisSection, ...]) -> NDArray[np.complex128]:
+        return responses(basis, self.variable) * self.inputs[:, j : j + 1]
 
 
 def _stacked(table: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 r"""Refined instrumental variables: poles from records over time, discrete or continuous (SRIV, SRIVC).
 
-With the ladder of the poles found before, :math:`A/\hat A = 1 + d^T x` and
+With the basis of the poles found before, :math:`A/\hat A = 1 + d^T x` and
 :math:`B/\hat A = \sum_k n_k \psi_k`, so that
 
 .. math:: y + d^T x(y) = \sum_k n_k \psi_k(u)
@@ -26,7 +26,7 @@ from sysid.estimation.linear.poles import sections_of, stabilised
 from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.kernels import linear as kernel
-from sysid.models.orthonormal_basis import Domain, rungs
+from sysid.models.orthonormal_basis import Domain, basis_of
 from sysid.models.realisation import realise
 
 PLAIN_ITERATIONS = 3
@@ -51,7 +51,7 @@ def refined_poles(
     poles = stabilised(start, domain)
     for iteration in range(iterations):
         sections = sections_of(poles, domain)
-        ladder = realise(rungs(sections, n - 1, domain), domain)
+        basis = realise(basis_of(sections, n - 1, domain), domain)
         rows = [_rows(record, sections, n_zeros) for record in records]
         X, y = np.concatenate([row[0] for row in rows]), np.concatenate([row[1] for row in rows])
         Z = X
@@ -63,7 +63,7 @@ def refined_poles(
         span = linalg.qr(Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300), mode="economic")[0]
         solution = linalg.lstsq(span.T @ (X / scale), span.T @ y, cond=1e-12)[0] / scale
         following = stabilised(
-            np.asarray(linalg.eigvals(ladder.A - np.outer(ladder.B, solution[:n])), dtype=np.complex128), domain
+            np.asarray(linalg.eigvals(basis.A - np.outer(basis.B, solution[:n])), dtype=np.complex128), domain
         )
         moved = np.abs(np.sort_complex(following) - np.sort_complex(poles)).max()
         poles = following
@@ -76,10 +76,10 @@ def _rows(
     record: TimeRecord, sections: tuple[NDArray[np.float64], ...], n_zeros: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Regressors ``[-x(y) | taps(u) | 1]`` and target of one record, weighted."""
-    ladder = rungs(sections, n_zeros, record.domain)
+    basis = basis_of(sections, n_zeros, record.domain)
     level = record.target[0]
     states = _states(sections, record.target - level, record)
-    taps = record.columns((ladder,))[:, : n_zeros + 1]
+    taps = record.columns((basis,))[:, : n_zeros + 1]
     root = record.root_weights[:, np.newaxis]
     table = np.column_stack([-states, taps, np.ones(len(states))]) * root
     return table, (record.target - level) * record.root_weights
@@ -88,9 +88,9 @@ def _rows(
 def _states(
     sections: tuple[NDArray[np.float64], ...], signal: NDArray[np.float64], record: TimeRecord
 ) -> NDArray[np.float64]:
-    """The ladder's state driven by a sampled signal that begins at zero."""
+    """The basis's state driven by a sampled signal that begins at zero."""
     n = sum(len(d) - 1 for d in sections)
-    system = realise(rungs(sections, n - 1, record.domain), record.domain)
+    system = realise(basis_of(sections, n - 1, record.domain), record.domain)
     A, B, D = system.A, system.B, np.zeros(n)
     if record.domain is Domain.CONTINUOUS:
         A, B, D = _linear_between(A, B, record.sample_time)
@@ -114,8 +114,8 @@ def _linear_between(
 
 def _noise_free(record: TimeRecord, sections: tuple[NDArray[np.float64], ...], n_zeros: int) -> TimeRecord:
     """The record with the output of the best model with these poles."""
-    ladder = rungs(sections, n_zeros, record.domain)
-    taps = np.column_stack([record.columns((ladder,))[:, : n_zeros + 1], np.ones(len(record.target))])
+    basis = basis_of(sections, n_zeros, record.domain)
+    taps = np.column_stack([record.columns((basis,))[:, : n_zeros + 1], np.ones(len(record.target))])
     root = record.root_weights
     weights = linalg.lstsq(taps * root[:, np.newaxis], record.target * root, cond=1e-12)[0]
     return _with_target(record, taps @ weights)
@@ -159,9 +159,9 @@ def refined_sections(
 
 def _left_for(record: TimeRecord, j: int, sections: Sections, n_zeros: tuple[int, ...]) -> TimeRecord:
     """What the other inputs, with their poles as they are, leave of the output for one."""
-    ladders = tuple(rungs(part, zeros, record.domain) for part, zeros in zip(sections, n_zeros, strict=True))
+    bases = tuple(basis_of(part, zeros, record.domain) for part, zeros in zip(sections, n_zeros, strict=True))
     ends = np.cumsum([zeros + 1 for zeros in n_zeros])
-    columns = record.columns(ladders)[:, : ends[-1]]
+    columns = record.columns(bases)[:, : ends[-1]]
     table = np.column_stack([columns, np.ones(len(columns))]) * record.root_weights[:, np.newaxis]
     weights = linalg.lstsq(table, record.target * record.root_weights, cond=1e-12)[0][:-1]
     weights[ends[j] - n_zeros[j] - 1 : ends[j]] = 0.0

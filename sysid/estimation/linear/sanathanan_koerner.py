@@ -1,7 +1,7 @@
 r"""Sanathanan-Koerner iterations: poles from frequency responses or spectra by a sequence of linear problems.
 
 Each iteration solves :math:`\min \sum_k w_k^2 |(D\,y - \sum_j N_j u_j) / D_{m-1}|^2` (Sanathanan and Koerner 1963),
-with :math:`D/D_{m-1} = 1 + \sum_k d_k x_k` and :math:`N_j/D_{m-1}` in the orthonormal ladder of the poles found before
+with :math:`D/D_{m-1} = 1 + \sum_k d_k x_k` and :math:`N_j/D_{m-1}` in the orthonormal basis of the poles found before
 (Drmač, Gugercin and Beattie 2015, "Vector fitting for matrix-valued rational approximation"): the monomials of a
 denominator of degree 20 would be numerically dependent. The new poles are the zeros of :math:`1 + d^T x`, eigenvalues
 of :math:`A - B d^T`.
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.linear.poles import sections_of, stabilised
-from sysid.models.orthonormal_basis import Domain, responses, rungs
+from sysid.models.orthonormal_basis import Domain, basis_of, responses
 from sysid.models.realisation import realise
 
 MAX_ITERATIONS = 20
@@ -53,17 +53,17 @@ def sk_poles(
     poles = start
     for _ in range(iterations):
         sections = sections_of(stabilised(poles, domain), domain)
-        ladder = rungs(sections, len(start) - 1, domain)
+        basis = basis_of(sections, len(start) - 1, domain)
         states = state_responses(sections, variable, domain)
         blocks = [-states * output[:, np.newaxis]]
         for j, zeros in enumerate(n_zeros):
-            blocks.append(responses(rungs(sections, zeros, domain), variable) * inputs[:, j : j + 1])
+            blocks.append(responses(basis_of(sections, zeros, domain), variable) * inputs[:, j : j + 1])
         table = np.concatenate(blocks, axis=1) * w[:, np.newaxis]
         target = output * w
         table, target = (np.concatenate([part.real, part.imag]) for part in (table, target))
         scale = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
         solution = linalg.lstsq(table / scale, target, cond=1e-12)[0] / scale
-        system = realise(ladder, domain)
+        system = realise(basis, domain)
         following = linalg.eigvals(system.A - np.outer(system.B, solution[: len(start)]))
         moved = np.abs(np.sort_complex(following) - np.sort_complex(poles)).max()
         poles = following
@@ -75,7 +75,7 @@ def sk_poles(
 def state_responses(
     sections: tuple[NDArray[np.float64], ...], variable: NDArray[np.complex128], domain: Domain
 ) -> NDArray[np.complex128]:
-    """The state of a ladder as functions of frequency: all strictly proper functions with its poles.
+    """The state of a basis as functions of frequency: all strictly proper functions with its poles.
 
     Args:
         sections: Denominators.
@@ -85,7 +85,7 @@ def state_responses(
     Returns:
         Shape ``(n_points, n_poles)``.
     """
-    system = realise(rungs(sections, sum(len(d) - 1 for d in sections) - 1, domain), domain)
+    system = realise(basis_of(sections, sum(len(d) - 1 for d in sections) - 1, domain), domain)
     n = len(system.A)
     if domain is Domain.DISCRETE:
         matrices = np.eye(n) - variable[:, np.newaxis, np.newaxis] * system.A

@@ -11,7 +11,7 @@ from scipy import linalg
 from sysid.estimation.linear.variable_projection import SeparableProvider, Separated
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import TransferFunctionModel
-from sysid.models import orthonormal_basis as ladders
+from sysid.models import orthonormal_basis as bases
 from sysid.models.orthonormal_basis import Domain
 
 
@@ -68,9 +68,9 @@ def _polynomials(
     rows: list[NDArray[np.float64]] = []
     tap, coefficient = 0, width - sum(model.orders.poles)
     for j, name in enumerate(model.mapping.inputs):
-        ladder = model.ladder(j)
+        basis = model.basis(j)
         gain = model.scaling.output_scale / model.scaling.input_scale[j]
-        numerators = gain * ladders.numerators(ladder)[:, : model.orders.zeros[j] + 1]
+        numerators = gain * bases.numerators(basis)[:, : model.orders.zeros[j] + 1]
         for power, value in enumerate(model.numerator(j)):
             row = np.zeros(width)
             row[tap : tap + len(numerators)] = numerators[:, power]

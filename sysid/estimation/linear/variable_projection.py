@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
-from sysid.estimation.linear.records import AbstractRecord, Ladders
-from sysid.models.orthonormal_basis import Domain, rungs, section_orders
+from sysid.estimation.linear.records import AbstractRecord, Bases
+from sysid.models.orthonormal_basis import Domain, basis_of, section_orders
 
 RANK_TOLERANCE = 1e-11
 """Singular values of the unit columns below this part of the largest are directions that the data do not show."""
@@ -148,7 +148,7 @@ class Separated:
     """The linear part solved at some poles.
 
     Args:
-        ladders: One per input.
+        bases: One per input.
         columns: Of each record, unweighted.
         span: Orthonormal basis of the weighted columns, shape ``(n_rows, rank)``.
         weights: Solution: shared columns (taps of all inputs, then the constant), then each record's own.
@@ -157,7 +157,7 @@ class Separated:
         constants: What a constant output is in each record's errors.
     """
 
-    ladders: Ladders
+    bases: Bases
     columns: tuple[NDArray[np.float64], ...]
     span: NDArray[np.float64]
     weights: NDArray[np.float64]
@@ -260,7 +260,7 @@ class SeparableProvider(AbstractProvider):
             n_private = columns.shape[1] - shared
             weights = np.concatenate([solution.weights[:shared], solution.weights[own : own + n_private]])
             own += n_private
-            parts.append(record.tangents(solution.ladders, columns, weights) * record.root_weights[:, np.newaxis])
+            parts.append(record.tangents(solution.bases, columns, weights) * record.root_weights[:, np.newaxis])
         return np.concatenate(parts)
 
     def design(self, columns: Sequence[NDArray[np.float64]], constants: Sequence[float]) -> NDArray[np.float64]:
@@ -294,11 +294,11 @@ class SeparableProvider(AbstractProvider):
 
     def _solve(self, theta: NDArray[np.float64]) -> Separated | None:
         sections = self.poles.sections(theta)
-        ladders = tuple(
-            rungs(part, zeros, self.poles.domain) for part, zeros in zip(sections, self.n_zeros, strict=True)
+        bases = tuple(
+            basis_of(part, zeros, self.poles.domain) for part, zeros in zip(sections, self.n_zeros, strict=True)
         )
-        columns = tuple(record.columns(ladders) for record in self.records)
-        through = [record.predictor(ladders) for record in self.records]
+        columns = tuple(record.columns(bases) for record in self.records)
+        through = [record.predictor(bases) for record in self.records]
         constants = tuple(1.0 if one is None else one.constant_gain for one in through)
         table = self.design(columns, constants)
         if not np.isfinite(table).all():
@@ -320,6 +320,6 @@ class SeparableProvider(AbstractProvider):
         seen = span.T @ target
         weights = (Vt[: len(sizes)][kept].T @ (seen / sizes[kept])) / scale
         return Separated(
-            ladders=ladders, columns=columns, span=span, weights=weights, residual=span @ seen - target,
+            bases=bases, columns=columns, span=span, weights=weights, residual=span @ seen - target,
             constants=constants, mirrored=any(one is not None for one in through),
         )  # fmt: skip
