@@ -1,6 +1,6 @@
 """One peer on one problem, run by ``peers.py`` in the peers' own environment; prints its result as a line of JSON.
 
-    python _peers_worker.py <tool> <problem.npz> <cap in seconds>
+    python _peers_worker.py <tool> <problem.npz> <cap in seconds> [seed]
 
 The problem holds scaled inputs ``u`` (n, n_inputs) and output ``y`` (n,), the range 2 wide and rest at zero before the
 first sample, the number of lags and of neurons; ``u_<name>`` and ``y_<name>`` are records that nothing is fitted to.
@@ -12,6 +12,7 @@ that are best on the training record.
 # mypy: ignore-errors
 
 import contextlib
+import functools
 import io
 import json
 import sys
@@ -35,6 +36,7 @@ class Task:
     neurons: int
     unseen: dict
     cap: float
+    seed: int
 
 
 def _jax(task, shape):
@@ -104,7 +106,7 @@ def jax_sysid(task):
             fresh = output(x, u, params)
             return jnp.concatenate([fresh, past_y[:-1], u, past_u[:-n_in]])
 
-        rng = np.random.default_rng(0)
+        rng = np.random.default_rng(task.seed)
         W = rng.standard_normal((neurons, n_state)) / np.sqrt(n_state)
         w = np.zeros((1, n_state))
         w[0, 0] = 0.9
@@ -114,14 +116,14 @@ def jax_sysid(task):
     return _jax(task, shape)
 
 
-def jax_sysid_states(task):
-    """A neural state space with two free states: not the same structure, but this tool's own way."""
+def jax_sysid_states(task, n_state=2):
+    """A neural state space with free states, its weights drawn as in this tool's examples."""
 
     def shape():
         import jax
         import jax.numpy as jnp
 
-        n_in, n_state, neurons = task.u.shape[1], 2, task.neurons
+        n_in, neurons = task.u.shape[1], task.neurons
 
         @jax.jit
         def state(x, u, params):
@@ -133,7 +135,7 @@ def jax_sysid_states(task):
         def output(x, u, params):
             return params[5] @ x
 
-        rng = np.random.default_rng(0)
+        rng = np.random.default_rng(task.seed)
         params = [
             0.9 * np.eye(n_state),
             0.1 * rng.standard_normal((n_state, n_in)),
@@ -239,6 +241,7 @@ def pyrenn(task):
 TOOLS = {
     "jax-sysid": jax_sysid,
     "jax-sysid, state space": jax_sysid_states,
+    "jax-sysid, three states": functools.partial(jax_sysid_states, n_state=3),
     "fastcan, degree 2": fastcan_quadratic,
     "fastcan, degree 3": fastcan_cubic,
     "pyrenn": pyrenn,
@@ -246,7 +249,7 @@ TOOLS = {
 
 
 if __name__ == "__main__":
-    tool, problem, seconds = sys.argv[1:]
+    tool, problem, seconds, *more = sys.argv[1:]
     with np.load(problem, allow_pickle=False) as stored:
         names = [name.removeprefix("u_") for name in stored if name.startswith("u_")]
         given = Task(
@@ -256,6 +259,7 @@ if __name__ == "__main__":
             neurons=int(stored["neurons"]),
             unseen={name: (stored[f"u_{name}"], stored[f"y_{name}"]) for name in names},
             cap=float(seconds),
+            seed=int(more[0]) if more else 0,
         )
     with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
         learned, elsewhere = TOOLS[tool](given)

@@ -158,9 +158,9 @@ def cylinder() -> Problem:
     )
 
 
-def peer(python: Path, tool: str, problem: Path, cap: float) -> Learned | None:
+def peer(python: Path, tool: str, problem: Path, cap: float, seed: int = 0) -> Learned | None:
     """What a peer learned; ``None`` where it gave nothing."""
-    command = [str(python), str(WORKER), tool, str(problem), str(cap)]
+    command = [str(python), str(WORKER), tool, str(problem), str(cap), str(seed)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE * (cap + 120.0))
     except subprocess.TimeoutExpired:

@@ -129,7 +129,8 @@ class NeuralProvider(AbstractProvider):
             y = np.empty(len(record.target))
             kernel.free_run(record.u, self._begin(record, theta), *self.template.arguments(theta), y)
             residual = record.weighted(y - record.target)
-            total += 0.5 * float(residual @ residual)
+            with np.errstate(over="ignore", invalid="ignore"):  # a free run that explodes has no loss
+                total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
 
     def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
