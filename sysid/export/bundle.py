@@ -101,7 +101,7 @@ class Bundle:
 
         Args:
             u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the bundle's order, or a frame
-                or dict with columns by name, in the bundle's units.
+                or dict with columns by name, in the bundle's units; for a model without input the number of samples.
             initial: Output before the first sample, in its unit, or one for each output by name; the declared levels
                 where nothing is said.
 
@@ -114,8 +114,11 @@ class Bundle:
             ConfigError: If an array has another number of columns, or ``initial`` says nothing to the model.
         """
         names = tuple(str(entry["name"]) for entry in self.outputs)
-        inputs = inputs_of(u, tuple(str(entry["name"]) for entry in self.inputs))
         surrogate = Surrogate.of(self.model, {}, outputs=names)
+        if surrogate.ticks:
+            inputs = np.zeros((len(inputs_of(u, ())), 1))
+        else:
+            inputs = inputs_of(u, tuple(str(entry["name"]) for entry in self.inputs))
         given = dict(initial) if isinstance(initial, Dict) else {} if initial is None else dict.fromkeys(names, initial)
         strangers = [name for name in given if name not in names]
         if strangers:

@@ -312,7 +312,7 @@ def _channel(port: Port, traces: TraceSet, estimation: tuple[Trace, ...]) -> dic
 
 
 def _initialisation(surrogate: Surrogate, example: Trace) -> dict[str, Any]:
-    first = example.columns(tuple(port.name for port in surrogate.inputs))[0]
+    first = surrogate.inputs_of(example)[0]
     lines = "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale"
     spaces = [stage for stage in surrogate.stages if isinstance(stage.state, SpaceState)]
     levels = surrogate.levels(first).tolist()

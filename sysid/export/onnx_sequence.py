@@ -137,8 +137,20 @@ class _Sequence:
         rows = [self._scaled(self.known[source], i, f"u{i}") for i, source in enumerate(self.stage.sources)]
         begin = {"state": self.state} | dict(zip(["remainder"], self.remainder, strict=False))
         body = space_body(nodes, self.stage, keeps=self.keeps)
-        numbers = self._loop(begin, [_rows(nodes, rows, "x")], body)
+        numbers = self._loop(begin, [_rows(nodes, rows, "x") if rows else self._nothing()], body)
         return numbers, nodes.add("Transpose", [f"{nodes.prefix}state_end"], "next_state", perm=[1, 0])
+
+    def _zeros(self, like: str) -> str:
+        """As many samples as a channel has, whatever they are there."""
+        zero = numpy_helper.from_array(np.zeros(1, dtype=self.nodes.dtype))
+        shape = self.nodes.add("Shape", [like], "shape")
+        return self.nodes.add("ConstantOfShape", [shape], "nothing_used", value=zero)
+
+    def _nothing(self) -> str:
+        """The inputs of a model without any, ``(time, 0, batch)``."""
+        nodes, none = self.nodes, self.nodes.integers([0])
+        rows = _rows(nodes, [self._zeros(self.known[0])], "x_unused")
+        return nodes.add("Slice", [rows, none, none, nodes.integers([1])], "x")
 
     def _loop(self, begin: dict[str, str], scanned: list[str], body: Body) -> list[str]:
         """The loop; gives back the scaled outputs, each ``(time, batch)``."""
@@ -199,9 +211,7 @@ class _Sequence:
         nodes = self.nodes
         if not terms:
             # The loop needs something to run over; zeros, because an input that the model does not read may be NaN.
-            zero = numpy_helper.from_array(np.zeros(1, dtype=nodes.dtype))
-            shape = nodes.add("Shape", [histories[0]], "shape")
-            return _rows(nodes, [nodes.add("ConstantOfShape", [shape], "nothing_used", value=zero)], "x")
+            return _rows(nodes, [self._zeros([*histories, *self.known][0])], "x")
 
         def sample(channel: int, lag: int) -> str:
             length = lines[channel].length

@@ -78,7 +78,8 @@ def step_nodes(surrogate: Surrogate, dtype: DTypeLike) -> Nodes:
         inputs = known
         n_known = stage.targets[0]
         if stage.known_sources != tuple(range(n_known)):
-            inputs = part.add("Gather", [known, nodes.integers(list(stage.known_sources))], "u", axis=-1)
+            read = "u" if len(surrogate.stages) > 1 else "read"  # alone, "u" is what goes in
+            inputs = part.add("Gather", [known, nodes.integers(list(stage.known_sources))], read, axis=-1)
         add_stage = _space_stage if isinstance(stage.cell, SpaceCell) else _stage
         one = add_stage(part, stage, inputs, *stage_state(part, surrogate, stage))
         made.append(_within_limits(part, stage, one, known))

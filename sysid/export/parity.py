@@ -98,8 +98,7 @@ def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[
         TraceError: If a trace is not longer than its measured start.
     """
     if isinstance(surrogate.source, Cascade):
-        names = tuple(port.name for port in surrogate.inputs)
-        return tuple(_from_rest(surrogate, trace.name, trace.columns(names)) for trace in traces)
+        return tuple(_from_rest(surrogate, trace.name, surrogate.inputs_of(trace)) for trace in traces)
     return tuple(_from_history(surrogate, surrogate.source, trace, start) for trace in traces)
 
 
@@ -112,24 +111,34 @@ def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, star
     disturbed = model.simulate(inputs, History(inputs=history.inputs, output=moved)).reshape(len(inputs), -1)
     return ParityCase(
         name=trace.name,
-        inputs=inputs,
+        inputs=surrogate.inputs_of(trace)[begun.first :],
         state=surrogate.stages[0].state.from_history(history),
         output=output,
         amplification=largest_difference(disturbed / change, output / change),
     )
 
 
-def _from_rest(surrogate: Surrogate, name: str, inputs: NDArray[np.float64]) -> ParityCase:
-    change = _disturbances(surrogate)
-    computed = surrogate.compute(inputs)
-    disturbed = surrogate.compute(inputs, surrogate.rest(inputs[0]) + change)
+def _from_rest(
+    surrogate: Surrogate, name: str, inputs: NDArray[np.float64], begun: NDArray[np.float64] | None = None
+) -> ParityCase:
+    change, rest = _disturbances(surrogate), surrogate.rest(inputs[0]) if begun is None else begun
+    computed = surrogate.compute(inputs, rest)
+    disturbed = surrogate.compute(inputs, rest + change)
     return ParityCase(
         name=name,
         inputs=inputs,
-        state=surrogate.at_rest(inputs[0]),
+        state=surrogate.at_rest(inputs[0], rest),
         output=surrogate.chosen(computed),
         amplification=largest_difference(surrogate.chosen(disturbed / change), surrogate.chosen(computed / change)),
     )
+
+
+def _somewhere(rng: np.random.Generator, surrogate: Surrogate) -> NDArray[np.float64]:
+    """What is computed before the first sample, within its scaling's range, in numbers that float32 can hold."""
+    cells = [(stage.cell, stage.cell.n_inputs) for stage in surrogate.stages]
+    offset = np.concatenate([np.array(cell.offset[n:]) for cell, n in cells])
+    scale = np.concatenate([np.array(cell.scale[n:]) for cell, n in cells])
+    return (offset + scale * rng.uniform(-1.0, 1.0, len(offset))).astype(np.float32).astype(np.float64)
 
 
 def _disturbances(surrogate: Surrogate) -> NDArray[np.float64]:
@@ -167,7 +176,9 @@ def random_cases(
     for number in range(sequences):
         drawn = (low + (high - low) * _excitation(rng, samples, len(low))).astype(np.float32)
         inputs = np.clip(drawn, least, most).astype(np.float64)
-        cases.append(_from_rest(surrogate, f"random {number + 1}", inputs))
+        # What nothing goes into differs by where it begins.
+        begun = None if not surrogate.ticks else _somewhere(rng, surrogate)
+        cases.append(_from_rest(surrogate, f"random {number + 1}", inputs, begun))
     return tuple(cases)
 
 
@@ -177,7 +188,7 @@ def _ranges(surrogate: Surrogate) -> tuple[NDArray[np.float64], NDArray[np.float
         cell = stage.cell
         for column, offset, half in zip(stage.sources, cell.offset, cell.scale, strict=False):
             scale.setdefault(column, (offset - half, offset + half))
-    ranges = [port.range or scale[i] for i, port in enumerate(surrogate.inputs)]
+    ranges = [port.range or scale.get(i, (0.0, 1.0)) for i, port in enumerate(surrogate.inputs)]
     return np.array([low for low, _ in ranges]), np.array([high for _, high in ranges])
 
 
@@ -192,7 +203,7 @@ def _excitation(rng: np.random.Generator, samples: int, n_inputs: int) -> NDArra
         ramped = np.interp(np.arange(samples), [0, *corners, samples], levels)
         noise = 0.01 * rng.uniform(-1.0, 1.0, samples)
         columns.append(np.clip((held if rng.random() < 0.5 else ramped) + noise, 0.0, 1.0))
-    return np.column_stack(columns)
+    return np.column_stack(columns) if columns else np.zeros((samples, 0))
 
 
 def check_parity(

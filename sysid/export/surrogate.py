@@ -25,9 +25,12 @@ from sysid.models import AbstractModel, Cascade, History
 from sysid.models.form import unheeded
 from sysid.models.wiring import Wiring
 from sysid.names import c_identifier, distinct, written_side
+from sysid.traces import Trace
 
 LONGEST_IDENTIFIER = 60
 """Characters. A file's name may have 255, with its folders 260 on Windows, and a cascade may have eighty outputs."""
+TICK = "tick"
+"""Name of the input of models without input: one number a sample, whatever it is."""
 MANY = 8
 """Stages beyond which their structures are not listed in a line."""
 
@@ -71,20 +74,13 @@ class Surrogate:
             The surrogate.
 
         Raises:
-            ConfigError: If a model is of a kind that cannot be written, models in a circle have no input, or an output
-                is not computed.
+            ConfigError: If a model is of a kind that cannot be written, or an output is not computed.
         """
         if isinstance(source, Cascade):
             models, wiring, limits = source.models, source.wiring, source.limits
         else:
             models, wiring, limits = (source,), Wiring.of([source]), {}
-        if not wiring.inputs:
-            raise ConfigError(
-                "nothing goes into the models, so that nothing would tell exported files how long to run",
-                expected="at least one channel that no model computes",
-                got=", ".join(str(model.mapping) for model in models),
-                remedy="run it in Python: fit.simulate(n_samples, initial=...)",
-            )
+        wiring = wiring if wiring.inputs else _ticking(wiring)
         ranges, starts = ranges or {}, starts or {}
         identifiers, levels = distinct(wiring.channels, c_identifier), _levels(source, wiring)
         inputs = tuple(
@@ -110,6 +106,25 @@ class Surrogate:
             outputs=tuple(computed[name] for name in names),
             stages=stages_of(models, wiring, limits, names),
         )
+
+    @property
+    def ticks(self) -> bool:
+        """Whether nothing goes into the models, so that its one input says how long to run and is not read."""
+        return not (self.source.inputs if isinstance(self.source, Cascade) else self.source.mapping.inputs)
+
+    def inputs_of(self, trace: Trace) -> NDArray[np.float64]:
+        """What goes in over a trace.
+
+        Args:
+            trace: The trace.
+
+        Returns:
+            Shape ``(n_samples, n_inputs)``, in their units.
+
+        Raises:
+            ChannelError: If it lacks an input.
+        """
+        return np.zeros((len(trace), 1)) if self.ticks else trace.columns([port.name for port in self.inputs])
 
     @property
     def channels(self) -> tuple[Port, ...]:
@@ -201,16 +216,19 @@ class Surrogate:
         values = dict(zip((port.name for port in self.inputs), map(float, first), strict=True))
         return np.array([values[p.level] if isinstance(p.level, str) else p.level for p in self.channels])
 
-    def at_rest(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at_rest(self, inputs: NDArray[np.float64], computed: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """The state of a system at rest, every channel at its declared level.
 
         Args:
             inputs: Their first sample, shape ``(n_inputs,)``, in units.
+            computed: Other levels of what is computed, shape ``(n_computed,)``.
 
         Returns:
             Shape ``(state_size,)``.
         """
         levels = self.levels(inputs)
+        if computed is not None:
+            levels[len(self.inputs) :] = computed
         return np.concatenate([stage.state.at_rest(levels[[*stage.sources, *stage.targets]]) for stage in self.stages])
 
     def simulate(
@@ -259,9 +277,10 @@ class Surrogate:
         """
         inputs = np.asarray(inputs, dtype=np.float64)
         rest = self.rest(inputs[0]) if rest is None else rest
+        inputs = inputs[:, :0] if self.ticks else inputs
         if isinstance(self.source, Cascade):
             levels = dict(zip(self.source.outputs, map(float, rest), strict=True))
-            return self.source.simulate(inputs, rest=levels).values[:, len(self.inputs) :]
+            return self.source.simulate(inputs, rest=levels).values[:, inputs.shape[1] :]
         resting = rest if self.source.structure.several_outputs else float(rest[0])
         run = self.source.simulate(inputs, History.at_rest(inputs=inputs[0], output=resting))
         return run.reshape(len(inputs), -1)
@@ -300,6 +319,14 @@ class Surrogate:
             "remainders_float32": self.remainders,
         }
         return text | ({"state_spaces": [{"first": at, **state.to_dict()} for at, state in spaces]} if spaces else {})
+
+
+def _ticking(wiring: Wiring) -> Wiring:
+    """What nothing goes into, with an input that nobody reads: it tells exported files how long to run."""
+    name = TICK
+    while name in wiring.outputs:
+        name += "_"
+    return replace(wiring, inputs=(name,), units={name: "", **wiring.units})
 
 
 def _known_names(names: Sequence[str], computed: Dict[str, Port]) -> tuple[str, ...]:

@@ -109,7 +109,7 @@ class StageStep(nn.Module):
         for name, values in numbers.items():
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
         regressors = [layout.column(channel, lag) for channel, own in enumerate(cell.lags) for lag in own]
-        self.register_buffer("sources", torch.tensor(stage.known_sources))
+        self.register_buffer("sources", torch.tensor(stage.known_sources, dtype=torch.long))
         self.register_buffer("regressor_columns", torch.tensor(regressors))
         self.register_buffer("state_columns", torch.tensor(layout.next_columns()))
         self.first, self.size = int(stage.first), int(layout.size)
@@ -189,7 +189,7 @@ class SpaceStep(nn.Module):
         }
         for name, values in numbers.items():
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
-        self.register_buffer("sources", torch.tensor(stage.known_sources))
+        self.register_buffer("sources", torch.tensor(stage.known_sources, dtype=torch.long))
         self.first, self.size = int(stage.first), cell.n_state
         self.bounded, self.limited = stage.bounded, stage.limited
         self.low, self.high, self.bound = float(cell.low), float(cell.high), float(cell.bound)

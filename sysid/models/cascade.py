@@ -290,7 +290,7 @@ class Cascade:
             TraceError: If the shape is not the cascade's.
         """
         inputs = np.asarray(inputs, dtype=np.float64)
-        if inputs.ndim != axes or inputs.shape[-1] != len(self.inputs) or 0 in inputs.shape:
+        if inputs.ndim != axes or inputs.shape[-1] != len(self.inputs) or 0 in inputs.shape[:-1]:
             raise TraceError(
                 "the inputs do not fit the cascade",
                 expected=f"{axes} axes, the last of them {len(self.inputs)}: {', '.join(self.inputs)}",

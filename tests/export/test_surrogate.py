@@ -71,10 +71,15 @@ def test_in_a_circle_what_is_computed_late_goes_into_the_state_at_the_end():
     assert surrogate.lines[1].first == 0
 
 
-def test_a_circle_that_nothing_goes_into_is_refused():
-    back = linear("z -> y", orders=ARX(na=1, nb=(1,), nk=(1,)))
-    with pytest.raises(ConfigError, match="nothing goes into the models"):
-        Surrogate.of(Cascade(models=(linear("y -> z"), back)))
+def test_what_nothing_goes_into_has_an_input_that_says_how_long_to_run():
+    back = linear("z -> tick", orders=ARX(na=1, nb=(1,), nk=(1,)))
+    cascade = Cascade(models=(linear("tick -> z"), back), rest={"tick": 3.0, "z": 1.0})
+    surrogate = Surrogate.of(cascade)
+    assert surrogate.ticks
+    assert [port.name for port in surrogate.inputs] == ["tick_"]
+    run = cascade.simulate(np.zeros((9, 0)))
+    found = surrogate.simulate(np.full((9, 1), np.nan))
+    np.testing.assert_array_equal(found, np.column_stack([run[port.name] for port in surrogate.outputs]))
 
 
 @pytest.mark.parametrize(
