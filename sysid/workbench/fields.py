@@ -29,6 +29,26 @@ from sysid.yaml_files import FieldError
 STRUCTURES: dict[str, type[AbstractStructure]] = {kind: row.structure for kind, row in ESTIMATORS.items()}
 """Structures that a pipeline can fit; their fields are those of the classes."""
 
+_KINDS = {structure.__name__: kind for kind, structure in STRUCTURES.items()}
+
+
+def with_short_kind(value: object) -> object:
+    """The fields of a structure, its kind as results have it where the YAML has the name of the class.
+
+    Args:
+        value: The fields; anything else is given back as it is.
+
+    Returns:
+        The fields.
+
+    Example:
+        >>> with_short_kind({"kind": "NeuralStateSpace", "states": 2})
+        {'kind': 'NSS', 'states': 2}
+    """
+    if isinstance(value, Dict) and isinstance(value.get("kind"), str):
+        return {**value, "kind": _KINDS.get(value["kind"], value["kind"])}
+    return value
+
 
 def as_field_error(error: ConfigError, name: str | None = None) -> FieldError:
     """A ConfigError of a deeper room, so that pydantic adds where in the YAML it happened.
@@ -50,7 +70,8 @@ def _structure(value: object) -> AbstractStructure:
     """A structure from its fields, with the fields of its kind named where one is wrong."""
     if isinstance(value, AbstractStructure):
         return value
-    kinds = ", ".join(STRUCTURES)
+    kinds = ", ".join(_KINDS)
+    value = with_short_kind(value)
     if not isinstance(value, Dict) or "kind" not in value:
         raise FieldError(
             "not a structure",
@@ -60,7 +81,7 @@ def _structure(value: object) -> AbstractStructure:
         )
     kind = value["kind"]
     if not isinstance(kind, str) or kind not in STRUCTURES:
-        near = difflib.get_close_matches(shortened(kind).strip("'"), STRUCTURES, n=1)
+        near = difflib.get_close_matches(shortened(kind).strip("'"), _KINDS, n=1)
         remedy = f"did you mean {near[0]}?" if near else "choose one of these kinds"
         raise FieldError("unknown kind of structure", expected=f"one of {kinds}", got=shortened(kind), remedy=remedy)
     parameters = inspect.signature(STRUCTURES[kind]).parameters
@@ -99,11 +120,12 @@ def _structure_schema() -> dict[str, Any]:
     choices = []
     for kind, structure in STRUCTURES.items():
         parameters = inspect.signature(structure).parameters
+        names = list(dict.fromkeys([structure.__name__, kind]))
         choices.append(
             {
                 "type": "object",
-                "title": kind,
-                "properties": {"kind": {"const": kind}} | {name: {} for name in parameters},
+                "title": structure.__name__,
+                "properties": {"kind": {"enum": names}} | {name: {} for name in parameters},
                 "required": ["kind", *(p.name for p in parameters.values() if p.default is p.empty)],
                 "additionalProperties": False,
             }

@@ -9,6 +9,8 @@ import jsonschema
 import pytest
 
 from sysid.workbench.cli import run_cli
+from sysid.workbench.fields import with_short_kind
+from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.schemas import DATASET_FILE, PIPELINE_FILE, dataset_schema, pipeline_schema, schema_line
 from sysid.workbench.workspace import TEMPLATE
 from sysid.yaml_files import parse_yaml, read_yaml
@@ -108,3 +110,15 @@ def test_a_workspace_has_the_schemas_its_files_name(tmp_path: Path, monkeypatch:
     PIPELINE_FILE.write_text("{}")
     assert run_cli(["schema"]) == 0
     assert json.loads(PIPELINE_FILE.read_text(encoding="utf-8")) == pipeline_schema()
+
+
+@pytest.mark.parametrize("kind", ["NeuralStateSpace", "NSS"])
+def test_a_structure_is_read_by_the_name_of_its_class_too(kind: str) -> None:
+    from sysid.models import NeuralStateSpace
+    from sysid.workbench.sweep.search_space import parse_space
+
+    fit = FitConfig.model_validate({"name": "a", "structure": {"kind": kind, "states": 2, "neurons": 3}})
+    assert isinstance(fit.structure, NeuralStateSpace)
+    asked = with_short_kind({"kind": kind, "states": 2, "neurons": {"from": 3, "to": 4}})
+    assert isinstance(asked, dict)
+    assert [point.structure.kind for point in parse_space([asked], {}, 1).points()] == ["NSS", "NSS"]

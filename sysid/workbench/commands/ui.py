@@ -12,13 +12,18 @@ import time
 import urllib.error
 import urllib.request
 import webbrowser
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import IO
 
 from sysid.errors import SysidError
 from sysid.workbench.runner.console import console
+from sysid.workbench.tracking.landing import VARIABLE
 from sysid.workbench.tracking.mlflow_store import QUIET, latest_experiment, store_uri
 from sysid.workbench.tracking.mlflow_views import VIEW
+
+APP = "sysid"
+"""Name of our entry point for MLflow's server."""
 
 START_LIMIT_S = 60.0
 """Seconds that a server may take; 8 to 10 s were measured on two cores."""
@@ -47,7 +52,11 @@ def ui_command(port: int, *, browser: bool) -> int:
     # What the server says is for those who look for a fault; it is kept until then and no longer.
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(  # noqa: S603 - our own words
-            server_command(uri, address), env=server_environment(), start_new_session=True, stdout=log, stderr=log
+            server_command(uri, address),
+            env=server_environment(page(experiment)),
+            start_new_session=True,
+            stdout=log,
+            stderr=log,
         )
         # The end is asked for in several ways; all of them shall end the server with us.
         previous = signal.signal(signal.SIGTERM, _interrupt)
@@ -92,12 +101,21 @@ def server_command(uri: str, address: str) -> list[str]:
     return [
         *(sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri),
         *("--host", host, "--port", port, "--workers", "1"),
+        # A checkout that was installed before it had this entry point goes without.
+        *(("--app-name", APP) if entry_points(group="mlflow.app", name=APP) else ()),
     ]
 
 
-def server_environment() -> dict[str, str]:
-    """The environment of the server: no telemetry, and no job queue (measured: 11 processes and 2 GB with it)."""
-    return {**QUIET, "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", **os.environ}
+def server_environment(landing: str = "") -> dict[str, str]:
+    """The environment of the server: no telemetry, and no job queue (measured: 11 processes and 2 GB with it).
+
+    Args:
+        landing: The page that the bare address leads to.
+
+    Returns:
+        Variables by name.
+    """
+    return {**QUIET, "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", VARIABLE: landing, **os.environ}
 
 
 def free_port(first: int) -> int:

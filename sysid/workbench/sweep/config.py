@@ -10,7 +10,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.models import Start, StartKind
 from sysid.reporting.sweep_record import FIGURES
-from sysid.workbench.fields import MappingField, StartField, as_field_error
+from sysid.workbench.fields import MappingField, StartField, as_field_error, with_short_kind
 from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig, ReportConfig
 from sysid.workbench.old_words import STRICT, TRAINING, with_new_words
 from sysid.workbench.stability import StabilityConfig
@@ -151,7 +151,7 @@ class SweepConfig(BaseModel):
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
     structure: Annotated[
-        tuple[dict[str, Any], ...],
+        tuple[Annotated[dict[str, Any], BeforeValidator(with_short_kind)], ...],
         BeforeValidator(_as_list, json_schema_input_type=dict[str, Any] | tuple[dict[str, Any], ...]),
     ] = Field(min_length=1)
     training: Annotated[dict[str, Any], BeforeValidator(lambda given: with_new_words(given, TRAINING))] = Field(
@@ -166,7 +166,7 @@ class SweepConfig(BaseModel):
     cluster: str | None = None
     storage: str | None = None
     stability: StabilityConfig = StabilityConfig()
-    beside: tuple[dict[str, Any], ...] = ()
+    beside: tuple[Annotated[dict[str, Any], BeforeValidator(with_short_kind)], ...] = ()
     reproduces: str | None = None
     export: ExportConfig | None = ExportConfig()
     report: ReportConfig = ReportConfig()

@@ -24,6 +24,7 @@ from sysid.workbench.runner.events import FitReady
 from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_views as views
 from sysid.workbench.tracking.fit_run import Entities
+from sysid.workbench.tracking.landing import VARIABLE, App, leading_to
 from sysid.workbench.tracking.registry import parsed, register
 from sysid.workbench.tracking.sqlite_store import SQLITE, held
 
@@ -78,6 +79,17 @@ def connect(uri: str) -> Any:
             return MlflowClient(uri)
         with held(Path(uri.removeprefix(SQLITE)), _make_store):
             return MlflowClient(uri)
+
+
+def page_app() -> App:
+    """MLflow's server with a bare address that leads to the fits; what ``mlflow server --app-name sysid`` runs.
+
+    Returns:
+        The application.
+    """
+    from mlflow.server.fastapi_app import app
+
+    return leading_to(app, os.environ.get(VARIABLE, ""))
 
 
 def _make_store(database: Path) -> None:

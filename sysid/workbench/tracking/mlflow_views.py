@@ -32,7 +32,7 @@ ORDER: Final = "mean_free_run_mse"
 
 COLUMNS: Final = {
     "metrics": (ORDER, "worst_free_run_mse", "mean_nrmse_fit", "mean_run_time_s", "parameters", "train_time_s"),
-    "tags": ("fit", "status", "pipeline"),
+    "tags": ("fit", "output_unit", "status", "pipeline"),
     "attributes": ("Dataset", "Models"),
 }
 """What matters first stands first."""
