@@ -18,6 +18,7 @@ from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.estimation.equilibrium import equilibrium_notes
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
@@ -25,9 +26,11 @@ from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_
 from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
+from sysid.estimation.linear_posteriors import LinearPosterior, arx_posterior, transfer_function_posterior
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.narx import fit_narx
 from sysid.estimation.networks.neural_state_space import STARTS, check_training, fit_neural_state_space
+from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial
@@ -77,6 +80,8 @@ class Estimator:
             ``None`` where it takes none.
         begins: Where a fit begins that takes no initial one.
         stability: How the stability of its fits is checked.
+        posterior: What its fits' covariance says of the output; ``None`` where the estimator gives a posterior itself.
+        no_posterior: Why a fit may have none.
         joins: Whether its models can be members of a whole that are trained together.
         of_residuals: What a reader of its residuals should know; empty for nothing.
         starts: Starts of a network's fit that asks for none.
@@ -90,6 +95,8 @@ class Estimator:
     initial: Callable[[AbstractStructure, AbstractStructure, int], None] | None = None
     begins: str = ""
     stability: type[AbstractStabilityCheck] = FreeRunCheck
+    posterior: LinearPosterior | None = None
+    no_posterior: str = ""
     joins: bool = False
     of_residuals: str = ""
     starts: int = 1
@@ -215,9 +222,32 @@ class Estimator:
         def noted(*args: Any, **named: Any) -> FitResult:
             """The fit with what its records say of how they begin, before what its check says."""
             found = self.fit(*args, **named)
-            return replace(found, notes=(*found.notes, *equilibrium_notes(found.model, traces, named["start"])))
+            found = self.with_posterior(found, traces, named["start"], given.get("selection", ()))
+            told = () if found.posterior is not None else (f"No interval of the output: {self.no_posterior}.",)
+            off = equilibrium_notes(found.model, traces, named["start"])
+            return replace(found, notes=(*found.notes, *told, *off), warnings=(*found.warnings, *off))
 
         return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
+
+    def with_posterior(
+        self, fit: FitResult, traces: Sequence[Trace], start: Start, selection: Sequence[Trace]
+    ) -> FitResult:
+        """A fit with the posterior that follows from what its estimator knows of its parameters.
+
+        Args:
+            fit: The fit.
+            traces: Estimation traces.
+            start: What stands before each.
+            selection: Traces that widen its intervals to the errors on them.
+
+        Returns:
+            The fit; as it is where its estimator gives a posterior itself, or there is none.
+        """
+        found = None if self.posterior is None else self.posterior(fit, traces, start)
+        if found is None:
+            return fit
+        others = [Experiment.for_model(trace, fit.model, start) for trace in selection]
+        return replace(fit, posterior=calibrate(found, fit.model, others))
 
     def takes_none(self, training: object) -> ConfigError:
         """The refusal of options where there is nothing to choose.
@@ -237,18 +267,30 @@ class Estimator:
         )
 
 
+GROWING = "the free run grows without bound, and with it every error of a parameter"
+ENDED = "training ended before there was evidence of how well the records determine the weights (some 20 iterations)"
+NO_SENSITIVITIES = "how the output moves with the parameters is not computed for this structure"
 LINEAR_START = "a linear model finds its own start"
 
 ESTIMATORS: dict[str, Estimator] = {
     row.kind: row
     for row in (
-        Estimator(structure=ARX, name="an ARX model", fit=fit_arx, begins=LINEAR_START, stability=PoleCheck),
+        Estimator(
+            structure=ARX,
+            name="an ARX model",
+            fit=fit_arx,
+            begins=LINEAR_START,
+            stability=PoleCheck,
+            posterior=arx_posterior,
+            no_posterior=GROWING,
+        ),
         Estimator(
             structure=NARX,
             name="a NARX network",
             fit=fit_narx,
             training=Training,
             initial=check_initial,
+            no_posterior=ENDED,
             joins=True,
         ),
         Estimator(
@@ -257,6 +299,7 @@ ESTIMATORS: dict[str, Estimator] = {
             fit=fit_neural_state_space,
             training=Training,
             check_training=check_training,
+            no_posterior=ENDED,
             begins="a neural state space begins at the best linear one",
             starts=STARTS,
         ),
@@ -269,6 +312,8 @@ ESTIMATORS: dict[str, Estimator] = {
             "free run, and its residuals need not be white, only independent of the inputs.",
             begins=LINEAR_START,
             stability=PoleCheck,
+            posterior=transfer_function_posterior,
+            no_posterior=f"{GROWING}, or it was fitted through a predictor, whose covariance is not known",
         ),
         Estimator(
             structure=LinearStateSpace,
@@ -277,6 +322,7 @@ ESTIMATORS: dict[str, Estimator] = {
             training=StateSpaceTraining,
             begins=LINEAR_START,
             stability=PoleCheck,
+            no_posterior=NO_SENSITIVITIES,
         ),
         Estimator(
             structure=VectorStateSpace,
@@ -285,6 +331,7 @@ ESTIMATORS: dict[str, Estimator] = {
             training=StateSpaceTraining,
             begins=LINEAR_START,
             stability=PoleCheck,
+            no_posterior=NO_SENSITIVITIES,
         ),
         *(
             Estimator(
@@ -294,6 +341,7 @@ ESTIMATORS: dict[str, Estimator] = {
                 training=PolynomialTraining,
                 begins=LINEAR_START,
                 stability=PoleCheck,
+                no_posterior=NO_SENSITIVITIES,
             )
             for structure, name in ((OE, "an OE model"), (BJ, "a Box-Jenkins model"), (ARMAX, "an ARMAX model"))
         ),
@@ -303,6 +351,7 @@ ESTIMATORS: dict[str, Estimator] = {
             fit=fit_vector_narx,
             training=JointTraining,
             initial=check_vector_initial,
+            no_posterior="networks that are trained together have none",
         ),
     )
 }

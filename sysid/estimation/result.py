@@ -94,6 +94,7 @@ class FitResult:
         stability: What a check of the free run over random sequences found, as JSON values; ``None`` where there was
             none (see :mod:`sysid.estimation.stability.free_run`).
         notes: Sentences worth knowing: choices made, stability.
+        warnings: Those of the notes that say what was taken for granted and is not so: they head a report.
     """
 
     model: AbstractModel
@@ -108,6 +109,7 @@ class FitResult:
     attempts: tuple[Attempt, ...] = ()
     stability: Dict[str, Any] | None = None
     notes: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = field(default=())
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON values, without the posterior."""
@@ -133,6 +135,7 @@ class FitResult:
             "attempts": [attempt.to_dict() for attempt in self.attempts],
             "stability": None if self.stability is None else dict(self.stability),
             "notes": list(self.notes),
+            "warnings": list(self.warnings),
         }
 
     @classmethod
@@ -157,4 +160,5 @@ class FitResult:
             attempts=tuple(Attempt.from_dict(attempt) for attempt in fields.get("attempts", ())),
             stability=fields.get("stability"),
             notes=tuple(fields["notes"]),
+            warnings=tuple(fields.get("warnings", ())),
         )

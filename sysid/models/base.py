@@ -222,6 +222,22 @@ class AbstractModel(ABC):
         del theta
         return None
 
+    def output_moves(
+        self, factor: NDArray[np.float64], inputs: NDArray[np.float64], history: History
+    ) -> NDArray[np.float64] | None:
+        """How the free run moves with the parameters, where that is not the compiled recursion's to say.
+
+        Args:
+            factor: Directions of the parameters that a fit is uncertain of, shape ``(n_parameters, n_directions)``.
+            inputs: Shape ``(n_samples, n_inputs)``.
+            history: The samples before.
+
+        Returns:
+            Derivatives along each direction, shape ``(n_samples, n_directions)``; ``None`` for a recursion over lags.
+        """
+        del factor, inputs, history
+        return None
+
     def predict_outputs(
         self, signals: Dict[str, NDArray[np.float64]], rest: Dict[str, float]
     ) -> dict[str, NDArray[np.float64]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.history import History
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.narx import CLAMP
@@ -104,6 +105,10 @@ class NeuralStateSpace(AbstractStructure):
         }
 
 
+_APART = 1e-3
+"""Step of a difference, in standard deviations."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NeuralStateSpaceModel(AbstractModel):
     """A fitted neural state space.
@@ -158,6 +163,25 @@ class NeuralStateSpaceModel(AbstractModel):
             low=-self.clamp,
             high=self.clamp,
         )
+
+    def output_moves(
+        self, factor: NDArray[np.float64], inputs: NDArray[np.float64], history: History
+    ) -> NDArray[np.float64]:
+        """How the free run moves with the weights, by differences; see the base class.
+
+        A state that is estimated from several samples stays where it is.
+        """
+        form = self.recursion
+        scaled = form.scaled(inputs)
+        known = form.state(history) if len(history.output) > 1 else None
+        columns = []
+        for column in factor.T:
+            runs = []
+            for sign in (1.0, -1.0):
+                moved = replace(form, theta=self.theta + sign * _APART * column)
+                runs.append(moved.run(scaled, moved.state(history) if known is None else known.copy()))
+            columns.append((runs[0] - runs[1]) * form.scaling.output_scale / (2.0 * _APART))
+        return np.column_stack(columns) if columns else np.zeros((len(inputs), 0))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""

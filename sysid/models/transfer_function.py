@@ -14,9 +14,11 @@ from scipy import linalg
 from sysid.errors import ConfigError, shortened
 from sysid.models import orthonormal_basis as bases
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.history import History
 from sysid.models.lags import MOST, per_input, whole
 from sysid.models.mapping import Mapping
 from sysid.models.orthonormal_basis import BasisSection, Domain
+from sysid.models.polynomial_moves import Polynomials
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
 from sysid.models.realisation import Realisation, realise
@@ -220,6 +222,29 @@ class TransferFunctionModel(AbstractModel):
             B=self.numerator(j), F=self.denominator(j), delay=self.delays[j], discrete=discrete,
             of_numerator=f"B({name}, ", of_denominator=f"F({name}, ",
         )  # fmt: skip
+
+    @property
+    def polynomials(self) -> Polynomials:
+        """The same in polynomials, in the channels' units."""
+        inputs = range(len(self.sections))
+        form = self.scaling
+        # The scaled inputs' zero lies at their offset: what they hold the output at there is part of the constant.
+        return Polynomials(
+            numerators=[self.numerator(j) for j in inputs],
+            denominators=[self.denominator(j) for j in inputs],
+            constant=form.output_offset + form.output_scale * self.constant,
+            delays=self.delays,
+            sample_time=None if self.orders.domain is Domain.DISCRETE else self.sample_time,
+        )
+
+    def output_moves(
+        self, factor: NDArray[np.float64], inputs: NDArray[np.float64], history: History
+    ) -> NDArray[np.float64]:
+        """How the free run moves with numerators, denominators and the constant; see the base class."""
+        offset = np.asarray(self.scaling.input_offset)
+        before = len(history.output)
+        u = np.concatenate([history.inputs, inputs]) - offset
+        return self.polynomials.moves(factor, u, known=before > 1)[before:]
 
     @property
     def pole_radius(self) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from sysid.names import output_side
 from sysid.reporting.advice_section import advice_section
 from sysid.reporting.amplitude import amplitude_section
+from sysid.reporting.beginnings import beginnings_section, warning_points
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.judging.document import judgement_sections
@@ -63,7 +64,9 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     for best in results.best_fits:
         judged = scored_cases(best) or best.cases
         instants[best.name] = worst_instants({name: signals[best.slug][name] for name in judged}, 5)
-    sections = [overview_section(results, signals), _accuracy(results, published), *sweep_sections(folder, published)]
+    sections = [overview_section(results, signals), _accuracy(results, published)]
+    begun = beginnings_section(results)
+    sections += [*([] if begun is None else [begun]), *sweep_sections(folder, published)]
     columns = _columns(results)
     for index, best in enumerate(results.best_fits):
         suffix = f"-{index + 1}" if index else ""
@@ -89,7 +92,8 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     sections += [_data(results), *_others(results, signals, columns)]
     comparability = "" if published is None else published.comparability
     found = verdict(results, instants, comparability)
-    found = replace(found, points=(*sweep_points(folder, published), *found.points))
+    points = (*sweep_points(folder, published), *warning_points(results), *found.points)
+    found = replace(found, points=points)
     return Document(results=results, verdict=found, sections=tuple(sections))
 
 

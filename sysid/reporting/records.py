@@ -66,7 +66,7 @@ class RunResults(Record):
     seed: int | None = Field(default=None, description="Seed of everything random.")
     start: dict[str, Any] | None = Field(
         default=None,
-        description="How each free run begins: kind (rest, first-sample, measured) and n_measured, in samples.",
+        description="How each free run begins: kind (estimated, rest, first-sample, measured) and n_measured.",
     )
     data: DataSetRecord
 

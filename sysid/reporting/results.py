@@ -180,6 +180,9 @@ class FitRecord(Record):
     train_time_s: Number = Field(description="Wall seconds of the fit.")
     status: str = Field(description="Name of the status, such as CONVERGED.")
     notes: list[str] = Field(default=[], description="Sentences on choices that were made.")
+    warnings: list[str] = Field(
+        default=[], description="Those of them that say what was declared and is not so, as of a record's beginning."
+    )
     evidence: EvidenceRecord | None = None
     attempts: list[AttemptRecord] = Field(default=[], description="Every start at every checkpoint.")
     stability: StabilityRecord | None = Field(default=None, description="Of the free run over random sequences.")

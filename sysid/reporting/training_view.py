@@ -78,19 +78,21 @@ def coverage_table(results: Results) -> Table | None:
             rows.append(tuple(cells))
     if not rows:
         return None
+    without = [fit.name for fit in results.fits if fit not in fits]
     return Table(
         caption="How often the 95 % interval of the output holds the measured output, by case [%].",
         head=(("fit", ""), *((name, role.value) for name, role in columns.items())),
         rows=tuple(rows),
         note="95 would be exact; more is a cautious interval, less a promise not kept. Small figures: the mean half "
         "width, and what the interval from the estimation records alone holds, before it was widened to the errors on "
-        "the traces that choose.",
+        "the traces that choose."
+        + (f" No interval: {', '.join(without)}; why stands among their notes." if without else ""),
     )
 
 
 def _coverage_cell(case: CaseRecord | None, kind: str, unit: str) -> Cell:
     found = None if case is None or case.coverage is None else case.coverage.get(kind)
-    if found is None:
+    if found is None or np.isnan(found.share):
         return Cell(text="none")
     below = f"± {number(found.mean_half_width)} {unit}; {100.0 * found.share_before_spread:.1f} % alone"
     return Cell(text=f"{100.0 * found.share:.1f}", value=found.share, below=below, mark="number")

@@ -66,6 +66,8 @@ class OutputInterval:
         """
         counted = np.ones(len(target), dtype=bool) if counted is None else counted
         error, half = np.abs(target - self.output)[counted], self.half_width[counted]
+        if np.isnan(error).all():  # no such run, or nothing that counts
+            return Coverage(level=self.level, share=np.nan, share_before_spread=np.nan, mean_half_width=np.nan)
         return Coverage(
             level=self.level,
             share=float(np.mean(error <= half)),
@@ -138,7 +140,7 @@ class CaseIntervals:
 def predict_interval(
     fit: FitResult, trace: Trace, level: float = LEVEL, *, loop: Loop = Loop.CLOSED, start: Start | None = None
 ) -> OutputInterval:
-    """A fitted network's output over a trace, with the interval in which the measured output is expected.
+    """A fitted model's output over a trace, with the interval in which the measured output is expected.
 
     Where the interval comes from, and its limits, stand at the head of :mod:`sysid.estimation.networks.posterior`.
 
@@ -147,7 +149,7 @@ def predict_interval(
         trace: The trace; a free run reads its measured output only as the start allows.
         level: Probability that the interval holds the measured output at a sample, between 0 and 1.
         loop: ``CLOSED`` for the free run, ``OPEN`` for one step ahead.
-        start: What stands before the trace; at rest by default.
+        start: What stands before the trace; as the fit was made where it knows (``sysid.fit``), else at rest.
 
     Returns:
         The interval, from the first sample on that is not part of the start.
@@ -175,17 +177,24 @@ def predict_interval(
         raise ConfigError(
             "the fit has no posterior",
             where=fit.model.structure.label,
-            expected="a network that was fitted for long enough that the evidence was computed (some 20 iterations)",
+            expected="a stable free run, and of a network a training of some 20 iterations or more",
             got=fit.status.value,
-            remedy="fit it again with more iterations; linear models have an uncertainty of their parameters instead",
+            remedy="fit it by sysid.fit or in a pipeline, a network with more iterations (max_iterations: 100); of a "
+            "free run that grows without bound there is no interval",
         )
     if not 0.0 < level < 1.0:
         raise ConfigError("not a probability", where="level", expected="between 0 and 1", got=level)
-    experiment = Experiment.for_model(trace, fit.model, start or Start())
+    experiment = Experiment.for_model(trace, fit.model, start or _start_of(fit))
     closed = loop is Loop.CLOSED
     model, inputs, history = fit.model, experiment.inputs, experiment.history
     output = model.simulate(inputs, history) if closed else model.predict(inputs, experiment.output, history)
     return _interval((fit.posterior, model), experiment, output, loop, level)
+
+
+def _start_of(fit: FitResult) -> Start:
+    """How a fit with its data beside it begins its free runs; at rest without."""
+    found = getattr(fit, "start", None)
+    return found if isinstance(found, Start) else Start()
 
 
 def case_intervals(

@@ -16,12 +16,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, State
 from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.result import Status
 
 EVERY_S = 30.0
@@ -140,7 +139,7 @@ class Checkpoints:
         stored = self.kept.get("runs", {}).get(name)
         if stored is None:
             return None
-        with threadpool_limits(1, "blas"):  # as the engine does: sums in another order are other sums
+        with one_blas_thread():  # as the engine does: sums in another order are other sums
             state = Checkpoint(fields=stored["state"]).state(provider, prior)
         return _Run(
             first_loss=float(stored["first_loss"]),

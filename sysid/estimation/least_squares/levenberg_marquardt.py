@@ -58,13 +58,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from threadpoolctl import threadpool_limits
 
 from sysid.estimation.least_squares.damping import DAMPINGS, DEFAULT
 from sysid.estimation.least_squares.damping.base import AbstractDamping
 from sysid.estimation.least_squares.evidence import Prior, update
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.least_squares.termination import MAX_DAMPING, Termination
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.result import Evidence, Status
 
 MIN_GAIN = 1e-4
@@ -180,7 +180,7 @@ class LevenbergMarquardt:
         """
         # BLAS threads that wake for matrices of this size cost more than they give (measured: 92 ms an epoch of
         # 20,000 x 281 with two threads, 45 ms with one); the second core is better spent on another start.
-        with threadpool_limits(1, "blas"):
+        with one_blas_thread():
             state = State(theta=theta, at=provider.linearise(theta), damping=self.damping, prior=prior)
         return self.resume(provider, self._record(state, provider, 0.0))
 
@@ -205,7 +205,7 @@ class LevenbergMarquardt:
         first, before = state.at.loss if first_loss is None else first_loss, state.curve[-1].elapsed_s
         started = time.perf_counter()
         status: Status | None = None
-        with threadpool_limits(1, "blas"):
+        with one_blas_thread():
             try:
                 while status is None:
                     elapsed = spent_s + time.perf_counter() - started

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from sysid.errors import TraceError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.dead_time import likely, longest_dead_time
 from sysid.estimation.linear.determined import STILL, Determined
@@ -97,7 +97,7 @@ def fit_transfer_function(
 
     # BLAS threads that wake for matrices of some ten columns cost more than they give: beside one other process on two
     # cores a fit took four times as long with them.
-    with threadpool_limits(1, "blas"):
+    with one_blas_thread():
         fit = problem.solve(began, on_iteration, score if selection else None)
     return replace(fit, model=of_all_inputs(fit.model), notes=(*fit.notes, *determined.notes, *_still(experiments)))
 

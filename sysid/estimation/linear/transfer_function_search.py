@@ -43,6 +43,8 @@ SIGNIFICANT = 6.6
 """Drop of twice the log-likelihood that one more free parameter has by chance in one case of a hundred."""
 MOST_COMBINATIONS = 30
 """Combinations of dead times up to which all are tried; above, one input at a time."""
+COMPARED = 2
+"""Starts, the best as they are, from which a dead time is tried."""
 SLOWEST = 5.0
 """Longest time constant of a stable pole, in lengths of the longest record."""
 
@@ -442,7 +444,9 @@ class AbstractProblem(ABC):
 
     def _loss_at(self, delays: tuple[int, ...], unknown: int) -> float:
         provider = self.provider(delays, unknown=unknown)
-        return min(self._short_run(start, delays, provider).loss for start in self.starts(provider, few=True))
+        begun = [self._unrun(start, delays, provider) for start in self.starts(provider, few=True)]
+        worth = sorted(begun, key=lambda one: one.loss)[:COMPARED]
+        return min(self._short_run(one.start, delays, provider).loss for one in worth)
 
     @staticmethod
     def _unrun(start: PoleStart, delays: tuple[int, ...], provider: SeparableProvider) -> Candidate:

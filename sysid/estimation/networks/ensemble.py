@@ -37,12 +37,12 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Solution
 from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.training import FitProgress, Training
@@ -180,7 +180,7 @@ def as_candidate(
         for plain in (ensemble.model.theta, task.layout.centre())
     )
     prior, evidence = starts.first_prior(multistart.training, task.layout, task.provider, theta, centre), None
-    with threadpool_limits(1, "blas"):
+    with one_blas_thread():
         at = task.provider.linearise(theta)
         for _ in range(EVIDENCE_ROUNDS if multistart.training.regularisation is None else 0):
             prior, evidence = update(prior, theta, at, task.provider.n_samples)

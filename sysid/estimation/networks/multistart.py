@@ -17,7 +17,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from sysid.errors import TraceError
 from sysid.estimation.least_squares.checkpoint import Checkpoint
@@ -27,6 +26,7 @@ from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.training import FitProgress, Training
@@ -165,7 +165,7 @@ def run(multistart: Multistart) -> list[Candidate]:
     seen: list[Candidate] = []
     total = _work(training.n_starts, rungs)
     # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
-    with threadpool_limits(1, "blas"):
+    with one_blas_thread():
         for rung, share in enumerate(rungs):
             before = rungs[rung - 1] if rung else 0.0
             seconds = training.max_time_s * (share - before) * training.workers / total

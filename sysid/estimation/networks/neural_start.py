@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from threadpoolctl import threadpool_limits
 
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.neural_provider import NeuralProvider
@@ -186,7 +186,7 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
         sizes=s, theta=np.zeros(s.count), scaling=whole.scaling, rectified=whole.rectified, bound=np.inf
     )
     linear = NeuralProvider(template=template, experiments=provider.experiments)
-    with threadpool_limits(1, "blas"):  # more threads than one cost more than they give at these sizes
+    with one_blas_thread():  # more threads than one cost more than they give at these sizes
         fits = [_fitted(linear, _realised(linear, order)) for order in ARX_ORDERS]
     theta = _levelled(linear, _unit_states(linear, min(fits, key=linear.loss)))
     base = np.zeros(provider.n_parameters)

@@ -17,6 +17,7 @@ from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
+from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import FitResult, Loop
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start
@@ -93,8 +94,26 @@ def fit_neural_state_space(
     records = [(e.inputs, e.history) for e in experiments]
     records += [(e.inputs, e.history) for e in experiments_of(selection, mapping, start, rest)]
     status = multistart_status(choice.chosen, candidates, records, interrupted=multistart.stop.is_set())
+    posterior = _posterior(choice.chosen, provider, traces, selection, start)
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
-    return multistart_result(choice, candidates, training, status, seconds)
+    return replace(multistart_result(choice, candidates, training, status, seconds), posterior=posterior)
+
+
+def _posterior(
+    chosen: starts.Candidate,
+    provider: NeuralProvider,
+    traces: Sequence[Trace],
+    selection: Sequence[Trace],
+    start: Start,
+) -> Posterior | None:
+    """Of the model's weights; those of its map to an initial state only where a record begins by it."""
+    model = chosen.model
+    to_plain = np.eye(model.n_parameters, provider.n_parameters)
+    if provider.all_free:
+        to_plain[provider.template.sizes.start] = 0.0
+    runs, others = ([Experiment.for_model(t, model, start) for t in some] for some in (traces, selection))
+    found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
+    return None if found is None else calibrate(found, model, others)
 
 
 def check_training(training: Training) -> None:

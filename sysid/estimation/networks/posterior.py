@@ -46,7 +46,6 @@ import scipy
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.levenberg_marquardt import State
 from sysid.estimation.networks.provider import RecursionProvider
@@ -86,10 +85,11 @@ class Noise:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Posterior:
-    """The Gaussian posterior of a network's parameters.
+    """The Gaussian posterior of a model's parameters.
 
     Args:
-        factor: ``F`` with covariance ``F F^T`` of the model's flat parameters, shape ``(n_parameters, n_directions)``.
+        factor: ``F`` with covariance ``F F^T`` of the flat parameters of the model's recursion, or of the polynomials
+            of a transfer function, shape ``(n_parameters, n_directions)``.
         noise: Variance of the residuals, in the output's unit squared.
         spread: Factor of the standard deviations, at least 1: how much larger errors were on traces that train nothing.
     """
@@ -112,19 +112,17 @@ class Posterior:
             loop: ``CLOSED`` for the free run.
 
         Returns:
-            Shape ``(n_samples,)``, in the output's unit squared.
-
-        Raises:
-            ConfigError: If the model is no recursion over lags, whose sensitivities are known.
+            Shape ``(n_samples,)``, in the output's unit squared; NaN one step ahead where there is no such run.
         """
         form = model.recursion
-        if not isinstance(form, Recursion):
-            raise ConfigError(
-                "no sensitivities are known for this kind of model",
-                where=model.structure.label,
-                expected="a model over lagged samples",
-                got=type(form).__name__,
-            )
+        if not form.predicts and loop is not Loop.CLOSED:
+            return np.full(len(experiment.output), np.nan)
+        with np.errstate(all="ignore"):  # what the data leave open may move the output beyond all numbers
+            moves = model.output_moves(self.factor, experiment.inputs, experiment.history)
+            if moves is not None:
+                variance = np.einsum("ij,ij->i", moves, moves)
+                return np.where(np.isfinite(variance), variance, np.inf)
+        assert isinstance(form, Recursion)  # noqa: S101 - the forms without moves of their own
         provider = RecursionProvider(template=form, experiments=(experiment,), closed=loop is Loop.CLOSED)
         return provider.output_variance(form.theta, self.factor) * form.scaling.output_scale**2
 
@@ -172,10 +170,10 @@ def laplace(
         stride: Every so-manieth sample counted.
 
     Returns:
-        The posterior, not calibrated; ``None`` where the evidence was never computed, or the model is no recursion.
+        The posterior, not calibrated; ``None`` where the evidence was never computed.
     """
-    form, evidence = model.recursion, state.evidence
-    if evidence is None or not isinstance(form, Recursion):
+    evidence = state.evidence
+    if evidence is None:
         return None
     root = 1.0 / np.sqrt(state.prior.precision)
     M = (state.prior.beta / copies) * state.at.gauss_newton * root[:, None] * root[None, :]
@@ -183,13 +181,33 @@ def laplace(
     counted = sum(e.n_counted for e in experiments)
     paid = copies * stride * evidence.correlation_time * evidence.total_effective_parameters
     left = max(1.0 - paid / counted, LEAST_NOISE_SHARE)
-    variances = {}
-    for loop in Loop:
-        provider = RecursionProvider(template=form, experiments=tuple(experiments), closed=loop is Loop.CLOSED)
-        mse = 2.0 * provider.loss(form.theta) / counted * form.scaling.output_scale**2
-        variances[loop] = mse / left
-    noise = Noise(free_run=variances[Loop.CLOSED], one_step=variances[Loop.OPEN])
+    errors = remaining(model, experiments)
+    noise = Noise(free_run=errors.free_run / left, one_step=errors.one_step / left)
     return Posterior(factor=to_plain @ (root[:, None] * _inverse_root(M)), noise=noise)
+
+
+def remaining(model: AbstractModel, experiments: Sequence[Experiment]) -> Noise:
+    """Mean squared errors over some records.
+
+    Args:
+        model: The model.
+        experiments: The records, each with the history that its run begins with.
+
+    Returns:
+        Of both runs, in the output's unit squared; NaN one step ahead where there is no such run.
+    """
+    form, counted = model.recursion, sum(e.n_counted for e in experiments)
+    if isinstance(form, Recursion):
+        found = []
+        for closed in (True, False):
+            provider = RecursionProvider(template=form, experiments=tuple(experiments), closed=closed)
+            found.append(2.0 * provider.loss(form.theta) / counted * form.scaling.output_scale**2)
+        return Noise(free_run=found[0], one_step=found[1])
+    total = 0.0
+    for e in experiments:
+        error = model.simulate(e.inputs, e.history) - e.output
+        total += float(np.sum(error**2 * (1.0 if e.weights is None else e.weights)))
+    return Noise(free_run=total / max(counted, 1), one_step=float("nan"))
 
 
 def _inverse_root(M: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -216,8 +234,8 @@ def calibrate(posterior: Posterior, model: AbstractModel, experiments: Sequence[
     """
     if not experiments:
         return posterior
-    spreads = {}
-    for loop in Loop:
+    spreads = {Loop.CLOSED: 1.0, Loop.OPEN: 1.0}
+    for loop in Loop if model.recursion.predicts else (Loop.CLOSED,):
         ratios = [_standardised(posterior, model, experiment, loop) for experiment in experiments]
         promised = float(scipy.stats.norm.ppf(0.5 + 0.5 * CALIBRATED_AT))
         found = float(np.quantile(np.concatenate(ratios), CALIBRATED_AT)) / promised

@@ -233,7 +233,7 @@ class FreeRunCheck(AbstractStabilityCheck):
     @cached_property
     def reference(self) -> AbstractModel | None:
         """A stable linear model that follows the estimation traces; ``None`` where there is none, or none is asked."""
-        if self.mapping is None:
+        if self.mapping is None or len(self.mapping.outputs) > 1:
             return None
         m = len(self.mapping.inputs)
         start = Start(kind=StartKind.ESTIMATED)

@@ -145,6 +145,7 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]]) -> dict[st
         "seed": fit.seed,
         "initial": ready.config.initial,
         "notes": list(fit.notes),
+        "warnings": list(fit.warnings),
         "evidence": stored["evidence"],
         "attempts": stored["attempts"],
         "stability": stored["stability"],

@@ -11,7 +11,7 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
-from sysid.estimation.estimators import with_stability
+from sysid.estimation.estimators import estimator_of, with_stability
 from sysid.estimation.networks.choosing import VETTED
 from sysid.reporting.sweep_record import Trial
 from sysid.traces import Role
@@ -119,7 +119,8 @@ class Checks:
         """The fit with its posterior, which is too large to be kept of every trial: made from where training ended."""
         job, outcome, fit = self.driver.last[trial.number], self._outcome(trial), fits[number]
         if any(one["checkpoint"] is None for one in stored_models(outcome)):
-            return fit
+            estimation, start = self.bench.traces.with_role(Role.ESTIMATION), self.bench.start
+            return estimator_of(fit.model.structure).with_posterior(fit, estimation, start, self.bench.selection)
         training = {**job.training, "starts": 1, "ensemble": 1, "input_subsets": ()}
         again, _ = train(self.bench, replace(job, after=job.key, resume=True, training=training), outcome)[number]
         if not np.array_equal(again.model.recursion.numbers, fit.model.recursion.numbers):

@@ -51,6 +51,11 @@ class Bench:
     folder: Path | None = None
 
     @property
+    def start(self) -> Start:
+        """How each free run begins."""
+        return PipelineConfig.model_validate(dict(self.pipeline)).start
+
+    @property
     def stability(self) -> StabilityOptions:
         """How the free run is checked."""
         return PipelineConfig.model_validate(dict(self.pipeline)).stability.options(self.sequences)

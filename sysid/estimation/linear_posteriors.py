@@ -1,0 +1,88 @@
+"""The posterior of linear models: what their covariance says of the output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.experiment import Experiment
+from sysid.estimation.networks.posterior import Noise, Posterior, remaining
+from sysid.estimation.result import FitResult
+from sysid.models import ARXModel, Start, TransferFunctionModel
+from sysid.traces import Trace
+
+GROWTH = 1e-6
+"""By how much a pole's magnitude may exceed 1 before a free run is known at no sample."""
+
+LinearPosterior = Callable[[FitResult, Sequence[Trace], Start], Posterior | None]
+
+
+def arx_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
+    """Of an ARX model: least squares says it of the coefficients, under white residuals one step ahead.
+
+    Args:
+        fit: The fit.
+        traces: Estimation traces.
+        start: How a free run over them begins.
+
+    Returns:
+        The posterior; ``None`` where the free run grows without bound.
+    """
+    model, known = fit.model, fit.uncertainty
+    if known is None or not isinstance(model, ARXModel) or model.pole_radius > 1.0 + GROWTH:
+        return None
+    n = len(model.coefficients)
+    root = _root(known.covariance)
+    factor = np.zeros((1 + n, root.shape[1]))  # the recursion has the constant first
+    factor[1:] = root[:n]
+    if len(root) > n:
+        factor[0] = root[n]
+    runs = [Experiment.for_model(trace, model, start) for trace in traces]
+    counted = sum(run.n_counted for run in runs)
+    share = counted / max(counted - len(root), 1)
+    noise = Noise(free_run=remaining(model, runs).free_run * share, one_step=known.noise_variance)
+    return Posterior(factor=factor, noise=noise)
+
+
+def transfer_function_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
+    """Of a transfer function: its polynomials, under white errors of the free run.
+
+    Args:
+        fit: The fit.
+        traces: Estimation traces; the fit's own covariance is all that is needed.
+        start: Likewise.
+
+    Returns:
+        The posterior; ``None`` where the fit has no covariance, or the free run grows without bound.
+    """
+    del traces, start
+    model, known = fit.model, fit.uncertainty
+    if known is None or not isinstance(model, TransferFunctionModel) or model.pole_radius > 1.0 + GROWTH:
+        return None
+    root, names = _root(known.covariance), _polynomial_names(model)
+    factor = np.zeros((len(names), root.shape[1]))
+    for i, name in enumerate(known.names):  # an input that the records do not determine is not among them
+        factor[names.index(name)] = root[i]
+    return Posterior(factor=factor, noise=Noise(free_run=known.noise_variance, one_step=float("nan")))
+
+
+def _polynomial_names(model: TransferFunctionModel) -> list[str]:
+    """What :attr:`sysid.models.polynomial_moves.Polynomials.vector` holds, as a fit's uncertainty calls it."""
+    found = []
+    for j, name in enumerate(model.mapping.inputs):
+        n = len(model.denominator(j)) - 1
+        first = 0 if model.polynomials.sample_time is not None else 1
+        found += [f"B({name}, {power})" for power in range(len(model.numerator(j)))]
+        found += [f"F({name}, {power})" for power in range(first, first + n)]
+    return [*found, "constant"]
+
+
+def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``R`` with ``R R^T`` the covariance; what the data do not determine stays where it is."""
+    known = np.where(np.isfinite(covariance), covariance, 0.0)
+    scale = np.sqrt(np.maximum(np.diag(known), np.finfo(np.float64).tiny))
+    values, vectors = np.linalg.eigh(known / np.outer(scale, scale))
+    kept = values > 1e-14 * max(float(values.max(initial=0.0)), np.finfo(np.float64).tiny)
+    return np.asarray(scale[:, np.newaxis] * vectors[:, kept] * np.sqrt(values[kept]))

@@ -1,0 +1,111 @@
+"""How far the free run of a transfer function moves with its numerators and denominators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+APART = 1e-4
+"""Step of a difference, in standard deviations, where those are no larger than the coefficients."""
+AT_ONE = 1e-6
+"""Distance of a denominator's sum from 0 below which its response to a constant is not told from an integrator's."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Polynomials:
+    """A transfer function in the channels' units.
+
+    Args:
+        numerators: ``B`` of each input, ascending powers.
+        denominators: ``F`` of each input, ascending powers; the first (discrete) or the last is 1.
+        constant: Output without inputs.
+        delays: Dead times in samples.
+        sample_time: Seconds; ``None`` where the powers are of ``1/q`` and not of ``s``.
+    """
+
+    numerators: Sequence[NDArray[np.float64]]
+    denominators: Sequence[NDArray[np.float64]]
+    constant: float
+    delays: Sequence[int]
+    sample_time: float | None
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """Input by input the numerator, then the denominator but for its 1; the constant behind them."""
+        parts = [
+            part
+            for B, F in zip(self.numerators, self.denominators, strict=True)
+            for part in (B, F[1:] if self.sample_time is None else F[:-1])
+        ]
+        return np.concatenate([*parts, [self.constant]])
+
+    def at(self, vector: NDArray[np.float64]) -> Polynomials:
+        """The same with other numbers.
+
+        Args:
+            vector: As :attr:`vector`.
+
+        Returns:
+            The transfer function.
+        """
+        numerators, denominators, at = [], [], 0
+        for B, F in zip(self.numerators, self.denominators, strict=True):
+            numerators.append(vector[at : at + len(B)])
+            free = vector[at + len(B) : at + len(B) + len(F) - 1]
+            denominators.append(np.concatenate([[1.0], free] if self.sample_time is None else [free, [1.0]]))
+            at += len(B) + len(F) - 1
+        return Polynomials(
+            numerators=numerators, denominators=denominators, constant=float(vector[-1]), delays=self.delays,
+            sample_time=self.sample_time,
+        )  # fmt: skip
+
+    def moves(self, factor: NDArray[np.float64], inputs: NDArray[np.float64], *, known: bool) -> NDArray[np.float64]:
+        """Derivatives of the free run along some directions.
+
+        Args:
+            factor: Directions of :attr:`vector`, shape ``(n_parameters, n_directions)``.
+            inputs: Shape ``(n_samples, n_inputs)``; held at their first sample before.
+            known: Whether the output before the first sample is known, so that it does not move with the parameters.
+
+        Returns:
+            Shape ``(n_samples, n_directions)``.
+        """
+        begun = self._levels(inputs[0]) if known else None
+        base, columns = self.vector, []
+        for column in factor.T:
+            larger = float(np.max(np.abs(column) / (np.abs(base) + np.abs(base).max() * 1e-3 + 1e-300), initial=0.0))
+            h = APART / max(1.0, larger)
+            there, back = (self.at(base + sign * h * column)._run(inputs, begun) for sign in (1.0, -1.0))
+            columns.append((there - back) / (2.0 * h))
+        return np.column_stack(columns) if columns else np.zeros((len(inputs), 0))
+
+    def _discrete(self, j: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        B, F = self.numerators[j], self.denominators[j]
+        if self.sample_time is None:
+            return B, F
+        num, den, _ = signal.cont2discrete((B[::-1], F[::-1]), self.sample_time, method="zoh")
+        return np.atleast_1d(np.squeeze(num)), np.asarray(den)
+
+    def _levels(self, first: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What each input holds the output at; 0 where it would hold it nowhere."""
+        found = np.zeros(len(first))
+        for j, u in enumerate(first):
+            b, a = self._discrete(j)
+            found[j] = u * b.sum() / a.sum() if abs(a.sum()) > AT_ONE * np.abs(a).sum() else 0.0
+        return found
+
+    def _run(self, inputs: NDArray[np.float64], begun: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        levels = self._levels(inputs[0]) if begun is None else begun
+        y = np.full(len(inputs), self.constant)
+        for j, delay in enumerate(self.delays):
+            b, a = self._discrete(j)
+            u = np.concatenate(
+                [np.full(min(delay, len(inputs)), inputs[0, j]), inputs[: max(len(inputs) - delay, 0), j]]
+            )
+            state = signal.lfiltic(b, a, np.full(len(a) - 1, levels[j]), np.full(len(b), inputs[0, j]))
+            y = y + signal.lfilter(b, a, u, zi=state)[0]
+        return np.asarray(y)
