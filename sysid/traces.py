@@ -20,6 +20,27 @@ from sysid.errors import ChannelError, TraceError
 from sysid.units import Reference
 
 
+def check_text(text: str, what: str) -> None:
+    """Refuse text that is not made of whole characters: a lone surrogate, as from names of files that are no text.
+
+    Args:
+        text: Anything that somebody named.
+        what: What it is, for the error.
+
+    Raises:
+        TraceError: If it cannot be written as UTF-8.
+    """
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        whole = text.encode("utf-8", "replace").decode()
+        raise TraceError(
+            f"{what} holds half a character, which no file can hold", where=ascii(text),
+            expected="text that can be written as UTF-8", got=ascii(text),
+            remedy=f"name it in whole characters, for example {whole!r}",
+        ) from None  # fmt: skip
+
+
 class Role(enum.Enum):
     """What a trace may be used for. Scores on a trace count only if nothing was chosen on it."""
 
@@ -38,12 +59,19 @@ class Channel:
         unit: A unit known to pint (``"psi"``); ``"1"`` for a pure number.
         reference: For pressures, what they are measured from.
         description: What it is, for people.
+
+    Raises:
+        TraceError: If a text holds half a character, which no file can be written with.
     """
 
     name: str
     unit: str
     reference: Reference = Reference.NONE
     description: str = ""
+
+    def __post_init__(self) -> None:
+        for what, text in (("name", self.name), ("unit", self.unit), ("description", self.description)):
+            check_text(text, f"the {what} of a channel")
 
     @property
     def label(self) -> str:
@@ -92,6 +120,7 @@ class Trace:
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "channels", tuple(self.channels))
         object.__setattr__(self, "provenance", tuple(self.provenance))
+        check_text(self.name, "the name of a trace")
         self._check()
         if self.usable is not None:
             usable = np.array(self.usable, dtype=np.bool_)

@@ -300,9 +300,32 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
             wanted,
             shortened(first["input"]),
         )
+        expected, remedy = _CHANGES.get(first["type"], (expected, remedy))
+        if first["type"] in {"enum", "literal_error"}:
+            remedy = _choice(str(first["input"]), str(first.get("ctx", {}).get("expected", "")))
     if others:
         remedy += f" (also at fault: {', '.join(sorted({_beside(loc, item['loc'], origins) for item in others}))})"
     return ConfigError(what, where=origins.place(loc), expected=expected, got=got, remedy=remedy)
+
+
+_LIST = ("a list", "write a list: [..., ...], or one entry a line with - before it")
+_CHANGES: dict[str, tuple[str, str]] = {
+    **dict.fromkeys(("tuple_type", "list_type"), _LIST),
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), ("names with values", "write {name: value}")),
+    "string_type": ("text", "write it in quotes"),
+    "bool_type": ("true or false", "write true or false"),
+    "bool_parsing": ("true or false", "write true or false"),
+}
+"""What was expected, and what to write, by pydantic's kind of error."""
+
+
+def _choice(given: str, expected: str) -> str:
+    """The one of some words that was probably meant, or the first of them."""
+    words = re.findall(r"'([^']*)'", expected)
+    near = difflib.get_close_matches(given, words, n=1)
+    if near:
+        return f"did you mean {near[0]}?"
+    return f"write one of them, such as {words[0]}" if words else "correct the value"
 
 
 def _beside(first: Sequence[str | int], loc: Sequence[str | int], origins: Origins) -> str:

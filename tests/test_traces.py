@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from sysid.errors import TraceError
 from sysid.traces import Channel, Trace, TraceSet
 
 TRACE = Trace(name="EST01", sample_time=0.1, channels=(Channel(name="BP", unit="psi"),), values=np.zeros((5, 1)))
@@ -18,3 +20,16 @@ def test_a_set_says_which_cases_it_has():
     traces = TraceSet(name="abdx", traces=(TRACE,))
     assert "EST01" in traces
     assert "VAL01" not in traces
+
+
+@pytest.mark.parametrize("made", [lambda name: Channel(name=name, unit="V"), lambda name: Channel(name="u", unit=name)])
+def test_half_a_character_is_refused_where_it_enters_and_the_remedy_is_whole(made):
+    with pytest.raises(TraceError, match="half a character") as refused:
+        made("u\ud800")
+    assert "'u?'" in refused.value.remedy
+    made("u?")
+
+
+def test_a_trace_is_named_in_whole_characters():
+    with pytest.raises(TraceError, match="half a character"):
+        Trace(name="\udcff", sample_time=0.1, channels=TRACE.channels, values=TRACE.values)

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from sysid.content import nearest_file
 from sysid.errors import ConfigError, ReaderError
 from sysid.ingest.meaning import with_meaning
 from sysid.ingest.options import FileOptions, RepairOptions
@@ -113,12 +114,15 @@ def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOpt
             remedy="remove it",
         )
     if not path.is_file():
+        near = nearest_file(path, reader.suffixes)
         raise ReaderError(
             "there is no such file",
             where=path,
             expected=f"a {reader.name} file",
             got="a folder" if path.is_dir() else "nothing at this path",
-            remedy="check the path; in a dataset.yaml it is relative to that file",
+            remedy=f"did you mean {near.name}?"
+            if near
+            else "check the path; in a dataset.yaml it is relative to that file",
         )
     try:
         return with_meaning(reader.read(path, files, repairs), files)
