@@ -14,12 +14,12 @@ from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.dead_time import likely, longest_dead_time
 from sysid.estimation.linear.determined import STILL, Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.transfer_function_search import AbstractProblem, Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
+from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
 from sysid.estimation.result import FitResult
 from sysid.models import AbstractModel, Domain, Mapping, Scaling, Start, TransferFunction, TransferFunctionModel
 from sysid.traces import Trace

@@ -17,11 +17,11 @@ from sysid.errors import ConfigError, FitDivergedError
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
 from sysid.estimation.least_squares.termination import Termination
-from sysid.estimation.linear.dead_time import AROUND, descend
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import sections_of
 from sysid.estimation.linear.transfer_function_uncertainty import transfer_function_uncertainty
 from sysid.estimation.linear.variable_projection import PoleParameters, Sections, SeparableProvider
+from sysid.estimation.nonparametric.dead_time import AROUND, descend
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import AbstractModel, Mapping, Scaling, TransferFunction, TransferFunctionModel

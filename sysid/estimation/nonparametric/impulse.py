@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
+from sysid.estimation.nonparametric.dead_time import shares
 from sysid.estimation.nonparametric.evidence import CHUNK, Posterior, Triangle, posterior, triangle
 from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
 from sysid.estimation.nonparametric.noise import whitener
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 FIRST_LENGTH, LONGEST, MOST_COLUMNS = 32, 512, 512
 """Lags that are tried first and at most, and columns at most that all inputs may have together."""
 
+CLEARLY = 1.5
+"""How much more of the output a late response must explain than an early one, for more lags to be tried first."""
 FEWEST_ROWS, MOST_ASKED = 8, 4096
 SEEN = 2.5
 """Standard deviations that a response is away from nothing where it is seen to begin."""
@@ -286,7 +289,8 @@ def estimate_impulse_response(
     length = room if lags is not None else min(FIRST_LENGTH, room)
     most = length if lags is not None else min(room, longest, MOST_COLUMNS // m)
     given = None if dead_times is None else np.asarray(dead_times, dtype=np.int64)
-    length = min(max(length, 0 if given is None else int(given.max()) + 2), max(most, 2))
+    known = _reach(segments, m, most) if given is None else int(given.max()) + 2
+    length = min(max(length, known), max(most, 2))
     while True:
         problem = Regression(segments=segments, scale=scale, length=length)
         kernels = tuple(Kernel) if kernel is None else (kernel,)
@@ -355,6 +359,18 @@ def _room(segments: Sequence[Segment], m: int, lags: int | None) -> int:
         )
     total = sum(map(len, segments))
     return max(2, min(longest // 2, longest - FEWEST_ROWS, MOST_COLUMNS // m, max(total // (2 * m), 4)))
+
+
+def _reach(segments: Sequence[Segment], m: int, most: int) -> int:
+    """Lags that a response needs which begins later than the lags that are tried first: it would be taken for none."""
+    found = 0
+    targets = [s.output - s.output.mean() for s in segments]
+    for j in range(m):
+        share = shares([s.inputs[:, j] - s.inputs[:, j].mean() for s in segments], targets, most, 1)
+        early = float(share[: FIRST_LENGTH // 2].max())
+        if float(share.max()) > CLEARLY * early:
+            found = max(found, int(share.argmax()) + FIRST_LENGTH)
+    return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

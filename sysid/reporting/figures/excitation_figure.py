@@ -33,9 +33,13 @@ def excitation_figure(found: Excitation) -> Figure:
             left.plot(*thin(found.time, x, _COLUMNS), color=colour, drawstyle="steps-post")
             left.set_ylabel(f"{name} [{unit}]")
             size = np.abs(np.fft.rfft(x - x.mean()))[1:] / len(x)
-            seen = size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)
-            right.plot(*thin(frequency[seen], size[seen], _COLUMNS), color=colour)
-            right.set_yscale("log")
+            every = -(-len(size) // _COLUMNS)
+            # Of many lines the highest of each few: a spectrum of lines is no curve.
+            whole = len(size) // every * every
+            top = size[:whole].reshape(-1, every)
+            place = np.arange(0, whole, every) + top.argmax(axis=1)
+            right.plot(frequency[place], size[place], ".", color=colour, markersize=2.5)
+            right.set_ylim(0.0, 1.1 * max(float(size.max(initial=0.0)), 1e-300))
             right.set_ylabel("amplitude")
         rows[-1, 0].set_xlabel("time [s]")
         rows[-1, 1].set_xlabel("frequency [Hz]")

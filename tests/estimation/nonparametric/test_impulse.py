@@ -54,6 +54,15 @@ def test_the_dead_time_is_that_of_the_plant_and_nothing_comes_before_it() -> Non
     assert np.all(found.values[0, : found.dead_times[0].low] == 0.0)
 
 
+@pytest.mark.parametrize("dead", [20, 45, 80])
+def test_a_response_that_begins_late_is_not_taken_for_none(dead: int) -> None:
+    rng = np.random.default_rng(dead)
+    u = np.repeat(rng.choice([-1.0, 1.0], 150), 5)
+    y = lfilter([*np.zeros(dead), 0.3], [1.0, -0.7], u)
+    found = estimate_impulse_response([trace(u, y + 0.1 * y.std() * rng.standard_normal(750))], ONE)
+    assert abs(found.dead_times[0].best - dead) <= 1
+
+
 def test_bands_hold_the_truth_where_there_is_a_response() -> None:
     inside = []
     for seed in range(6):

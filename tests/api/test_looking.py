@@ -1,0 +1,68 @@
+"""The look at data first from Python: what is asked in a line answers, prints, draws and saves itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sysid
+from sysid.errors import ConfigError
+from sysid.traces import TraceSet
+
+
+def traces(outputs: int = 1) -> TraceSet:
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1, 1, 100), 5)
+    y = np.convolve(u, [0.0, 0.0, *(0.3 * 0.7 ** np.arange(60))])[:500]
+    columns = np.column_stack([(k + 1) * y + 0.01 * rng.standard_normal(500) for k in range(outputs)])
+    return sysid.data((u, columns), sample_time=0.1, split=0.8, units={"u": "V"})
+
+
+def test_advice_prints_what_was_found_and_draws_it() -> None:
+    found = sysid.advise(traces(), "u -> y")
+    assert "acts after 2 samples" in str(found)
+    assert str(found) in found._repr_html_().replace("&gt;", ">")
+    assert set(found.to_frame()["verdict"]) <= {"fine", "worth knowing", "look at this", "cannot be said", ""}
+    assert len(found.plot().axes) == 3
+
+
+def test_two_channels_need_no_mapping_and_three_do() -> None:
+    assert str(sysid.advise(traces()).mapping) == "u -> y"
+    with pytest.raises(ConfigError, match="nothing tells"):
+        sysid.advise(traces(2))
+
+
+def test_several_outputs_are_looked_at_one_by_one() -> None:
+    found = sysid.advise(traces(2), "u -> y1+y2")
+    assert list(found.outputs) == ["y1", "y2"]
+    assert set(found.to_frame()["output"]) == {"y1", "y2"}
+    assert "u -> y2" in str(found)
+
+
+def test_a_record_with_nothing_to_draw_says_so() -> None:
+    found = sysid.advise(sysid.data((np.ones(50), np.arange(50.0)), sample_time=1.0))
+    with pytest.raises(ConfigError, match="nothing to draw"):
+        found.plot()
+
+
+def test_responses_draw_themselves_and_models_over_them() -> None:
+    data = traces()
+    fit = sysid.fit(data, "u -> y", sysid.ARX(na=1, nb=1, nk=2), stability=sysid.StabilityOptions(count=0))
+    response = sysid.frequency_response(data, method="welch", resolution=2.0)
+    gain = response.plot(fit).axes[0]
+    assert fit.model.structure.label in [line.get_label() for line in gain.lines]
+    pulse = sysid.impulse_response(data, kernel="TC")
+    assert pulse.dead_times[0].best == 2
+    assert len(pulse.plot().axes) == 1
+    with pytest.raises(ConfigError, match="kernel"):
+        sysid.impulse_response(data, kernel="SE")
+
+
+def test_an_excitation_is_saved_and_read_again(tmp_path: Path) -> None:
+    found = sysid.excite("prbs", samples=63, sample_time=0.1, low=0.0, high=5.0, names=["a", "b"], units=["V", "mm"])
+    again = sysid.load(found.save(tmp_path / "u.csv"))
+    np.testing.assert_array_equal(again.traces[0].values, found.values)
+    assert [channel.label for channel in again.channels] == ["a [V]", "b [mm]"]
+    assert len(found.plot().axes) == 4

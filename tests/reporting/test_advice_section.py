@@ -1,0 +1,46 @@
+"""The section of a report on what is in the record: made from what is stored, and from nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import sysid
+from sysid.reporting.advice_record import AdviceRecord
+from sysid.reporting.advice_section import advice_section
+from sysid.reporting.parts import Picture
+from sysid.reporting.tables import Table
+from sysid.workbench.runner.store import strict
+
+
+def record(u: np.ndarray, y: np.ndarray) -> AdviceRecord:
+    traces = sysid.data({"valve <1>": u, "level": y}, inputs="valve <1>", outputs="level", sample_time=0.1)
+    stored = strict(sysid.advise(traces).to_dict())
+    return AdviceRecord.model_validate_json(AdviceRecord.model_validate(stored).model_dump_json())
+
+
+def test_every_finding_is_a_row_and_the_responses_are_drawn() -> None:
+    u = np.repeat(np.random.default_rng(0).uniform(-1, 1, 60), 5)
+    found = record(u, np.convolve(u, [0.0, 0.3, 0.2, 0.1])[:300])
+    section = advice_section([found, found])
+    tables = [part for part in section.parts if isinstance(part, Table)]
+    assert [len(table.rows) for table in tables] == [len(found.findings) + len(found.suggestions)] * 2
+    pictures = [part for part in section.parts if isinstance(part, Picture)]
+    assert len(pictures) == 2
+    assert "valve &lt;1&gt;" in pictures[0].svg
+
+
+def test_a_record_without_a_response_has_no_picture() -> None:
+    section = advice_section([record(np.ones(20), np.arange(20.0))])
+    assert not any(isinstance(part, Picture) for part in section.parts)
+
+
+def test_a_finding_of_a_later_release_is_shown_by_its_code() -> None:
+    found = record(np.ones(20), np.arange(20.0))
+    later = found.findings[0].model_copy(update={"code": "weather.rain", "topic": "WEATHER", "verdict": "WET"})
+    table = next(
+        part
+        for part in advice_section([found.model_copy(update={"findings": [later]})]).parts
+        if isinstance(part, Table)
+    )
+    assert [cell.text for cell in table.rows[0]][:2] == ["WEATHER", "WET"]
+    assert "weather.rain" in table.rows[0][2].text
