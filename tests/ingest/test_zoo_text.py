@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid.ingest import inspect_file, load_dataset, propose_dataset
+from sysid.ingest import inspect_file, load_dataset
+from sysid.workbench.cli import run_cli
 
 N = 20
 T = [0.1 * k for k in range(N)]
@@ -198,11 +199,15 @@ ZOO = {
 
 
 @pytest.mark.parametrize("animal", ZOO.values(), ids=ZOO)
-def test_what_is_proposed_for_a_file_reads_it_right(tmp_path: Path, animal: Animal) -> None:
-    path = tmp_path / f"record{animal.suffix}"
+def test_what_is_proposed_for_a_file_reads_it_right(
+    tmp_path: Path, animal: Animal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # What is drawn is tested where it is drawn.
+    monkeypatch.setattr("sysid.workbench.commands.ingest._picture", lambda _: "none")
+    path, proposed = tmp_path / f"record{animal.suffix}", tmp_path / "dataset.yaml"
     path.write_bytes(animal.text.encode(animal.encoding))
-    proposal = propose_dataset(inspect_file(path))
-    (tmp_path / "dataset.yaml").write_text(proposal, encoding="utf-8")
+    assert run_cli(["ingest", str(path), "--propose", str(proposed)]) == 0
+    proposal = proposed.read_text(encoding="utf-8")
     trace = load_dataset(tmp_path)["record"]
     states = max(trace[animal.u]) == 1.0
     assert len(trace) == N
