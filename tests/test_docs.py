@@ -85,6 +85,21 @@ def test_an_example_of_the_python_page_runs_in_a_few_lines(
     assert (tmp_path / Path(name).stem / "model.json").is_file()
 
 
+NEIGHBOURS = {"from-sysidentpy.md", "from-jax-sysid.md"}
+TASKS = [page for page in PAGES if page.parent.name == "how" or page.name in NEIGHBOURS]
+
+
+@pytest.mark.parametrize(
+    ("name", "block"), [pytest.param(*pair, id=pair[0]) for page in TASKS for pair in blocks_of(str(page))]
+)
+def test_an_example_of_a_task_runs(
+    name: str, block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, name, "exec"), {})  # noqa: S102 - our own page
+    assert capsys.readouterr().out.strip()
+
+
 def test_the_example_of_linear_models_runs(capsys: pytest.CaptureFixture[str]) -> None:
     ((name, block),) = blocks_of("linear-models.md")
     exec(compile(block, name, "exec"), {})  # noqa: S102 - our own page
