@@ -124,10 +124,10 @@ def test_installed_packages_are_found_without_being_imported():
 def test_a_run_that_cannot_be_tracked_says_so_and_goes_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    from sysid.workbench import listeners
+    from sysid.workbench import listeners, trackers
     from sysid.workbench.runner.program import Closing
 
-    monkeypatch.setattr(listeners, "has", lambda package: package != "mlflow")
+    monkeypatch.setattr(trackers, "has", lambda package: package != "mlflow")
     assert listeners.Listeners.of(tracking=True).end(Closing(compare=True)) == 0
     said = capsys.readouterr().out
     assert 'pip install "sysid-workbench[mlflow]"' in said
