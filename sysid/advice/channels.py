@@ -62,6 +62,7 @@ def _channel(record: Record, name: str) -> Iterator[Finding]:
     # An input whose levels are held is a command: where it stands, and in which steps, was somebody's choice.
     if name == record.mapping.output or _roughness(parts) > 0.0:
         yield from _resolution(name, x, levels)
+    if name == record.mapping.output:
         yield from _ends(name, parts, x)
     yield from _spikes(name, parts, x, levels)
 
@@ -177,8 +178,10 @@ def _trend(record: Record, part: NDArray[np.float64], place: tuple[str, int, int
     at, jump, rest = _jump(centred)
     step = np.where(np.arange(n) < at, 0.0, jump)
     spread = np.sqrt(line / n / _effective(centred - slope * t))
-    jump_spread = np.sqrt(rest / n / _effective(centred - step + step.mean()))
-    if abs(jump) > max(TREND_SHARE * size, 8.0 * jump_spread) and rest < 0.7 * line:
+    # Of the difference of two means, over parts that may be of unequal length.
+    parts = n / np.sqrt(at * (n - at))
+    jump_spread = parts * np.sqrt(rest / n / _effective(centred - step + step.mean()))
+    if abs(jump) > max(TREND_SHARE * size, 6.0 * jump_spread) and rest < 0.7 * line:
         seconds = (first + at * factor) * record.sample_time
         figures = {"size": jump, "share": abs(jump) / size, "seconds": seconds}
         code = "output.jump"

@@ -31,7 +31,8 @@ SLIGHT, CLEAR = 0.05, 0.2
 """Parts of what a linear response leaves that curvature explains: where it is told, and where it is clear."""
 NOTHING_LEFT = 1e-6
 """Part of the output's variance that a linear response leaves, below which there is nothing to ask."""
-NEIGHBOURS = 6
+NEIGHBOURS, SMOOTH = 6, 10
+"""Excited lines to either side over which a response is a parabola; settling times that make a period long enough."""
 COHERENT = 0.9
 
 
@@ -88,6 +89,10 @@ def _periodic(record: Record) -> Finding | None:
     segment = max(record.segments, key=len)
     period = period_of(segment.inputs[: 2**18, j])
     if period < 4 * NEIGHBOURS or len(segment) < 2 * period:
+        return None
+    # Between lines that lie so far apart a response is no parabola: its own bends would pass for distortion.
+    slow, factor = record.slowed
+    if not isinstance(slow.impulse, str) and period < SMOOTH * max(slow.impulse.settling()) * factor:
         return None
     return _approximation(segment, j, period)
 

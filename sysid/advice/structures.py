@@ -45,7 +45,8 @@ def suggestions(record: Record, findings: Sequence[Finding]) -> tuple[Suggestion
             found.append(Suggestion(structure=transfer, code="structure.transfer_function"))
     if codes & NOT_LINEAR:
         lags = max(arx.na, 2)
-        network = NARX(input_delays=max(lags, max(arx.nk, default=0) + 1), output_delays=lags, neurons=8)
+        late = 0 if "linearity.nothing_explained" in codes else max(arx.nk, default=0) + 1
+        network = NARX(input_delays=max(lags, late), output_delays=lags, neurons=8)
         found.append(Suggestion(structure=network, code="structure.network"))
     return tuple(found)
 
