@@ -87,7 +87,9 @@ def read_trace(
         channels=tuple(channels) if channels is not None else _all_channels(table, files),
         sample_time=sample_time if sample_time is not None else _step(table, files, grid),
     )
-    return assemble(table, wanted, files=files, grid=grid, repairs=repairs)
+    held = [table]
+    del table  # given away: what assembles it lets go of columns that it no longer needs, and they may be large
+    return assemble(held.pop(), wanted, files=files, grid=grid, repairs=repairs)
 
 
 def _as_written(table: RawTable) -> Trace | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from sysid.ingest.grid import grid_places
 
 _MOST_SLOTS = 1e18  # of one gap: a stamp that is nonsense shall not overflow
+_PIECE = 1 << 16
 _GAP_FACTOR = 1.5  # a step this many times the usual one means that a sample is missing
 
 
@@ -63,7 +65,7 @@ def survey(stamps: NDArray[np.float64], *, longest_step: float | None = None) ->
         >>> round(timing.step, 6), timing.gaps.tolist(), timing.missing
         (0.1, [2], 2)
     """
-    none = np.zeros(0, dtype=np.intp)
+    none, missing = np.zeros(0, dtype=np.intp), 0
     steps = np.diff(stamps)
     if len(steps) and steps.min() > 0.0:  # in order, as nearly all records are
         backward = duplicates = none
@@ -76,15 +78,17 @@ def survey(stamps: NDArray[np.float64], *, longest_step: float | None = None) ->
         rising = stamps[kept]
         steps = np.diff(rising)
     if len(steps) == 0:
-        median, slope, jitter, slots, is_gap = np.nan, np.nan, 0.0, np.zeros(1), np.zeros(0, dtype=bool)
+        median, slope, jitter, is_gap = np.nan, np.nan, 0.0, np.zeros(0, dtype=bool)
     else:
         median = float(np.median(steps))
         limit = _GAP_FACTOR * median if longest_step is None else longest_step
         is_gap = steps > limit * (1.0 + 1e-9)
-        slots = np.arange(len(rising), dtype=np.float64)
+        slots = None
         if is_gap.any():
             # Outside gaps every step is one slot, however uneven: only a gap lacks samples.
+            slots = np.zeros(len(rising))
             slots[1:] = np.cumsum(np.where(is_gap, np.clip(np.rint(steps / median), 1.0, _MOST_SLOTS), 1.0))
+            missing = int(slots[-1]) - (len(rising) - 1)
         del steps
         slope, jitter = _line(slots, rising)
     return Timing(
@@ -95,19 +99,29 @@ def survey(stamps: NDArray[np.float64], *, longest_step: float | None = None) ->
         median_step=median,
         jitter=jitter,
         gaps=np.flatnonzero(is_gap) if kept is None else kept[:-1][is_gap],
-        missing=int(slots[-1]) - (len(rising) - 1),
+        missing=missing,
         duplicates=duplicates,
         backward=backward,
     )
 
 
-def _line(slots: NDArray[np.float64], stamps: NDArray[np.float64]) -> tuple[float, float]:
-    """Slope of the least-squares line through the stamps, and the largest distance from it."""
-    x, y = slots - slots.mean(), stamps - stamps.mean()
-    slope = float(x @ y / (x @ x))
-    x *= slope
-    y -= x
-    return slope, float(max(y.max(), -y.min()))
+def _line(slots: NDArray[np.float64] | None, stamps: NDArray[np.float64]) -> tuple[float, float]:
+    """Slope of the least-squares line through the stamps, and the largest distance from it; one slot each by default.
+
+    Piece by piece: whole arrays of some ten millions of stamps would be the most that a reader needs.
+    """
+    n = len(stamps)
+    middle, mean = (n - 1) / 2.0 if slots is None else float(slots.mean()), float(stamps.mean())
+
+    def pieces() -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        for first in range(0, n, _PIECE):
+            end = min(first + _PIECE, n)
+            x = np.arange(first, end, dtype=np.float64) if slots is None else slots[first:end]
+            yield x - middle, stamps[first:end] - mean
+
+    sums = np.sum([(x @ y, x @ x) for x, y in pieces()], axis=0)
+    slope = float(sums[0] / sums[1])
+    return slope, float(max(np.abs(y - slope * x).max() for x, y in pieces()))
 
 
 def round_step(step: float) -> float:

@@ -8,8 +8,6 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from sysid.errors import ReaderError
 
 LONGEST_LINE = 1_000_000
@@ -17,7 +15,6 @@ LONGEST_LINE = 1_000_000
 
 _BLOCK = 4 << 20
 _HEAD = 1 << 18
-_NEWLINE = 10
 _ASCII_INSIDE = {"utf-8", "utf-8-sig", "cp1252", "iso8859-1", "iso8859-15", "ascii"}
 _HEAD_LINES = 400
 _FEWEST_LINES = 8
@@ -95,7 +92,7 @@ class TextFile:
                 while skip and whole:
                     whole = whole.partition(b"\n")[2]
                     skip, line = skip - 1, line + 1
-                lines = int(np.count_nonzero(np.frombuffer(whole, dtype=np.uint8) == _NEWLINE))
+                lines = whole.count(b"\n")
                 # Below that many bytes in all, no line among them can be too long.
                 if len(data) > lines * LONGEST_LINE or len(rest) > LONGEST_LINE:
                     self._check_lines(whole, rest, line)
