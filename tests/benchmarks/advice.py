@@ -4,8 +4,8 @@
 
 Each seed is another stable plant of order one or two with a dead time of one to six samples, another excitation (PRBS,
 many levels, filtered and white noise, multisine; 300, 800 or 2,000 samples), and another noise, white or coloured, 1 to
-50 % of the output. A false alarm is any finding of feedback, curvature, distortion, limits, spikes, drifts or jumps that
-asks to be looked at. Such records are then spoiled in one way each, from 800 samples on, with noise of at most 5 %.
+50 % of the output. A false alarm is any finding of feedback, curvature, distortion, limits, spikes, drifts or jumps
+that asks to be looked at. Such records are then spoiled in one way each, from 800 samples on, noise being at most 5 %.
 """
 
 from __future__ import annotations
