@@ -121,6 +121,20 @@ class Innovations:
         drive = self.B @ inputs + self.K @ (outputs - self.D @ inputs - self.constant)
         return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.predictor, drive, cond=1e-9)[0])
 
+    def padded(self, states: int) -> Innovations:
+        """The same system with states more that nothing reaches and nobody sees."""
+        more = states - self.n_state
+        if more <= 0:
+            return self
+        below, beside = ((0, more), (0, 0)), ((0, 0), (0, more))
+        return replace(
+            self,
+            A=np.pad(self.A, (0, more)),
+            B=np.pad(self.B, below),
+            C=np.pad(self.C, beside),
+            K=np.pad(self.K, below),
+        )
+
     def in_coordinates(self, T: Array) -> Innovations:
         """The same system with the state ``T x``."""
         back = linalg.inv(T)

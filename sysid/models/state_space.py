@@ -240,6 +240,8 @@ class StateSpace(AbstractForm):
         known: NDArray[np.bool_],
     ) -> NDArray[np.float64]:
         """How far the state at the history's begin is from the one expected, judged by its output."""
+        if not self.n_state:
+            return x
         missing = output - self._run(scaled, x.copy())
         rows = np.empty((len(scaled), self.n_outputs, self.n_state))
         row = self.C.copy()
@@ -258,10 +260,15 @@ class StateSpace(AbstractForm):
         if (len(left) > rank and clean) or self._radius >= 1.0 - AT_ONE:
             return np.asarray(found / scale)
         spread = self._covariance()
-        seen = observed @ spread @ observed.T
+        with np.errstate(all="ignore"):
+            seen = observed @ spread @ observed.T
+        if not np.isfinite(seen).all():  # so near the edge that a covariance has no digits left
+            return np.asarray(found / scale)
         if len(left) <= rank:
             level = HISTORY_NOISE * max(float(np.trace(seen)) / len(seen), np.finfo(np.float64).tiny)
-        return np.asarray(spread @ observed.T @ linalg.lstsq(seen + level * np.eye(len(seen)), missing)[0])
+        with np.errstate(all="ignore"):
+            moved = spread @ observed.T @ linalg.lstsq(seen + level * np.eye(len(seen)), missing)[0]
+        return np.asarray(moved if np.isfinite(moved).all() else found / scale)
 
     def _covariance(self) -> NDArray[np.float64]:
         """Covariance of the state under white inputs; the identity where the system is not stable."""

@@ -120,6 +120,9 @@ def _record(rng: Rng, length: int, *, kinds: list[str], output: str, scales: Arr
     return {**dict(zip(names, u.T, strict=True)), "y": y}
 
 
+KINDS = ["ARX", "TF", "NARX", "NSS", "SS", "VectorSS", "OE", "BJ", "ARMAX"]
+
+
 def _starts() -> st.SearchStrategy[sysid.Start]:
     return st.one_of(
         st.just(sysid.Start(kind="estimated")),
@@ -132,8 +135,24 @@ def _starts() -> st.SearchStrategy[sysid.Start]:
 
 @st.composite
 def _fits(draw: st.DrawFn, n_inputs: int) -> tuple[AbstractStructure, Options | None]:
-    kind = draw(st.sampled_from(["ARX", "TF", "NARX", "NSS"]))
+    kind = draw(st.sampled_from(KINDS))
     each = st.tuples
+    if kind in {"SS", "VectorSS"}:
+        structure = sysid.LinearStateSpace if kind == "SS" else sysid.VectorStateSpace
+        asked = {name: draw(st.booleans()) for name in ("feedthrough", "noise", "intercept")}
+        method = draw(st.sampled_from(["prediction-error", "subspace"]))
+        return structure(states=draw(st.integers(1, 4)), **asked), sysid.StateSpaceTraining(
+            method=method, max_iterations=draw(st.integers(0, 15)), stable=draw(st.sampled_from([None, True, False]))
+        )
+    if kind in {"OE", "BJ", "ARMAX"}:
+        nb, nf, nk = (draw(each(*[st.integers(low, 2)] * n_inputs)) for low in (1, 0, 0))
+        na, nc, nd = (draw(st.integers(low, 2)) for low in (0, 0, 0))
+        given: dict[str, AbstractStructure] = {
+            "OE": sysid.OE(nb=nb, nf=nf, nk=nk),
+            "BJ": sysid.BJ(nb=nb, nc=nc, nd=nd, nf=nf, nk=nk),
+            "ARMAX": sysid.ARMAX(na=na, nb=nb, nc=nc, nk=nk, integrated=draw(st.booleans())),
+        }
+        return given[kind], sysid.PolynomialTraining(max_iterations=draw(st.integers(0, 15)))
     if kind == "ARX":
         nb, nk = (draw(each(*[st.integers(low, 3)] * n_inputs)) for low in (1, 0))
         return sysid.ARX(na=draw(st.integers(0, 3)), nb=nb, nk=nk, intercept=draw(st.booleans())), None

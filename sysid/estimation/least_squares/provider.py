@@ -26,6 +26,16 @@ class Linearisation:
     gauss_newton: NDArray[np.float64]
     correlation_time: float = 1.0
 
+    def scaled(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The Gauss-Newton matrix with a diagonal of ones, as rounding should see it.
+
+        Returns:
+            The roots of its diagonal, 1 where that is zero, and the matrix divided by them on both sides.
+        """
+        diagonal = np.diag(self.gauss_newton)
+        root = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        return root, self.gauss_newton / root / root[:, np.newaxis]
+
     @property
     def finite(self) -> bool:
         """Whether the matrix can be used: the sensitivities of an unstable free run grow beyond all numbers."""

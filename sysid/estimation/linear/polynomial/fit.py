@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from sysid.errors import ConfigError, FitDivergedError, TraceError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
@@ -119,7 +120,7 @@ def fit_polynomial(
             "mse": unit * np.array([one.mse for one in solution.curve]),
         },
         train_time_s=time.perf_counter() - began,
-        uncertainty=_uncertainty(model, at.gauss_newton, 2.0 * at.loss, errors.n_samples, variance * unit),
+        uncertainty=_uncertainty(model, at, errors.n_samples, variance * unit),
         notes=(_stability(model),),
     )
 
@@ -174,8 +175,11 @@ def _starts(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Array
     looked = [piece for piece in looked if len(piece) > 3]
     longs = [LongARX.of(looked, least), LongARX.of(looked, least, more=2.0)]
     if orders.order("na") or not orders.nb:
-        return [armax_start(looked, orders, long) for long in longs]
-    return [box_jenkins_start(looked, orders, long, whitened=whitened) for long in longs for whitened in (False, True)]
+        found = [armax_start(looked, orders, long) for long in longs]
+    else:
+        kinds = [(long, whitened) for long in longs for whitened in (False, True)]
+        found = [box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
+    return [*found, np.zeros(orders.n_parameters)]  # the last is finite whatever the record
 
 
 def _differenced(piece: Segment) -> Segment:
@@ -188,23 +192,22 @@ def _differenced(piece: Segment) -> Segment:
     )
 
 
-def _uncertainty(model: PolynomialModel, H: Array, squares: float, n: int, noise_variance: float) -> Uncertainty:
+def _uncertainty(model: PolynomialModel, at: Linearisation, n: int, noise_variance: float) -> Uncertainty:
     """What the prediction errors say about the coefficients, in the channels' units."""
     names, P = model.orders.names(model.mapping.inputs), len(model.theta)
-    gains = np.ones(P)
-    at = 0
+    gains, first = np.ones(P), 0
     for j, nb in enumerate(model.orders.nb):
-        gains[at : at + nb] = model.scaling.output_scale / model.scaling.input_scale[j]
-        at += nb
+        gains[first : first + nb] = model.scaling.output_scale / model.scaling.input_scale[j]
+        first += nb
     gains[P - model.orders.level :] = model.scaling.output_scale
     values = gains * model.theta
     values[P - model.orders.level :] += model.scaling.output_offset
-    root = np.sqrt(np.diag(H))
-    sizes, vectors = linalg.eigh(H / np.outer(root, root))
+    root, scaled = at.scaled()
+    sizes, vectors = linalg.eigh(scaled)
     covariance = np.full((P, P), np.nan)
     if sizes[0] > 1e-14 * sizes[-1]:
         half = gains[:, np.newaxis] * (vectors / np.sqrt(sizes)) / root[:, np.newaxis]
-        covariance = squares / max(n - P, 1) * (half @ half.T)
+        covariance = 2.0 * at.loss / max(n - P, 1) * (half @ half.T)
     return Uncertainty(names=names, values=values, covariance=covariance, noise_variance=noise_variance)
 
 

@@ -191,8 +191,7 @@ class _Problem:
             at = errors.linearise(np.zeros(errors.chart.n_parameters))
             if not errors.allowed(system) or not np.isfinite(at.loss) or not at.finite:
                 return None
-            root = np.sqrt(np.diag(at.gauss_newton))
-            scaled = at.gauss_newton / np.outer(root, root)
+            root, scaled = at.scaled()
             step = -np.linalg.lstsq(scaled, at.gradient / root, rcond=1e-13)[0] / root
             system = errors.chart.system(step)
         errors = self.errors(self.linear(system), np.eye(system.n_outputs))

@@ -30,10 +30,10 @@ def coordinates_covariance(found: Found) -> Array:
     Returns:
         Shape ``(n_parameters, n_parameters)``.
     """
-    H, P = found.at.gauss_newton, found.chart.n_parameters
+    P = found.chart.n_parameters
     variance = 2.0 * found.at.loss / max(found.n_samples - P, 1)
-    root = np.sqrt(np.diag(H))
-    sizes, vectors = linalg.eigh(H / np.outer(root, root))
+    root, scaled = found.at.scaled()
+    sizes, vectors = linalg.eigh(scaled)
     if not sizes[0] > 1e-14 * sizes[-1]:
         return np.full((P, P), np.nan)
     half = vectors / np.sqrt(sizes) / root[:, np.newaxis]

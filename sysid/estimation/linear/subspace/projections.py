@@ -96,6 +96,8 @@ def regress(columns: Array, targets: Array) -> Array:
     Returns:
         Shape ``(n_columns, n_targets)``.
     """
+    if not columns.size or not targets.size:
+        return np.zeros((columns.shape[1], targets.shape[1]))
     norms = np.linalg.norm(columns, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
     found = linalg.lstsq(columns / scale, targets, cond=1e-11, check_finite=False, lapack_driver="gelsy")[0]

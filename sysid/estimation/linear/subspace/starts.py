@@ -84,7 +84,8 @@ class Subspace:
         """
         found = project(self.windows, weighting, feedthrough=self.feedthrough)
         n = min(states, found.to_state.shape[1])
-        return realise(self.windows, found, n, feedthrough=self.feedthrough, noise=self.noise)
+        system = realise(self.windows, found, n, feedthrough=self.feedthrough, noise=self.noise)
+        return system.padded(states)
 
     def order(self, most: int) -> int:
         """The number of states by the criterion of Bauer (2001, "Order estimation for subspace methods").

@@ -12,8 +12,8 @@ from sysid.models.innovations import Innovations, spectral_radius
 
 Array = NDArray[np.float64]
 
-EDGE = 1.0 - 1e-6
-"""Largest magnitude of a pole where a system is to be stable."""
+EDGE, INSIDE = 1.0 - 1e-6, 1.0 - 1e-4
+"""Largest magnitude of a pole where a system is to be stable, and that at which one outside begins."""
 
 
 def realise(windows: Windows, projection: Projection, n: int, *, feedthrough: bool, noise: bool) -> Innovations:
@@ -80,8 +80,8 @@ def stabilised(system: Innovations) -> Innovations:
         return system
     T, Z = linalg.schur(system.A, output="complex")
     poles = np.diag(T)
-    size = np.abs(poles)
-    mirrored = np.where(size > EDGE, poles / size * np.minimum(1.0 / size, EDGE), poles)
+    size = np.maximum(np.abs(poles), np.finfo(np.float64).tiny)
+    mirrored = np.where(size > INSIDE, poles / size * np.minimum(1.0 / np.maximum(size, 1.0), INSIDE), poles)
     T = T - np.diag(poles) + np.diag(mirrored)
     A = np.real(Z @ T @ Z.conj().T)
     return Innovations(A=A, B=system.B, C=system.C, D=system.D, K=system.K, constant=system.constant)
