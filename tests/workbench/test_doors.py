@@ -93,10 +93,10 @@ def in_python(
     )  # fmt: skip
 
 
-def in_a_pipeline(place: Path, *fits: dict[str, Any]) -> FitResult:
+def in_a_pipeline(place: Path, *fits: dict[str, Any], shared: dict[str, Any] = SHARED) -> FitResult:
     """The last of some fits."""
     named = [{"name": f"fit {number}", **fit} for number, fit in enumerate(fits)]
-    text = yaml_text({"name": "doors", **SHARED, "fits": named})
+    text = yaml_text({"name": "doors", **shared, "fits": named})
     pipeline = Pipeline(config=parse_pipeline(text), text=text, path=place / "pipelines" / "doors.yaml")
     run_pipeline(pipeline, place / "runs" / "doors", command="")
     return read_fit(place / "runs" / "doors" / "fits" / pipeline.config.fits[-1].slug)
@@ -163,6 +163,37 @@ def test_a_fit_is_the_same_at_every_door(
 
 def test_every_kind_of_structure_goes_through_the_doors() -> None:
     assert {one.values[0]["kind"] for one in FITS} == set(ESTIMATORS)
+
+
+TWO = {"data": "rig", "mapping": "inlet+valve -> outlet+valve2", "start": "rest", "rest": {"outlet": 100.0}}
+TWO |= {"stability": STABILITY, "export": None}
+
+
+@pytest.mark.parametrize(
+    ("structure", "training"),
+    [
+        pytest.param(VECTOR, {"seed": 7, "max_iterations": 3}, id="VectorNARX"),
+        pytest.param(SS | {"kind": "VectorSS"}, None, id="VectorSS"),
+    ],
+)
+def test_several_outputs_are_the_same_at_every_door(
+    place: Path, structure: dict[str, Any], training: dict[str, Any] | None
+) -> None:
+    folder = place / "datasets" / "rig"
+    described = (folder / "dataset.yaml").read_text(encoding="utf-8")
+    second = "  - {name: valve2, unit: V}\nsource: {files: {references: gauge, columns: {valve2: valve}}}"
+    (folder / "dataset.yaml").write_text(
+        described.replace("source: {files: {references: gauge}}", second), encoding="utf-8"
+    )
+    python = sysid.fit(
+        sysid.load(folder / "dataset.yaml"), str(TWO["mapping"]), structure_from_dict(structure),
+        options_of(structure, training), start=Start(), rest_output={"outlet": 100.0},
+        stability=StabilityOptions(**STABILITY),
+    )  # fmt: skip
+    assert isinstance(python, sysid.Fit)
+    fits = in_a_pipeline(place, as_request(structure, training), shared=TWO)
+    swept = in_a_sweep(place, structure, training, **TWO)
+    assert said(python) == said(fits) == said(swept)
 
 
 @pytest.mark.parametrize(
