@@ -58,9 +58,9 @@ def fit(
     Args:
         traces: The data set.
         mapping: Which channels go in, which come out: ``"u1+u2 -> y"``, or ``"u1+u2 -> y1+y2"``. A structure with
-            several outputs of its own, such as :class:`~sysid.VectorNARX`, gives one model of all; of any other, each
-            output gets a model, and all of them are run as one. As lists, ``{"inputs": ["P+"], "output": "V->C"}``,
-            names may hold anything.
+            several outputs of its own, such as :class:`~sysid.VectorNARX` or a state space, gives one model of all; of
+            any other, each output gets a model, and all of them are run as one. As lists,
+            ``{"inputs": ["P+"], "output": "V->C"}``, names may hold anything.
         structure: What is fitted.
         training: How a network is trained, or a transfer function; an ARX model has nothing to choose.
         start: How each free run begins.
@@ -78,7 +78,9 @@ def fit(
             apply to it.
         ChannelError: If a channel of the mapping is missing.
     """
-    chosen = structure.mappings(Mapping.of(mapping))
+    mapped = Mapping.of(mapping)
+    structure = structure.for_outputs(len(mapped.outputs))
+    chosen = structure.mappings(mapped)
     estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)
     if not estimation:
         raise ConfigError(

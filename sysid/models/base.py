@@ -64,6 +64,18 @@ class AbstractStructure(ABC):
         del neurons
         return None
 
+    def for_outputs(self, n_outputs: int) -> AbstractStructure:
+        """What is fitted where this structure is asked for with so many outputs.
+
+        Args:
+            n_outputs: Outputs of the mapping.
+
+        Returns:
+            The structure; of some that are for one output, the one that several outputs share.
+        """
+        del n_outputs
+        return self
+
     def mappings(self, mapping: Mapping) -> tuple[Mapping, ...]:
         """What its models map, of a mapping of any number of outputs.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from typing import Any
@@ -144,20 +145,23 @@ class Innovations:
         """The same system in coordinates in which its stable predictor is balanced.
 
         Returns:
-            The system; as it is where a state is neither reached nor seen, so that nothing balances it.
+            The system; as it is where a state is neither reached nor seen, or the Gramians cannot be computed.
         """
         A, n = self.predictor, self.n_state
         if n == 0 or spectral_radius(A) >= 1.0:
             return self
         drive = np.concatenate([self.B - self.K @ self.D, self.K], axis=1)
         try:
-            P = _root(linalg.solve_discrete_lyapunov(A, drive @ drive.T))
-            Q = _root(linalg.solve_discrete_lyapunov(A.T, self.C.T @ self.C))
+            # A predictor far from normal, as of a record without noise, has Gramians that rounding makes up.
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", linalg.LinAlgWarning)
+                P = _root(linalg.solve_discrete_lyapunov(A, drive @ drive.T))
+                Q = _root(linalg.solve_discrete_lyapunov(A.T, self.C.T @ self.C))
             U, sizes, _ = linalg.svd(Q.T @ P)
             if not sizes[-1] > 1e-12 * sizes[0]:
                 return self
             return self.in_coordinates((U / np.sqrt(sizes)).T @ Q.T)
-        except (linalg.LinAlgError, ValueError):
+        except (linalg.LinAlgError, linalg.LinAlgWarning, ValueError):
             return self
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
+from dataclasses import fields as dataclass_fields
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -67,6 +68,12 @@ class LinearStateSpace(AbstractStructure):
         """The states, and what is not the default."""
         words = ["direct"] * self.feedthrough + ["without noise model"] * (not self.noise)
         return " ".join([self.kind, str(self.states), *words])
+
+    def for_outputs(self, n_outputs: int) -> LinearStateSpace:
+        """One state space for all outputs, where there are several: what each says of the states is used for all."""
+        if n_outputs == 1 or self.several_outputs:
+            return self
+        return VectorStateSpace(**{field.name: getattr(self, field.name) for field in dataclass_fields(self)})
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""

@@ -207,7 +207,8 @@ class PipelineConfig(BaseModel):
             initial = None if fit.initial is None else structures[fit.initial]
             try:
                 n_outputs = len(self.mapping.outputs)
-                check_request(fit.structure, len(self.mapping.inputs), n_outputs=n_outputs, initial=initial)
+                structure = fit.structure.for_outputs(n_outputs)
+                check_request(structure, len(self.mapping.inputs), n_outputs=n_outputs, initial=initial)
             except ConfigError as error:
                 raise as_field_error(error, f"the fit {fit.name!r}") from error
         return self

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sysid.models import Mapping
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
@@ -51,7 +51,10 @@ def models_of(fit: FitConfig, config: PipelineConfig) -> tuple[FitModel, ...]:
     if len(mapping.outputs) == 1:
         return (FitModel(fit=fit, config=config, outputs=(FitOutput(fit=fit, config=config),)),)
     outputs = tuple(FitOutput(fit=_named(fit, one.output, config), config=_of(config, one)) for one in mapping.each)
-    if fit.structure.several_outputs:
+    structure = fit.structure.for_outputs(len(mapping.outputs))
+    if structure.several_outputs:
+        fit = fit.model_copy(update={"structure": structure})
+        outputs = tuple(replace(one, fit=one.fit.model_copy(update={"structure": structure})) for one in outputs)
         return (FitModel(fit=fit, config=config, outputs=outputs),)
     return tuple(FitModel(fit=one.fit, config=one.config, outputs=(one,)) for one in outputs)
 

@@ -214,7 +214,7 @@ class Driver:
     def _keyed(self, job: Job) -> Job:
         terms = {
             "shared": self._shared,
-            "code": _code(job.structure),
+            "code": _code(job.structure, len(self.config.mapping.outputs)),
             "structure": job.structure,
             "training": job.training,
             "iterations": job.iterations,
@@ -268,11 +268,11 @@ class Driver:
         return trial
 
 
-def _code(structure: Mapping[str, Any]) -> str:
+def _code(structure: Mapping[str, Any], n_outputs: int) -> str:
     """Digest of the code that a job runs: not of the estimators of other structures, or of how YAML is read."""
     choices = ("sysid.estimation.estimators:ESTIMATORS", "sysid.models.store:model_from_dict")
     configuration = ("sysid.workbench.fits.config", "sysid.workbench.fits.data", "sysid.workbench.fields")
-    runs = estimator_of(structure_from_dict(structure)).runs
+    runs = estimator_of(structure_from_dict(structure).for_outputs(n_outputs)).runs
     return code_digest(run_job, *runs, without=(*choices, *configuration))
 
 

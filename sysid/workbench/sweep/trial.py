@@ -193,13 +193,13 @@ def train(
         result = estimators.fit(
             data.estimation,
             model.config.mapping,
-            fit.structure,
+            model.fit.structure,
             training,
             start=config.start,
             rest_output=model.config.rest_output,
             selection=data.selection,
             initial=FitResult.from_dict(stood[number]["fit"]) if stood and not job.resume else None,
-            stability=_checked(bench, estimator_of(fit.structure), training),
+            stability=_checked(bench, estimator_of(model.fit.structure), training),
             resume=Checkpoint(fields=stood[number]["checkpoint"]) if stood and job.resume else None,
             on_checkpoint=kept.append,
             # Where a training stands is kept under names that know of one model only.

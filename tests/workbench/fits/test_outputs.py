@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
 
 import sysid
@@ -186,6 +187,27 @@ def test_a_sweep_tries_all_outputs_of_a_point(place: Path, monkeypatch: pytest.M
     assert best.selection_free_run_mse == pytest.approx(np.mean(shares))
     assert [fit.mapping for fit in found.results.best_fits] == ["u+w -> level", "u+w -> heat"]
     assert found.results.systems[0].name == "sweep winner"
+
+
+def test_a_state_space_of_several_outputs_is_one_through_every_door(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sysid.reporting.report.write_report", lambda folder: folder / "results.json")
+    structure = {"kind": "SS", "states": 2}
+    shared = {"data": "tanks", "mapping": "u+w -> level+heat", "export": None, "stability": {"count": 0}}
+    fits = {"name": "both", **shared, "fits": [{"name": "SS", "structure": structure}]}
+    text = yaml.safe_dump(fits)
+    pipeline = Pipeline(config=parse_pipeline(text), text=text, path=place / "pipelines" / "ss.yaml")
+    run_pipeline(pipeline, place / "runs" / "ss", command="")
+    swept = {"kind": "sweep", "name": "swept", **shared, "structure": structure}
+    sweep = Sweep(config=check(SweepConfig, swept, where="here"), text="", path=place / "pipelines" / "swept-ss.yaml")
+    run_sweep(sweep, place / "runs" / "swept-ss", command="", find_workers=lambda bench, _: InThisProcess(bench))
+    traces = sysid.load(place / "datasets" / "tanks" / "dataset.yaml")
+    python = sysid.fit(traces, "u+w -> level+heat", sysid.LinearStateSpace(states=2))
+    assert isinstance(python, sysid.Fit)
+    assert python.model.structure == sysid.VectorStateSpace(states=2)
+    for stored in (place / "runs" / "ss" / "fits" / "ss", place / "runs" / "swept-ss" / "fits" / "sweep-winner"):
+        assert read_fit(stored).model.to_dict() == python.model.to_dict()
 
 
 WRONG = {
