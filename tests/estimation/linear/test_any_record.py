@@ -213,3 +213,19 @@ def test_a_record_that_is_shorter_than_the_lags_of_a_start_counts_beside_a_long_
     long, short = (trace_of(u[:n, None], lfilter([0.0, 0.2], [1.0, -0.8], u[:n]), name=f"{n}") for n in (200, 8))
     found = model_of(tf([short, long], TransferFunction(poles=(1,), zeros=(0,), delays=(1,))))
     np.testing.assert_allclose(found.numerator(0), [0.2], atol=1e-6)
+
+
+def test_more_poles_than_the_plant_has_never_fit_worse() -> None:
+    """Beyond the orders whose structures are fitted as starts; with poles anywhere, what is significant has a say."""
+    rng = np.random.default_rng(1)
+    u, y = steps(120, 1), np.zeros(120)
+    for k in range(3, 120):
+        y[k] = 1.9 * y[k - 1] - 1.23 * y[k - 2] + 0.28 * y[k - 3] + 0.1 * np.tanh(2.0 * u[k - 1])
+    trace = trace_of(u[:, None], y + 0.02 * rng.standard_normal(120))
+    options = TransferFunctionTraining(stable=True, scattered_starts=0)
+    losses = []
+    for poles, zeros in ((4, 2), (5, 2), (6, 3)):
+        orders = TransferFunction(poles=(poles,), zeros=(zeros,), delays=(1,))
+        losses.append(fit_transfer_function([trace], ONE, orders, options, start=ESTIMATED).history["mse"][-1])
+    assert losses[1] <= losses[0] * (1.0 + 1e-3)
+    assert losses[2] <= losses[1] * (1.0 + 1e-3)
