@@ -56,9 +56,9 @@ def _headline(results: Results, best: FitRecord) -> str:
     whole = next((one for one in results.systems if one.name == best.system), None)
     if whole is not None:
         what = "one model" if whole.models == 1 else f"{whole.models} models run as one"
-        return f"{whole.name} ({whole.label}, {what}, {whole.n_parameters} parameters) models {whole.mapping}."
+        return f"Best model of {whole.mapping}: {whole.name} ({whole.label}, {what}, {whole.n_parameters} parameters)."
     count = "" if best.n_parameters is None else f", {best.n_parameters} parameters"
-    return f"{best.name} ({best.label}, trained in {best.loop.value} loop{count}) models {best.mapping}."
+    return f"Best model of {best.mapping}: {best.name} ({best.label}, trained in {best.loop.value} loop{count})."
 
 
 def _judged(fit: FitRecord) -> Dict[str, CaseRecord]:
@@ -95,6 +95,13 @@ def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord], *, cases_chose: bool
         return f"The free run diverges on every one of the {_count(len(cases), 'case')} {kind}."
     low = min(finite, key=lambda name: finite[name].free_run.mse)
     high = max(finite, key=lambda name: finite[name].free_run.mse)
+    if len(cases) == 1:
+        (error,) = (case.free_run.mse for case in finite.values())
+        rms = quantity(math.sqrt(error), fit.unit)
+        return (
+            f"In free run on {low}, the one case {kind}, the mse is {quantity(error, squared)}: a root mean square "
+            f"error of {rms}."
+        )
     text = (
         f"In free run on the {_count(len(cases), 'case')} {kind}, the mse lies between "
         f"{quantity(finite[low].free_run.mse, squared)} ({low}) and "

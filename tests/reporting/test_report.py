@@ -135,7 +135,9 @@ def test_a_screen_reader_finds_language_headings_captions_scopes_and_figure_text
 def test_the_verdict_stands_before_everything_else(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert 0 < text.index('id="verdict"') < text.index("<nav") < text.index("<table")
-    assert "NARX free run (NARX 4/4/20, trained in closed loop, 281 parameters) models pump+valve → level." in text
+    assert (
+        "Best model of pump+valve → level: NARX free run (NARX 4/4/20, trained in closed loop, 281 parameters)." in text
+    )
 
 
 @pytest.mark.parametrize(("kind", "words"), [("free_run", "Free run"), ("one_step", "One step ahead")])
