@@ -93,7 +93,7 @@ def _measured(above: Axes, below: Axes, found: FrequencyResponse, j: int) -> Non
 
 def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, which: tuple[str, int]) -> None:
     name, number = which
-    if fit.model.mapping.output != found.mapping.output or not hasattr(fit.model, "ratio"):
+    if fit.model.mapping.outputs != found.mapping.outputs or not hasattr(fit.model, "ratio"):
         return
     views = [view for view in linear_views(fit.model, None) if view.name == name]
     w = found.frequency[found.frequency > 0.0]

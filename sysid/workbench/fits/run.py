@@ -275,7 +275,10 @@ class FitSteps:
         if bundle is not None:
             place, stored = run.store.path / "bundle", bundle.stored
             for ready in best.ready:
-                told = events.BundleReady(of=ready, folder=place, exports=exports, stored=stored)
+                told = events.BundleReady(
+                    of=ready, folder=place, exports=exports, stored=stored,
+                    mapping=str(self.config.mapping), told=ready.output != self.config.mapping.outputs[0],
+                )  # fmt: skip
                 run.then(partial(run.tell, told))
         advice = run.do(self._look(run, loaded))
         found = () if orders is None else orders.value

@@ -141,12 +141,16 @@ class BundleReady(Event):
         folder: The bundle.
         exports: Per file its ``format``, ``file``, ``largest_difference`` and ``tolerance``.
         stored: Whether an earlier run wrote it.
+        mapping: What the files map, where that is more than the fit's own output.
+        told: Whether it has been told of already, for another output of the same files.
     """
 
     of: FitReady
     folder: Path
     exports: tuple[Mapping[str, Any], ...]
     stored: bool
+    mapping: str = ""
+    told: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -164,9 +164,11 @@ class Tracker:
             packed = zip_bundle(ready.folder, Path(scratch) / f"{slug(tracked.run_name(ready.of))}.zip")
             self.client.log_artifact(run_id, str(packed))
         sequence = next((entry for entry in ready.exports if Path(entry["file"]).name == SEQUENCE_FILE), None)
-        if sequence is not None and self.data is not None:
+        if sequence is not None and self.data is not None and not ready.told:
             file = ready.folder.parent / sequence["file"]
-            tracking.log_model(self.client, file, ready.of, uri=self.uri, run_id=run_id, traces=self.data.traces)
+            tracking.log_model(
+                self.client, file, ready.of, ready.mapping, uri=self.uri, run_id=run_id, traces=self.data.traces
+            )
         self._describe(self.client.get_run(run_id).info.experiment_id, run_id, ready.of, exported=True)
         self.client.set_tag(run_id, "exported", "yes")
 

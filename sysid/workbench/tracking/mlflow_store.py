@@ -201,13 +201,16 @@ def log_data(client: Any, run_id: str, traces: TraceSet) -> None:
     client.log_inputs(run_id, [DatasetInput(dataset._to_mlflow_entity(), [context])])
 
 
-def log_model(client: Any, file: Path, ready: FitReady, *, uri: str, run_id: str, traces: TraceSet) -> None:
+def log_model(
+    client: Any, file: Path, ready: FitReady, mapping: str = "", *, uri: str, run_id: str, traces: TraceSet
+) -> None:
     """Log the exported network as a model that MLflow can load and serve, and as the newest in the registry.
 
     Args:
         client: An ``MlflowClient``.
         file: The network, in ONNX.
         ready: The fit that was exported.
+        mapping: What the file maps, where that is more than the fit's own output.
         uri: The tracking URI.
         run_id: The fit's run.
         traces: The data; an example of inputs is taken from it.
@@ -232,7 +235,7 @@ def log_model(client: Any, file: Path, ready: FitReady, *, uri: str, run_id: str
             )
         register(
             client,
-            str(ready.fit.model.mapping),
+            mapping or str(ready.pipeline.mapping),
             source=logged.model_uri,
             run_id=run_id,
             model_id=logged.model_id,
@@ -250,6 +253,7 @@ def _example(network: Any, ready: FitReady, traces: TraceSet) -> dict[str, NDArr
     """A few samples of the first trace for one car, from the middle of every channel's range."""
     trace = traces.traces[0]
     columns = trace.columns(ready.fit.model.mapping.inputs)[:8]
+    columns = columns if columns.shape[1] else np.zeros((len(columns), 1))  # without input, how long to run
     _, state = network.graph.input
     return {"u": columns[:, None, :], "state": np.zeros((1, state.type.tensor_type.shape.dim[1].dim_value))}
 

@@ -159,6 +159,11 @@ def test_the_report_has_the_whole_and_every_output(place: Path, results: Results
 def test_a_second_run_does_nothing_again(place: Path) -> None:
     heard: list[events.Event] = []
     run(place, watch=heard)
+    bundles = [event for event in heard if isinstance(event, events.BundleReady)]
+    assert [(event.of.output, event.mapping, event.told) for event in bundles] == [
+        ("level", "u+w -> level+heat", False),
+        ("heat", "u+w -> level+heat", True),
+    ]
     steps = [event for event in heard if isinstance(event, events.StepDone)]
     assert len(steps) > 10
     assert [event.step for event in steps if not event.stored and "Loading" not in event.step] == []
