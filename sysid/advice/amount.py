@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from sysid.advice.finding import Finding, Topic, Verdict
-from sysid.advice.record import Record
+from sysid.advice.record import SEEN, Record
 
 FEW, MANY_MASKED = 100, 0.2
 
@@ -35,6 +35,9 @@ def check_amount(record: Record) -> Iterator[Finding]:
             "longest": longest,
         },
     )
+    if usable > SEEN:
+        figures = {"seen": SEEN}
+        yield Finding(topic=Topic.AMOUNT, code="amount.part", verdict=Verdict.FINE, figures=figures)
     if usable < total:
         share = 1.0 - usable / total
         yield Finding(

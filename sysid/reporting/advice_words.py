@@ -29,6 +29,7 @@ SAID: Final[dict[str, Words]] = {
         "Only {usable:.0f} samples count, the longest stretch has {longest:.0f}.",
         "Record more: several times the settling time, and ten samples for each parameter at least.",
     ),
+    "amount.part": Words("Dynamics, noise and linearity are judged by the first {seen:.0f} of them."),
     "amount.masked": Words(
         "{share:.1%} of the samples do not count; what is left is {stretches:.0f} stretches of at most {longest:.0f}.",
         "Nothing, as long as the stretches are longer than the response. Each costs its first lags.",

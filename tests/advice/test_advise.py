@@ -152,6 +152,15 @@ def test_too_fast_and_too_slow_sampling() -> None:
     assert "sampling.slow" in looks(look(trace(v, np.roll(v, 1) + noise(800, 8, 0.01))))
 
 
+def test_a_long_record_says_how_much_of_it_was_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sysid.advice.record.SEEN", 400)
+    monkeypatch.setattr("sysid.advice.amount.SEEN", 400)
+    u = steps(1000, 15)
+    found = look(trace(u, plant(u) + noise(1000, 15, 0.02)))
+    assert finding(found, "amount.part").figures["seen"] == 400
+    assert finding(found, "dead_time").figures["best"] == 2
+
+
 def test_noise_is_measured() -> None:
     u = steps(3000, 9)
     y = plant(u)
