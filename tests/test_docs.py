@@ -133,3 +133,13 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
 @pytest.mark.parametrize("word", ["narxnet", "closeloop", "trainbr", "tfest", "arx", "compare", "resid", "genFunction"])
 def test_matlab_s_words_are_on_the_page(word: str) -> None:
     assert f"`{word}" in (ROOT / "docs" / "from-matlab.md").read_text(encoding="utf-8")
+
+
+def test_every_field_of_the_yaml_has_an_example(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT / "docs" / "reference")
+    (cell,) = CELL.findall(Path("pipelines.md").read_text(encoding="utf-8"))
+    names: dict[str, object] = {}
+    exec(compile(cell, "pipelines.md", "exec"), names)  # noqa: S102 - our own page
+    fields = [line.split(" | ") for part in names["text"] for line in part.splitlines() if line.startswith("| `")]
+    assert len(fields) > 300
+    assert [field[0] for field in fields if not field[3].strip()] == []
