@@ -6,6 +6,7 @@ from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
 from sysid.estimation.linear.instrumental import fit_iv4
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
 from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
+from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
 from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
@@ -34,6 +35,7 @@ __all__ = [
     "Posterior",
     "Spectrum",
     "StabilityOptions",
+    "StateOrders",
     "StateSpaceTraining",
     "Status",
     "Training",
@@ -50,5 +52,6 @@ __all__ = [
     "fit_transfer_function",
     "fit_vector_narx",
     "fit_vector_state_space",
+    "state_orders",
     "with_upstream_outputs",
 ]

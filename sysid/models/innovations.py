@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from typing import Any
@@ -136,9 +135,8 @@ class Innovations:
             K=np.pad(self.K, below),
         )
 
-    def in_coordinates(self, T: Array) -> Innovations:
-        """The same system with the state ``T x``."""
-        back = linalg.inv(T)
+    def in_coordinates(self, T: Array, back: Array) -> Innovations:
+        """The same system with the state ``T x``, where ``back`` is the inverse of ``T``."""
         return replace(self, A=T @ self.A @ back, B=T @ self.B, C=self.C @ back, K=T @ self.K)
 
     def balanced(self) -> Innovations:
@@ -152,16 +150,14 @@ class Innovations:
             return self
         drive = np.concatenate([self.B - self.K @ self.D, self.K], axis=1)
         try:
-            # A predictor far from normal, as of a record without noise, has Gramians that rounding makes up.
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", linalg.LinAlgWarning)
-                P = _root(linalg.solve_discrete_lyapunov(A, drive @ drive.T))
-                Q = _root(linalg.solve_discrete_lyapunov(A.T, self.C.T @ self.C))
-            U, sizes, _ = linalg.svd(Q.T @ P)
+            P = _root(_gramian(A, drive @ drive.T))
+            Q = _root(_gramian(A.T, self.C.T @ self.C))
+            U, sizes, Vt = linalg.svd(Q.T @ P)
             if not sizes[-1] > 1e-12 * sizes[0]:
                 return self
-            return self.in_coordinates((U / np.sqrt(sizes)).T @ Q.T)
-        except (linalg.LinAlgError, linalg.LinAlgWarning, ValueError):
+            # Both directions come from the factors: nothing is inverted but the singular values.
+            return self.in_coordinates((U / np.sqrt(sizes)).T @ Q.T, P @ Vt.T / np.sqrt(sizes))
+        except (linalg.LinAlgError, ValueError):
             return self
 
 
@@ -172,6 +168,18 @@ def spectral_radius(A: Array) -> float:
     if not np.isfinite(A).all():
         return np.inf
     return float(np.abs(linalg.eigvals(A, check_finite=False)).max())
+
+
+def _gramian(A: Array, Q: Array) -> Array:
+    """The sum of ``A^k Q A'^k`` over all ``k``, by doubling (Smith 1968); right however near to 1 a pole is."""
+    P, power = Q, A
+    for _ in range(60):
+        more = power @ P @ power.T
+        P = P + more
+        if not np.abs(more).max(initial=0.0) > 1e-16 * np.abs(P).max(initial=0.0):
+            break
+        power = power @ power
+    return P
 
 
 def _root(gramian: Array) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.experiment import Experiment, unit_range
 from sysid.models import Scaling
 
 Array = NDArray[np.float64]
@@ -62,6 +62,21 @@ class Segment:
             )
             found.append(piece)
         return found
+
+
+def scaling_of(experiments: Sequence[Experiment], *, constant: bool) -> Scaling:
+    """The scaling of a linear model.
+
+    Args:
+        experiments: The records.
+        constant: Whether a constant output is fitted, or left open by an integrator. Where it is not, nothing may be
+            taken away from inputs and outputs: zero has to stay zero.
+
+    Returns:
+        The range of each channel onto -1 to 1, or without its offsets.
+    """
+    found = unit_range(experiments)
+    return found if constant else replace(found, input_offset=(0.0,) * len(found.input_offset), output_offset=0.0)
 
 
 def segments_of(experiments: Sequence[Experiment], scaling: Scaling) -> tuple[Segment, ...]:

@@ -12,14 +12,14 @@ from scipy import linalg
 from threadpoolctl import threadpool_limits
 
 from sysid.errors import ConfigError, FitDivergedError, TraceError
-from sysid.estimation.experiment import Experiment, experiments_of, unit_range
+from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start
-from sysid.estimation.linear.segments import Segment, segments_of
+from sysid.estimation.linear.segments import Segment, scaling_of, segments_of
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.state_space.search import flat_prior
 from sysid.estimation.result import FitResult, Loop, Status
@@ -93,7 +93,7 @@ def fit_polynomial(
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = experiments_of(traces, mapping, start or Start(), rest)
     _check(orders, experiments)
-    scaling = unit_range(experiments)
+    scaling = scaling_of(experiments, constant=orders.intercept or orders.drifts)
     segments = segments_of(experiments, scaling)
     with threadpool_limits(1, "blas"):  # threads that wake for such small matrices cost more than they give
         errors, solution = _search(segments, orders, training)

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from sysid.errors import TraceError
-from sysid.estimation.experiment import experiments_of, unit_range
+from sysid.estimation.experiment import experiments_of
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.segments import segments_of, side_by_side
+from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, side_by_side
 from sysid.estimation.linear.state_space.search import METHODS, Found, StateSpaceTraining, search
 from sysid.estimation.linear.state_space.uncertainty import state_space_uncertainty
 from sysid.estimation.result import FitResult, Loop
@@ -57,7 +57,8 @@ def fit_state_space(
     """
     began, training = time.perf_counter(), training or StateSpaceTraining()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
-    (scaling,), found = _found(traces, mapping, orders, training, start=start, rests=(rest,))
+    (scaling,), segments = records_of(traces, mapping, orders, start=start, rests=(rest,))
+    found = search(segments, orders, training)
     model = LinearStateSpaceModel(
         orders=orders,
         system=found.system,
@@ -101,7 +102,8 @@ def fit_vector_state_space(
     """
     began, training, given = time.perf_counter(), training or StateSpaceTraining(), rest_output or {}
     rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
-    scalings, found = _found(traces, mapping, orders, training, start=start, rests=rests)
+    scalings, segments = records_of(traces, mapping, orders, start=start, rests=rests)
+    found = search(segments, orders, training)
     model = VectorStateSpaceModel(
         orders=orders,
         system=found.system,
@@ -118,16 +120,29 @@ def fit_vector_state_space(
 _TINY = 1e-300
 
 
-def _found(
+def records_of(
     traces: Sequence[Trace],
     mapping: Mapping,
     orders: LinearStateSpace,
-    training: StateSpaceTraining,
     *,
     start: Start | None,
     rests: tuple[float, ...],
-) -> tuple[list[Scaling], Found]:
-    """The scaling of each output, and what the search finds."""
+) -> tuple[list[Scaling], tuple[Segment, ...]]:
+    """The scaling of each output, and the records in scaled numbers.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which come out.
+        orders: The structure.
+        start: What stands before each trace.
+        rests: Each output at rest, in its unit.
+
+    Returns:
+        Both.
+
+    Raises:
+        TraceError: If there are fewer samples than parameters.
+    """
     each = [experiments_of(traces, one, start or Start(), rest) for one, rest in zip(mapping.each, rests, strict=True)]
     counted = len(each) * sum(e.n_counted for e in each[0])
     needed = orders.n_parameters(len(mapping.inputs), len(each)) + orders.states * sum(e.free for e in each[0])
@@ -138,9 +153,9 @@ def _found(
             got=counted // len(each),
             remedy="ask for fewer states, or use longer traces",
         )
-    scalings = [unit_range(experiments) for experiments in each]
+    scalings = [scaling_of(experiments, constant=orders.intercept) for experiments in each]
     segments = side_by_side([segments_of(e, scaling) for e, scaling in zip(each, scalings, strict=True)])
-    return scalings, search(segments, orders, training)
+    return scalings, segments
 
 
 def _result(

@@ -185,6 +185,8 @@ class _Problem:
         """The loss and the system with the ``B``, ``D`` and constant that fit best; twice, for rounding."""
         if self.stable:
             system = stabilised(system)
+        if not self.orders.intercept:
+            system = replace(system, constant=np.zeros(system.n_outputs))
         system = system.balanced()
         for _ in range(2 if sum(map(len, self.segments)) <= LONG else 1):
             errors = self.errors(self.linear(system), np.eye(system.n_outputs))

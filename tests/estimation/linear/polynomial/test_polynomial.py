@@ -91,3 +91,24 @@ def test_a_record_too_short_for_its_orders_is_refused() -> None:
     orders, truth = CASES["BJ"]
     with pytest.raises(TraceError, match="fewer samples"):
         fit_polynomial([record(orders, truth, 0, 12)], TWO, orders, start=FREE)
+
+
+def test_the_fit_is_that_of_scipys_least_squares() -> None:
+    """The same minimum from another program: errors with lfilter, minimised with least_squares."""
+    orders, truth = CASES["BJ"]
+    rng = np.random.default_rng(5)
+    p = orders.polynomials(np.array([*truth, 0.0]))
+    u, e = np.sign(rng.normal(size=(400, 2))), 0.3 * rng.normal(size=400)
+    u[:3] = 0.0  # at rest before the record
+    y = lfilter(p.C, p.D, e) + sum(lfilter(b, f, x) for b, f, x in zip(p.B, p.F, u.T, strict=True))
+    still = BJ(nb=(2, 1), nc=1, nd=1, nf=(2, 1), nk=(1, 2), intercept=False)
+
+    def errors(theta: np.ndarray) -> np.ndarray:
+        q = still.polynomials(theta)
+        driven = sum(lfilter(b, f, x) for b, f, x in zip(q.B, q.F, u.T, strict=True))
+        return np.asarray(lfilter(q.D, q.C, y - driven))
+
+    other = optimize.least_squares(errors, truth, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    mine = fit_polynomial([trace_of(u, y)], TWO, still, rest_output=0.0)
+    assert float(mine.history["mse"][-1]) == pytest.approx(2.0 * other.cost / 400, rel=1e-6)
+    np.testing.assert_allclose(mine.uncertainty.values, other.x, atol=2e-4)

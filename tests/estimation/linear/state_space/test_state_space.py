@@ -171,3 +171,9 @@ def test_one_output_of_a_vector_model_is_the_single_model() -> None:
     vector = fit_vector_state_space([trace], ONE, VectorStateSpace(states=2), start=FREE).model
     u = trace.columns(["u1"])
     np.testing.assert_allclose(vector.simulate(u)[:, 0], single.simulate(u), rtol=1e-9, atol=1e-9)
+
+
+def test_without_an_intercept_zero_stays_zero() -> None:
+    trace = record(6)
+    model = fit_state_space([trace], ONE, LinearStateSpace(states=2, noise=False, intercept=False), start=FREE).model
+    assert np.abs(model.simulate(np.zeros((5, 1)))).max() < 1e-12
