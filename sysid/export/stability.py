@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from sysid.errors import TraceError
 from sysid.estimation.result import Status
-from sysid.estimation.stability.free_run import SEQUENCES, Stability, check_stability
-from sysid.estimation.stability.sequences import Excursions
+from sysid.estimation.stability.check import FreeRunCheck, StabilityOptions
+from sysid.estimation.stability.free_run import Stability
 from sysid.export.verification import FOLDER
 from sysid.models import AbstractModel
 from sysid.traces import Role, TraceSet
@@ -17,7 +16,7 @@ WORST = f"{FOLDER}/worst.csv"
 
 
 def check_free_run(model: AbstractModel, traces: TraceSet) -> Stability | None:
-    """Run a model over excursions of its estimation traces.
+    """Run a model over excursions of its estimation traces, as its fit was checked.
 
     Args:
         model: The model.
@@ -26,11 +25,8 @@ def check_free_run(model: AbstractModel, traces: TraceSet) -> Stability | None:
     Returns:
         What was found; ``None`` where no estimation trace is long enough to make sequences from.
     """
-    try:
-        sequences = Excursions.of(traces.with_role(Role.ESTIMATION), model.mapping.inputs, model.mapping.outputs)
-    except TraceError:
-        return None
-    return check_stability(model, sequences, count=SEQUENCES)
+    estimation = traces.with_role(Role.ESTIMATION)
+    return FreeRunCheck.of(StabilityOptions(), model.mapping, estimation).finding(model) if estimation else None
 
 
 def state_stability(manifest: dict[str, Any], stability: Stability | None) -> None:

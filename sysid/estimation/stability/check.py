@@ -217,12 +217,12 @@ class FreeRunCheck(AbstractStabilityCheck):
         Returns:
             The verdict; true where nothing is asked.
         """
-        found = self._of(model)
+        found = self.finding(model)
         return found is None or found.stable
 
     def applied(self, fit: FitResult) -> FitResult:
         """A fit with what the sequences found; the sentence is among its notes."""
-        found = self._of(fit.model)
+        found = self.finding(fit.model)
         if found is None:
             return fit
         status = fit.status if found.stable else _unstable(fit.status)
@@ -245,7 +245,15 @@ class FreeRunCheck(AbstractStabilityCheck):
             return None
         return found if all(_follows(found, trace, start) for trace in self.estimation) else None
 
-    def _of(self, model: AbstractModel) -> Stability | None:
+    def finding(self, model: AbstractModel) -> Stability | None:
+        """What the sequences say of a model.
+
+        Args:
+            model: The model; it is run once.
+
+        Returns:
+            The finding; ``None`` where nothing is asked.
+        """
         if self.source is None:
             return None
         if id(model) not in self.found:
