@@ -21,7 +21,7 @@ from sysid.reporting.judging.results import JudgementResults
 from sysid.reporting.judging.version_1 import ReadyResults
 from sysid.reporting.numbers import number
 from sysid.reporting.records import RunResults
-from sysid.reporting.results import Results
+from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.tables import SCORED, Column
 from sysid.traces import Role
@@ -104,7 +104,10 @@ def contenders(folder: Path, results: RunResults) -> list[Contender]:
 
 
 def _of_fits(folder: Path, results: Results) -> list[Contender]:
-    fit = results.best_fit or results.fits[0]
+    return [_of_fit(folder, fit) for fit in results.best_fits or results.fits[:1]]
+
+
+def _of_fit(folder: Path, fit: FitRecord) -> Contender:
     signals = read_signals(folder / "fits" / fit.slug, list(fit.cases))
     merits = [merit for merit in MERITS if merit.compared]
     cases = {
@@ -126,18 +129,17 @@ def _of_fits(folder: Path, results: Results) -> list[Contender]:
         "parameters": "unknown" if fit.n_parameters is None else str(fit.n_parameters),
         "training time [s]": number(fit.train_time_s),
     }
-    return [
-        Contender(
-            name=fit.name,
-            output=_output(fit.mapping),
-            unit=fit.unit,
-            columns=tuple(Column.of(merit, fit.unit) for merit in merits),
-            cases=cases,
-            parameters=fit.n_parameters,
-            train_time_s=fit.train_time_s,
-            facts=facts,
-        )
-    ]
+    return Contender(
+        # Beside another run, a fit is told by its name in the pipeline; its output stands beside it.
+        name=fit.system or fit.name,
+        output=_output(fit.mapping),
+        unit=fit.unit,
+        columns=tuple(Column.of(merit, fit.unit) for merit in merits),
+        cases=cases,
+        parameters=fit.n_parameters,
+        train_time_s=fit.train_time_s,
+        facts=facts,
+    )
 
 
 def _of_assembly(folder: Path, results: AssemblyResults) -> list[Contender]:
