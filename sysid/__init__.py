@@ -13,7 +13,7 @@ The rooms of the house, each with its public names: :mod:`sysid.ingest`, :mod:`s
 
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 WORDS = (
     *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
