@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 APART = 1e-4
 """Step of a difference, in standard deviations, where those are no larger than the coefficients."""
@@ -87,7 +87,7 @@ class Polynomials:
         B, F = self.numerators[j], self.denominators[j]
         if self.sample_time is None:
             return B, F
-        num, den, _ = signal.cont2discrete((B[::-1], F[::-1]), self.sample_time, method="zoh")
+        num, den, _ = scipy.signal.cont2discrete((B[::-1], F[::-1]), self.sample_time, method="zoh")
         return np.atleast_1d(np.squeeze(num)), np.asarray(den)
 
     def _levels(self, first: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -106,6 +106,6 @@ class Polynomials:
             u = np.concatenate(
                 [np.full(min(delay, len(inputs)), inputs[0, j]), inputs[: max(len(inputs) - delay, 0), j]]
             )
-            state = signal.lfiltic(b, a, np.full(len(a) - 1, levels[j]), np.full(len(b), inputs[0, j]))
-            y = y + signal.lfilter(b, a, u, zi=state)[0]
+            state = scipy.signal.lfiltic(b, a, np.full(len(a) - 1, levels[j]), np.full(len(b), inputs[0, j]))
+            y = y + scipy.signal.lfilter(b, a, u, zi=state)[0]
         return np.asarray(y)

@@ -141,8 +141,10 @@ def sysid(workspace: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*SYSID, *arguments], cwd=workspace, capture_output=True, text=True, check=False)
 
 
-def test_a_workspace_of_ones_own_from_first_to_last(tmp_path: Path) -> None:
-    """What the workspace's README tells: init, run, simulate, export, report, each a process of its own."""
+def test_a_workspace_of_ones_own_from_first_to_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What the workspace's README tells: init and run as programs, the rest in this process, which has all imported."""
     made = sysid(tmp_path, "init", "mine")
     assert (made.returncode, made.stderr) == (0, "")
     mine = tmp_path / "mine"
@@ -154,23 +156,25 @@ def test_a_workspace_of_ones_own_from_first_to_last(tmp_path: Path) -> None:
     assert (mine / "runs/tank/report/index.html").is_file()
     assert not (mine / "mlflow.db").exists()
 
-    simulated = sysid(
-        mine, "simulate", "runs/tank/bundle", "datasets/tank/val.csv", "--out", "out.csv", "--start", "rest"
-    )
-    assert (simulated.returncode, simulated.stderr) == (0, "")
+    monkeypatch.chdir(mine)
+
+    def here(*arguments: str) -> None:
+        assert run_cli(arguments) == 0
+        assert capsys.readouterr().err == ""
+
+    here("simulate", "runs/tank/bundle", "datasets/tank/val.csv", "--out", "out.csv", "--start", "rest")
     output, bundle = read_trace(mine / "out.csv"), read_bundle(mine / "runs/tank/bundle")
     inputs = read_trace(mine / "datasets/tank/val.csv")
     assert output.channel_names == ("pump", "level")
     np.testing.assert_array_equal(output["level"], bundle.model.simulate(inputs.columns(["pump"])))
 
-    exported = sysid(mine, "export", "tank", "--fit", "ARX", "--out", "linear", "--zip")
-    assert (exported.returncode, exported.stderr) == (0, "")
+    here("export", "tank", "--fit", "ARX", "--out", "linear", "--zip")
     for bundle_path in (mine / "linear", mine / "linear.zip"):
         assert read_bundle(bundle_path).model.structure.label == "ARX [2; 2; 1]"
     assert read_bundle(mine / "runs/tank/bundle").model.structure.label == "NARX 2/2/5"
 
     (mine / "runs/tank/report/index.html").unlink()
-    assert sysid(mine, "report", "runs/tank").returncode == 0
+    here("report", "runs/tank")
     assert (mine / "runs/tank/report/index.html").is_file()
 
 
@@ -200,6 +204,7 @@ def test_a_data_set_is_summed_up(workspace: Path, capsys: pytest.CaptureFixture[
         assert word in told
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_untracked_results_are_done_but_not_code_0(
     workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
