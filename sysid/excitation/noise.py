@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from sysid.excitation.plan import AbstractExcitation, Plan, band_in_hertz, check
 
@@ -38,7 +38,7 @@ class FilteredNoise(AbstractExcitation):
         lead = plan.samples if sections is not None else 0
         x = plan.rng(k).standard_normal(plan.samples + lead)
         if sections is not None:
-            x = signal.sosfilt(sections, x)[lead:]
+            x = scipy.signal.sosfilt(sections, x)[lead:]
         size = float(np.sqrt(np.mean(x**2))) or 1.0
         return np.asarray(np.clip(x / (self.peak * size), -1.0, 1.0))
 
@@ -51,7 +51,7 @@ class FilteredNoise(AbstractExcitation):
             return None
         edges = (low, high) if below and above else low if below else high
         kind = "bandpass" if below and above else "highpass" if below else "lowpass"
-        return np.asarray(signal.butter(self.order, edges, btype=kind, fs=1.0 / plan.sample_time, output="sos"))
+        return np.asarray(scipy.signal.butter(self.order, edges, btype=kind, fs=1.0 / plan.sample_time, output="sos"))
 
 
 class Sweep(Enum):
@@ -84,5 +84,5 @@ class Chirp(AbstractExcitation):
         t = plan.sample_time * np.arange(plan.samples)
         phases = 90.0 + 180.0 * np.arange(plan.channels) / plan.channels
         method = self.sweep.value
-        columns = [signal.chirp(t, low, t[-1], high, method=method, phi=-phase) for phase in phases]
+        columns = [scipy.signal.chirp(t, low, t[-1], high, method=method, phi=-phase) for phase in phases]
         return np.column_stack(columns)

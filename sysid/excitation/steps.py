@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import max_len_seq
 
 from sysid.excitation.plan import AbstractExcitation, Plan, check
 
@@ -39,7 +39,7 @@ class PRBS(AbstractExcitation):
         check(SMALLEST <= order <= LARGEST, "order", f"{SMALLEST} to {LARGEST} bits", order)
         period = 2**order - 1
         check(plan.channels <= period, "order", f"a period of at least {plan.channels} clocks, one a channel", order)
-        bits = max_len_seq(order)[0].astype(np.float64) * 2.0 - 1.0
+        bits = scipy.signal.max_len_seq(order)[0].astype(np.float64) * 2.0 - 1.0
         first = int(np.random.default_rng(plan.seed).integers(period))
         clocks = np.arange(plan.samples) // self.clock
         shifts = first + np.arange(plan.channels) * period // plan.channels
