@@ -144,7 +144,7 @@ def no_prediction(kind: str) -> ConfigError:
     """
     return ConfigError(
         f"{kind} has no prediction from measured output",
-        expected="a model whose regressors are past outputs: ARX or NARX",
+        expected="a model that says what measured output tells: ARX, ARMAX, BJ, SS, or NARX",
         got="one whose noise is added to its output, so that measured output says nothing about what follows",
         remedy="use simulate: its free run is what it predicts any number of steps ahead",
     )
