@@ -1,10 +1,17 @@
 """Settings that all tests share."""
 
+import copy
 import signal
+from collections.abc import Iterator
 from html import escape
+from typing import Any
 
 import pytest
 from hypothesis import settings
+
+from sysid.workbench.fits import steps
+from sysid.workbench.fits.config import PipelineConfig
+from sysid.workbench.fits.data import Data
 
 # Seeds are fixed, so that a failure is the same everywhere; machines that are busy are not slow code.
 settings.register_profile("sysid", derandomize=True, deadline=None)
@@ -30,3 +37,20 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
         return f'<svg role="img" aria-labelledby="{name}-title {name}-desc" viewBox="0 0 1 1">{words}</svg>'
 
     monkeypatch.setattr("sysid.reporting.parts.svg", empty)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def looked_at_once() -> Iterator[None]:
+    """Pipelines over the same traces share one first look at them: it depends on its key alone, and takes seconds."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    look = steps.look
+
+    def once(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
+        key = steps.advice_key(config, data)
+        if key not in found:
+            found[key] = look(config, data)
+        return copy.deepcopy(found[key])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(steps, "look", once)
+        yield

@@ -149,12 +149,12 @@ WRONG_OWN = [
     pytest.param(f"fixed:\n  - {NEW}\n  - {BAD}", "line 6, field fixed[1]", "bounds", id="a known member"),
     pytest.param(f"fixed: [{UNBOUND}]", "line 4, field fixed[0].low", "number", id="one in the place of the base's"),
     pytest.param("fixed: [{}]", "line 4, field fixed[0].mapping", "missing", id="a known member without a mapping"),
-    pytest.param("fixed: [all]", "line 4, field fixed[0]", "FixedConfig", id="no known member at all"),
-    pytest.param("fixed: all", "line 4, field fixed", "tuple", id="no list of them"),
+    pytest.param("fixed: [all]", "line 4, field fixed[0]", "expected: names with values", id="no known member at all"),
+    pytest.param("fixed: all", "line 4, field fixed", "expected: a list", id="no list of them"),
     pytest.param("limits: {upper: {lw: 1}}", "line 4, field limits.upper.lw", "did you mean low?", id="a limit"),
 ]  # fmt: skip
 WRONG_BASE = [
-    pytest.param("data: tanks", "data: []", "line 4, field data", "string", id="a key"),
+    pytest.param("data: tanks", "data: []", "line 4, field data", "expected: text", id="a key"),
     pytest.param(
         "monte_carlo:", "monte_carl:", "line 19, field monte_carl", "did you mean monte_carlo?", id="a misspelt key"
     ),
