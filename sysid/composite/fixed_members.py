@@ -28,6 +28,7 @@ import numpy as np
 
 from sysid.composite.composite import FixedMember
 from sysid.composite.members import bounds_of, placed
+from sysid.errors import ConfigError
 from sysid.models import NARX, Cascade, NARXModel, Scaling
 from sysid.traces import Channel, Trace
 
@@ -70,10 +71,11 @@ def with_fixed(fixed: Sequence[FixedMember], traces: Sequence[Trace]) -> list[Tr
         traces: Measured traces.
 
     Returns:
-        As many traces, the new channels in the order of the submodels, each in all its instances.
+        As many traces, the new channels in the order of the submodels, each in all its instances. A channel that is
+        measured stays as it is.
 
     Raises:
-        ConfigError: If the submodels cannot be wired.
+        ConfigError: If the submodels cannot be wired, or an output is measured in another unit than is declared.
         ChannelError: If a trace lacks an input.
     """
     bounds, units = bounds_of(fixed), {name: one.unit for one in fixed for name in one.outputs}
@@ -82,10 +84,26 @@ def with_fixed(fixed: Sequence[FixedMember], traces: Sequence[Trace]) -> list[Tr
         first = [(member, fixed_model(member, trace, units)) for member in fixed]
         declared = tuple(placed(member, model, there) for member, model in first for there in member.instances)
         run = Cascade(models=declared, limits=bounds).simulate_trace(trace)
+        # What is measured stays as measured: the whole is held against it, and the others are fitted to it.
+        new = {name: unit for name, unit in units.items() if name not in trace.channel_names}
+        _check_units(trace, {name: unit for name, unit in units.items() if name not in new})
         return replace(
             trace,
-            channels=(*trace.channels, *(Channel(name=name, unit=unit) for name, unit in units.items())),
-            values=np.column_stack([trace.values, *(run[name] for name in units)]),
+            channels=(*trace.channels, *(Channel(name=name, unit=unit) for name, unit in new.items())),
+            values=np.column_stack([trace.values, *(run[name] for name in new)]),
         )
 
     return [one(trace) for trace in traces] if fixed else list(traces)
+
+
+def _check_units(trace: Trace, declared: Dict[str, str]) -> None:
+    for name, unit in declared.items():
+        measured = trace.channel(name).unit
+        if measured != unit:
+            raise ConfigError(
+                f"the fixed submodel's output {name} is measured in another unit",
+                where=f"trace {trace.name}",
+                expected=measured,
+                got=unit,
+                remedy=f"declare unit: {measured} for it, and its weights for that unit",
+            )

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from sysid.composite.composite import FixedMember
 from sysid.composite.fixed_members import fixed_model, with_fixed
+from sysid.errors import ConfigError
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
 from tests.composite.composites import fixed
@@ -117,3 +118,19 @@ def test_they_may_read_each_other_in_a_circle_through_the_past(rows):
         v = min(max(5.0 * a - 50.0 * t + 50.0 * v, 0.0), 1.0)
         t = min(max(v - b + t, 0.0), 1.0)
         assert_allclose([seen["v"][n], seen["t"][n]], [v, t], atol=1e-9)
+
+
+def test_an_output_that_is_measured_stays_as_it_was_measured():
+    """A position beside a speed, whose integral is known."""
+    summed = fixed("a -> b", gains={"a": 0.1, "b": 1}, low=-500, high=500, unit="V")
+    measured = trace(np.array([[1.0, 0.0], [1.0, 0.2], [1.0, 0.3]]))
+    (seen,) = with_fixed([summed], [measured])
+    assert seen.channel_names == ("a", "b")
+    assert_allclose(seen["b"], measured["b"])
+
+
+def test_an_output_that_is_measured_in_another_unit_is_refused():
+    with pytest.raises(ConfigError, match="measured in another unit") as caught:
+        with_fixed([fixed("a -> b", gains={"a": 0.1, "b": 1}, low=-500, high=500, unit="mV")], [trace(np.ones((3, 2)))])
+    assert caught.value.remedy is not None
+    assert "unit: V" in caught.value.remedy
