@@ -135,11 +135,7 @@ class LinearStateSpaceModel(AbstractModel):
     @cached_property
     def recursion(self) -> StateSpace:
         """The form that is run."""
-        system = self.system
-        return StateSpace(
-            A=system.A, B=system.B, C=system.C, D=system.D, constant=system.constant,
-            K=system.K if self.orders.noise else None, scaling=self.scaling,
-        )  # fmt: skip
+        return StateSpace.of(self.system, self.scaling, noise=self.orders.noise)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -262,11 +258,7 @@ class VectorStateSpaceModel(SeveralOutputs):
     @cached_property
     def recursion(self) -> StateSpace:
         """The form that is run."""
-        system = self.system
-        return StateSpace(
-            A=system.A, B=system.B, C=system.C, D=system.D, constant=system.constant,
-            K=system.K if self.orders.noise else None, scaling=self.scaling,
-        )  # fmt: skip
+        return StateSpace.of(self.system, self.scaling, noise=self.orders.noise)
 
     @property
     def poles(self) -> NDArray[np.complex128]:

@@ -6,10 +6,11 @@ What is run, exported and differentiated is their state space in observer form.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,11 @@ class AbstractPolynomial(AbstractStructure):
     """Dead time of each input in samples."""
     intercept: bool
     """Whether a constant output is fitted."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(cast("Any", self))}
+        return {"kind": self.kind} | {key: list(v) if isinstance(v, tuple) else v for key, v in given.items()}
 
     def order(self, name: str) -> int:
         """Order of ``A``, ``C`` or ``D``, by ``na``, ``nc`` or ``nd``; 0 for a kind without it."""
@@ -170,10 +176,6 @@ class OE(AbstractPolynomial):
         """As MATLAB writes the orders."""
         return f"OE [{_row(self.nb)}; {_row(self.nf)}; {_row(self.nk)}]"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The fields as JSON values."""
-        return _fields(self)
-
 
 @dataclass(frozen=True, kw_only=True)
 class BJ(AbstractPolynomial):
@@ -212,10 +214,6 @@ class BJ(AbstractPolynomial):
     def label(self) -> str:
         """As MATLAB writes the orders."""
         return f"BJ [{_row(self.nb)}; {self.nc}; {self.nd}; {_row(self.nf)}; {_row(self.nk)}]"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The fields as JSON values."""
-        return _fields(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -258,18 +256,9 @@ class ARMAX(AbstractPolynomial):
         rows = [str(self.na), *([_row(self.nb)] if self.nb else []), *([str(self.nc)] if self.nc else [])]
         return f"{name} [{'; '.join([*rows, *([_row(self.nk)] if self.nb else [])])}]"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The fields as JSON values."""
-        return _fields(self)
-
 
 def _row(values: tuple[int, ...]) -> str:
     return " ".join(map(str, values))
-
-
-def _fields(structure: AbstractPolynomial) -> dict[str, Any]:
-    fields = {name: getattr(structure, name) for name in structure.__dataclass_fields__}  # type: ignore[attr-defined]
-    return {"kind": structure.kind} | {k: list(v) if isinstance(v, tuple) else v for k, v in fields.items()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -397,11 +386,7 @@ class PolynomialModel(AbstractModel):
     @cached_property
     def recursion(self) -> StateSpace:
         """The form that is run."""
-        system = self.system
-        return StateSpace(
-            A=system.A, B=system.B, C=system.C, D=system.D, constant=system.constant,
-            K=system.K if self.orders.noise else None, scaling=self.scaling,
-        )  # fmt: skip
+        return StateSpace.of(self.system, self.scaling, noise=self.orders.noise)
 
     @property
     def poles(self) -> NDArray[np.complex128]:

@@ -14,6 +14,7 @@ from sysid.kernels import innovations
 from sysid.kernels import linear as kernel
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
+from sysid.models.innovations import Innovations
 from sysid.models.scaling import Scaling, VectorScaling
 
 HISTORY_NOISE = 1e-6
@@ -64,6 +65,23 @@ class StateSpace(AbstractForm):
     high: float = np.inf
     K: NDArray[np.float64] | None = None
     predicts: bool = field(default=False, init=False)
+
+    @classmethod
+    def of(cls, system: Innovations, scaling: Scaling | VectorScaling, *, noise: bool) -> StateSpace:
+        """A system in innovations form as what is run.
+
+        Args:
+            system: Its matrices, in scaled numbers.
+            scaling: Between units and scaled numbers.
+            noise: Whether its model of the noise counts; without it there is no prediction from measured output.
+
+        Returns:
+            The form.
+        """
+        gain = system.K if noise else None
+        return cls(
+            A=system.A, B=system.B, C=system.C, D=system.D, constant=system.constant, K=gain, scaling=scaling
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "predicts", self.K is not None)

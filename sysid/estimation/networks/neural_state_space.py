@@ -25,7 +25,7 @@ from sysid.traces import Trace
 
 STARTS = 6
 """Starts of a fit that asks for none: the linear model's, and five that differ (:class:`NeuralLayout`). Halved at each
-look, all of them take some 1.6 times the iterations of one."""
+checkpoint, all of them take some 1.6 times the iterations of one."""
 
 LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_subsets")
 """Options of a training that concern lagged regressors."""
