@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,9 @@ def _show_file(found: FileFinding, propose: Path | None) -> None:
     if propose is None:
         target.print("\nProposed dataset.yaml (each ? above and the comments below mark what was guessed):\n")
         target.print(proposal, markup=False, soft_wrap=True)
+        place = Path("datasets", found.path.stem, "dataset.yaml")
+        again = shlex.join(("sysid", "ingest", str(found.path), "--propose", str(place)))
+        target.print(f"Next: {again}", markup=False, soft_wrap=True)
         return
     target.print(f"Proposed data set: {propose}; check it, then load it with: sysid ingest {propose}", soft_wrap=True)
 
@@ -158,3 +162,5 @@ def _show_dataset(traces: TraceSet, path: Path) -> None:
         for sentence in trace.provenance:
             target.print(f"{trace.name}: {sentence}", soft_wrap=True)
     target.print(f"digest {traces.digest}")
+    look = shlex.join(("sysid", "advise", traces.name, "--mapping", "INPUT -> OUTPUT"))
+    target.print(f"Next: {look}", markup=False, soft_wrap=True)
