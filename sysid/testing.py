@@ -106,21 +106,21 @@ def _member_step(model: Member, past: dict[str, list[float]]) -> list[float]:
     past = {
         name: values + [np.nan] * (n_known + 1 - len(values)) for name, values in past.items() if name in ends.inputs
     } | {name: past[name] for name in ends.outputs}
-    part = model.recursion.part
-    if part is None:
+    columns = model.recursion.columns
+    if columns is None:
         raise TypeError(f"{model.mapping} is no recursion over lagged regressors")
     x = []
-    for column, (name, lags) in enumerate(zip((*ends.inputs, *ends.outputs), part.lags.inputs, strict=True)):
+    for column, (name, lags) in enumerate(zip((*ends.inputs, *ends.outputs), columns.lags.inputs, strict=True)):
         own = column >= len(ends.inputs)
-        x += [(past[name][-lag if own else -1 - lag] - part.offset[column]) / part.scale[column] for lag in lags]
-    n, r, m = part.neurons, len(x), len(ends.outputs)
-    W, b, V, c, w, gates = np.split(part.theta, np.cumsum([n * r, n, m * n, m, m * r if part.linear else 0]))
+        x += [(past[name][-lag if own else -1 - lag] - columns.offset[column]) / columns.scale[column] for lag in lags]
+    n, r, m = columns.neurons, len(x), len(ends.outputs)
+    W, b, V, c, w, gates = np.split(columns.theta, np.cumsum([n * r, n, m * n, m, m * r if columns.linear else 0]))
     h = np.tanh(W.reshape(n, r) @ x + b)
     y = V.reshape(m, n) @ h + c
-    y = y + w.reshape(m, r) @ x if part.linear else y
-    y = y + h @ (gates.reshape(n, r) @ x) if part.gated else y
-    y = np.clip(y, part.low, part.high)
-    units = zip(y, part.scale[-m:], part.offset[-m:], strict=True)
+    y = y + w.reshape(m, r) @ x if columns.linear else y
+    y = y + h @ (gates.reshape(n, r) @ x) if columns.gated else y
+    y = np.clip(y, columns.low, columns.high)
+    units = zip(y, columns.scale[-m:], columns.offset[-m:], strict=True)
     return [float(value * scale + offset) for value, scale, offset in units]
 
 

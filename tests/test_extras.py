@@ -81,7 +81,7 @@ def test_base_code_needs_no_extra(tmp_path):
         "sysid.export.onnx_body onnx",
         "sysid.export.onnx_nodes onnx",
         "sysid.export.onnx_sequence onnx",
-        "sysid.export.onnx_space onnx",
+        "sysid.export.onnx_state_space onnx",
         "sysid.export.onnx_step onnx",
         "sysid.export.torch_module torch",
         "sysid.sklearn",

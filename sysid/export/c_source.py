@@ -11,9 +11,9 @@ import numpy as np
 import sysid
 from sysid.export.flags import MEANING
 from sysid.export.incremental_form import IncrementalForm
-from sysid.export.layout import SpaceState
-from sysid.export.space import SpaceCell
+from sysid.export.layout import HiddenState
 from sysid.export.stage import Level, Side, Stage
+from sysid.export.state_space_form import StateSpaceForm
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import c_real, render
 
@@ -65,8 +65,8 @@ def _words(level: Level) -> str:
 
 def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
     """The numbers and expressions of one stage."""
-    cell, n = stage.cell, stage.cell.n_inputs
-    ends = cell.ends
+    form, n = stage.form, stage.form.n_inputs
+    ends = form.ends
     outputs = [
         {
             "name": name,
@@ -81,8 +81,8 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
             ends.outputs,
             ends.output_units,
             stage.targets,
-            cell.offset[n:],
-            cell.scale[n:],
+            form.offset[n:],
+            form.scale[n:],
             stage.limits,
             stage.told,
             strict=True,
@@ -92,14 +92,14 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
         "title": f"{stage.model.mapping}, {stage.model.structure.label}",
         "first": stage.first,
         "lost": stage.first_remainder,
-        "low": cell.low if np.isfinite(cell.low) else None,
-        "high": cell.high if np.isfinite(cell.high) else None,
+        "low": form.low if np.isfinite(form.low) else None,
+        "high": form.high if np.isfinite(form.high) else None,
         "outputs": outputs,
         "limited": stage.limited,
     }
     for output in outputs:  # the others are at no bound, and at a limit that nobody is told of
         output["raises"] = bool(output["sides"] and output["told"]) or stage.bounded
-    return common | (_space(stage) if isinstance(cell, SpaceCell) else _lagged(stage))
+    return common | (_state_space(stage) if isinstance(form, StateSpaceForm) else _lagged(stage))
 
 
 def _side(surrogate: Surrogate, side: Side) -> dict[str, Any]:
@@ -109,36 +109,36 @@ def _side(surrogate: Surrogate, side: Side) -> dict[str, Any]:
 
 
 def _lagged(stage: Stage) -> dict[str, Any]:
-    cell, layout = stage.lagged
-    form = IncrementalForm.of(cell)
+    form, layout = stage.lagged
+    incremental = IncrementalForm.of(form)
     late = [source > stage.targets[-1] for source in stage.sources]
     used = [
         not later and (bool(line.length) or 0 in own)
-        for later, line, own in zip(late, layout.inputs, cell.lags, strict=False)
+        for later, line, own in zip(late, layout.inputs, form.lags, strict=False)
     ]
 
     def sample(channel: int, lag: int) -> str:
         return f"past[{layout.lines[channel].column(lag)}]" if lag else f"u{channel}"
 
-    terms = (*form.inputs, *form.outputs)
-    newest = ["" if later else f"u{i}" for i, later in enumerate(late)] + [f"y[{j}]" for j in range(cell.n_outputs)]
+    terms = (*incremental.inputs, *incremental.outputs)
+    newest = ["" if later else f"u{i}" for i, later in enumerate(late)] + [f"y[{j}]" for j in range(form.n_outputs)]
     return {
         "kind": "lagged",
         "n": len(terms),
-        "neurons": cell.neurons,
-        "short": not cell.neurons and len(terms) <= SHORT,
-        "adds": cell.adds,
-        "weights": form.hidden_weights.T,
-        "gates": form.gates.T if cell.gated else [],
-        "bias": cell.hidden_bias,
-        "readout": cell.readout,
-        "linear": form.linear,
-        "constant": cell.constant,
+        "neurons": form.neurons,
+        "short": not form.neurons and len(terms) <= SHORT,
+        "adds": form.adds,
+        "weights": incremental.hidden_weights.T,
+        "gates": incremental.gates.T if form.gated else [],
+        "bias": form.hidden_bias,
+        "readout": form.readout,
+        "linear": incremental.linear,
+        "constant": form.constant,
         "scaled": _scaled(stage, used),
         "terms": [
             sample(t.channel, t.lag) + ("" if t.older is None else f" - {sample(t.channel, t.older)}") for t in terms
         ],
-        "last": [layout.column(cell.n_inputs + j, 1) - cell.n_inputs for j in range(cell.n_outputs)],
+        "last": [layout.column(form.n_inputs + j, 1) - form.n_inputs for j in range(form.n_outputs)],
         "lines": [
             {"first": line.first, "length": line.length, "newest": newest[i]}
             for i, line in enumerate(layout.lines)
@@ -147,40 +147,40 @@ def _lagged(stage: Stage) -> dict[str, Any]:
     }
 
 
-def _space(stage: Stage) -> dict[str, Any]:
-    cell = stage.space
+def _state_space(stage: Stage) -> dict[str, Any]:
+    form = stage.state_space
     return {
         "kind": "space",
         "short": False,
-        "n": cell.n_state,
-        "neurons": 0 if cell.cubic else len(cell.state_neurons) + len(cell.output_neurons),
-        "adds": cell.n_state > 0,
-        "change": cell.change,
-        "drift": cell.drift,
-        "readout": cell.readout,
-        "constant": cell.constant,
-        "state_neurons": cell.state_neurons,
-        "output_neurons": cell.output_neurons,
-        "cubic": cell.cubic,
-        "rectified": cell.rectified,
-        "bound": cell.bound if np.isfinite(cell.bound) else None,
-        "scaled": _scaled(stage, [True] * cell.n_inputs),
+        "n": form.n_state,
+        "neurons": 0 if form.cubic else len(form.state_neurons) + len(form.output_neurons),
+        "adds": form.n_state > 0,
+        "change": form.change,
+        "drift": form.drift,
+        "readout": form.readout,
+        "constant": form.constant,
+        "state_neurons": form.state_neurons,
+        "output_neurons": form.output_neurons,
+        "cubic": form.cubic,
+        "rectified": form.rectified,
+        "bound": form.bound if np.isfinite(form.bound) else None,
+        "scaled": _scaled(stage, [True] * form.n_inputs),
     }
 
 
 def _scaled(stage: Stage, used: list[bool]) -> list[dict[str, Any]]:
     """The inputs that a stage reads."""
-    cell, ends = stage.cell, stage.cell.ends
+    form, ends = stage.form, stage.form.ends
     return [
         {
             "number": i,
             "source": stage.sources[i],
             "name": ends.inputs[i],
             "unit": ends.input_units[i],
-            "offset": cell.offset[i],
-            "scale": cell.scale[i],
+            "offset": form.offset[i],
+            "scale": form.scale[i],
         }
-        for i in range(cell.n_inputs)
+        for i in range(form.n_inputs)
         if used[i]
     ]
 
@@ -195,13 +195,13 @@ def _rest_spaces(surrogate: Surrogate) -> list[dict[str, Any]]:
     """Every state space with what its scaled inputs hold at rest."""
     found = []
     for stage in surrogate.stages:
-        if isinstance(stage.state, SpaceState) and stage.state.size:
-            cell, places = stage.space, (*stage.sources, *stage.targets)
+        if isinstance(stage.state, HiddenState) and stage.state.size:
+            form, places = stage.state_space, (*stage.sources, *stage.targets)
             channels = [
                 {"source": source, "offset": offset, "scale": scale}
-                for source, offset, scale, _ in zip(places, cell.offset, cell.scale, cell.rest_channels, strict=False)
+                for source, offset, scale, _ in zip(places, form.offset, form.scale, form.rest_channels, strict=False)
             ]
-            bound = cell.bound if np.isfinite(cell.bound) else None
-            rest = {"first": stage.first, "gain": cell.gain, "rest": cell.rest, "channels": channels, "bound": bound}
+            bound = form.bound if np.isfinite(form.bound) else None
+            rest = {"first": stage.first, "gain": form.gain, "rest": form.rest, "channels": channels, "bound": bound}
             found.append(rest | {"size": stage.state.size})
     return found

@@ -210,15 +210,15 @@ class _Read:
 def _from_csv(text: str, path: Path) -> _Read:
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     delimiter = next((mark for mark in (";", "\t", ",") if lines and mark in lines[0]), ",")
-    rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO("\n".join(lines)), delimiter=delimiter)]
+    rows = [[form.strip() for form in row] for row in csv.reader(io.StringIO("\n".join(lines)), delimiter=delimiter)]
     decimal = "," if delimiter == ";" else "."
     names, units, time_unit = None, {}, None
     if rows and not _is_number(rows[0][0], decimal):
-        headers = [parse_header(cell) for cell in rows.pop(0)]
+        headers = [parse_header(form) for form in rows.pop(0)]
         names = tuple(header.name for header in headers[1:])
         time_unit = headers[0].unit
         units = {h.name: _with_reference(h.unit, h.reference) for h in headers[1:] if h.unit is not None}
-    numbers = [[_number(cell, decimal, f"{path}, row {i + 1}") for cell in row] for i, row in enumerate(rows)]
+    numbers = [[_number(form, decimal, f"{path}, row {i + 1}") for form in row] for i, row in enumerate(rows)]
     return _Read(path=path, rows=numbers, names=names, time_unit=time_unit, units=units)
 
 
@@ -239,7 +239,7 @@ def _from_yaml(text: str, path: Path) -> _Read:
     if not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
         raise ConfigError("the command is not a list of rows", where=path, expected="[[time, value], ...]", got=rows)
     units = {str(k): str(v) for k, v in unit.items()} if isinstance(unit, dict) else {"": str(unit)} if unit else {}
-    numbers = [[_number(cell, ".", f"{path}, row {i + 1}") for cell in row] for i, row in enumerate(rows)]
+    numbers = [[_number(form, ".", f"{path}, row {i + 1}") for form in row] for i, row in enumerate(rows)]
     time_unit = content.get("time_unit")
     return _Read(
         path=path,
@@ -258,13 +258,13 @@ def _is_number(text: str, decimal: str) -> bool:
     return True
 
 
-def _number(cell: Any, decimal: str, where: str) -> float:
-    text = cell.replace(decimal, ".") if isinstance(cell, str) else cell
+def _number(form: Any, decimal: str, where: str) -> float:
+    text = form.replace(decimal, ".") if isinstance(form, str) else form
     try:
         if isinstance(text, bool):
             raise ValueError
         return float(text)
     except (TypeError, ValueError):
         raise ConfigError(
-            "the command has a cell that is no number", where=where, expected="a number", got=repr(cell)
+            "the command has a form that is no number", where=where, expected="a number", got=repr(form)
         ) from None

@@ -58,13 +58,13 @@ def expected_flags(
     n_inputs = inputs.shape[1]
     bound, limited = (np.zeros(len(inputs), dtype=bool) for _ in range(2))
     for stage in surrogate.stages:
-        cell, n = stage.cell, len(stage.sources)
+        form, n = stage.form, len(stage.sources)
         for j, (target, told) in enumerate(zip(stage.targets, stage.told, strict=True)):
-            output, offset, scale = computed[:, target - n_inputs], cell.offset[n + j], cell.scale[n + j]
+            output, offset, scale = computed[:, target - n_inputs], form.offset[n + j], form.scale[n + j]
             reached = np.zeros(len(inputs), dtype=bool)
             for _, at_side in _at_sides(stage, j, inputs, computed):
                 reached |= at_side
-            for value in (cell.low, cell.high):
+            for value in (form.low, form.high):
                 if np.isfinite(value):
                     bound |= ~reached & (output == value * scale + offset)
             limited |= reached & told

@@ -24,7 +24,7 @@ from math import fsum
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.cell import Cell
+from sysid.export.lagged_form import LaggedForm
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,14 +44,14 @@ class Term:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IncrementalForm:
-    """Terms and their weights: the same sums as the cell's, over other regressors.
+    """Terms and their weights: the same sums as the lowered form's, over other regressors.
 
     Args:
         inputs: The inputs' terms.
         outputs: The outputs' terms.
         hidden_weights: Shape ``(n_neurons, n_terms)``, inputs before outputs.
         gates: Shape ``(n_neurons, n_terms)``, or without rows.
-        linear: Shape ``(n_outputs, n_terms)``; of what is added to the last outputs where the cell ``adds``. Elsewhere
+        linear: Shape ``(n_outputs, n_terms)``; of what is added to the last outputs where it ``adds``. Elsewhere
             the outputs' terms are levels, lest a number that is not be carried on.
     """
 
@@ -62,12 +62,12 @@ class IncrementalForm:
     linear: NDArray[np.float64]
 
     @classmethod
-    def of(cls, cell: Cell, *, blocks: bool = False) -> IncrementalForm:
-        """A cell in incremental (delta) form.
+    def of(cls, form: LaggedForm, *, blocks: bool = False) -> IncrementalForm:
+        """A lowered form in incremental (delta) form.
 
         Args:
-            cell: The cell.
-            blocks: Where the cell adds, whether the outputs' terms are in blocks that shift from step to step: the
+            form: The lowered form.
+            blocks: Where it adds, whether the outputs' terms are in blocks that shift from step to step: the
                 levels of all outputs, their last rates, those of the sample before, up to the longest lag of any.
                 More terms, with zero for weight, but this step's are the last one's.
 
@@ -79,22 +79,22 @@ class IncrementalForm:
             >>> arx = ARXModel(orders=ARX(na=2, nb=(1,), nk=(1,)), coefficients=[0.5, 1.75, -0.75], intercept=0.0,
             ...     mapping=Mapping.parse("u -> y"), sample_time=0.1, input_units=("V",), output_unit="V",
             ...     rest_output=0.0)
-            >>> form = IncrementalForm.of(Cell.of(arx))
+            >>> form = IncrementalForm.of(LaggedForm.of(arx))
             >>> [(term.channel, term.lag, term.older) for term in (*form.inputs, *form.outputs)]
             [(0, 1, None), (1, 1, None), (1, 1, 2)]
             >>> form.linear.tolist()
             [[0.5, 0.0, 0.75]]
         """
-        table = np.concatenate([cell.hidden_weights, cell.gates, cell.linear])
-        first = len(cell.hidden_weights) + len(cell.gates)  # of the linear parts
-        longest = max(max(own, default=0) for own in cell.lags[cell.n_inputs :])
+        table = np.concatenate([form.hidden_weights, form.gates, form.linear])
+        first = len(form.hidden_weights) + len(form.gates)  # of the linear parts
+        longest = max(max(own, default=0) for own in form.lags[form.n_inputs :])
         found: list[tuple[tuple[Term, ...], NDArray[np.float64]]] = []
         at = 0
-        for channel, own in enumerate(cell.lags):
+        for channel, own in enumerate(form.lags):
             columns = table[:, at : at + len(own)]
             at += len(own)
-            output = channel - cell.n_inputs
-            if output >= 0 and not cell.adds:
+            output = channel - form.n_inputs
+            if output >= 0 and not form.adds:
                 found.append((tuple(Term(channel=channel, lag=lag) for lag in own), columns))
                 continue
             used = tuple(range(1, longest + 1)) if output >= 0 and blocks else own
@@ -103,18 +103,18 @@ class IncrementalForm:
                 row = first + output
                 weights[row, 0] = fsum([*columns[row].tolist(), -1.0])  # rounded once: nearly everything cancels
             found.append((_terms(channel, used), weights))
-        inputs, outputs = found[: cell.n_inputs], found[cell.n_inputs :]
+        inputs, outputs = found[: form.n_inputs], found[form.n_inputs :]
         whole = np.concatenate([weights for _, weights in found], axis=1)
         terms = [term for own, _ in outputs for term in own]
-        if blocks and cell.adds:
+        if blocks and form.adds:
             n = sum(len(own) for own, _ in inputs)
-            order = [output * longest + back for back in range(longest) for output in range(cell.n_outputs)]
+            order = [output * longest + back for back in range(longest) for output in range(form.n_outputs)]
             whole, terms = whole[:, [*range(n), *(n + i for i in order)]], [terms[i] for i in order]
         return cls(
             inputs=tuple(term for own, _ in inputs for term in own),
             outputs=tuple(terms),
-            hidden_weights=whole[: cell.neurons],
-            gates=whole[cell.neurons : first],
+            hidden_weights=whole[: form.neurons],
+            gates=whole[form.neurons : first],
             linear=whole[first:],
         )
 

@@ -13,26 +13,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.cell import Cell, cell_of
-from sysid.export.space import SpaceCell
+from sysid.export.lagged_form import LaggedForm, lowered_form
+from sysid.export.state_space_form import StateSpaceForm
 from sysid.models import History
 from sysid.models.wiring import Member
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SpaceState:
+class HiddenState:
     """The state of a state space: numbers without a channel of their own.
 
     Args:
-        cell: The state space.
+        form: The state space.
     """
 
-    cell: SpaceCell
+    form: StateSpaceForm
 
     @property
     def size(self) -> int:
         """Length of the state."""
-        return self.cell.n_state
+        return self.form.n_state
 
     @property
     def lines(self) -> tuple[DelayLine, ...]:
@@ -40,8 +40,8 @@ class SpaceState:
         return ()
 
     def from_history(self, history: History) -> NDArray[np.float64]:
-        """The state after some samples; see :meth:`SpaceCell.from_history`."""
-        return self.cell.from_history(history)
+        """The state after some samples; see :meth:`StateSpaceForm.from_history`."""
+        return self.form.from_history(history)
 
     def at_rest(self, levels: NDArray[np.float64]) -> NDArray[np.float64]:
         """The state of a system that has stood at some values for ever.
@@ -52,28 +52,28 @@ class SpaceState:
         Returns:
             Shape ``(size,)``.
         """
-        n = self.cell.n_inputs
-        return self.from_history(History.at_rest(inputs=levels[:n], output=self.cell.rest_of(levels[n:])))
+        n = self.form.n_inputs
+        return self.from_history(History.at_rest(inputs=levels[:n], output=self.form.rest_of(levels[n:])))
 
     def to_dict(self) -> dict[str, Any]:
         """How to begin at rest, as JSON values."""
-        cell = self.cell
-        channels = cell.rest_channels
-        bounds = {"bound": cell.bound} if np.isfinite(cell.bound) else {}
+        form = self.form
+        channels = form.rest_channels
+        bounds = {"bound": form.bound} if np.isfinite(form.bound) else {}
         return {
             "size": self.size,
             "rule": "at rest: constant plus at_rest times the scaled channels, (value - offset) / scale, one column "
             "per channel; within the bound, where there is one, on both sides of zero",
             "channels": list(channels),
-            "offset": list(cell.offset[: len(channels)]),
-            "scale": list(cell.scale[: len(channels)]),
-            "at_rest": cell.gain.tolist(),
-            "constant": cell.rest.tolist(),
+            "offset": list(form.offset[: len(channels)]),
+            "scale": list(form.scale[: len(channels)]),
+            "at_rest": form.gain.tolist(),
+            "constant": form.rest.tolist(),
             **bounds,
         }
 
 
-def layout_of(model: Member) -> StateLayout | SpaceState:
+def layout_of(model: Member) -> StateLayout | HiddenState:
     """The layout of a model's state, whatever it lowers to.
 
     Args:
@@ -85,8 +85,8 @@ def layout_of(model: Member) -> StateLayout | SpaceState:
     Raises:
         ConfigError: If it lowers to neither.
     """
-    cell = cell_of(model)
-    return SpaceState(cell=cell) if isinstance(cell, SpaceCell) else StateLayout.of_cell(cell)
+    form = lowered_form(model)
+    return HiddenState(form=form) if isinstance(form, StateSpaceForm) else StateLayout.of_form(form)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,26 +152,26 @@ class StateLayout:
     @classmethod
     def of(cls, model: Member) -> StateLayout:
         """The layout of a model's state; :class:`ConfigError` if it has no delay lines."""
-        return cls.of_cell(Cell.of(model))
+        return cls.of_form(LaggedForm.of(model))
 
     @classmethod
-    def of_cell(cls, cell: Cell) -> StateLayout:
-        """The layout of a cell's state.
+    def of_form(cls, form: LaggedForm) -> StateLayout:
+        """The layout of a form's state.
 
         Args:
-            cell: The cell.
+            form: The lowered form.
 
         Returns:
             Lines as long as the model's lags need.
         """
-        ends, n = cell.ends, cell.n_inputs
-        lengths = [max([int(i >= n), *own]) for i, own in enumerate(cell.lags)]
+        ends, n = form.ends, form.n_inputs
+        lengths = [max([int(i >= n), *own]) for i, own in enumerate(form.lags)]
         first = [0, *accumulate(lengths)][:-1]
         names, units = (*ends.inputs, *ends.outputs), (*ends.input_units, *ends.output_units)
         lines = tuple(
             DelayLine(channel=name, unit=unit, first=at, length=length, offset=offset, scale=scale)
             for name, unit, at, length, offset, scale in zip(
-                names, units, first, lengths, cell.offset, cell.scale, strict=True
+                names, units, first, lengths, form.offset, form.scale, strict=True
             )
         )
         return cls(inputs=lines[:n], outputs=lines[n:])

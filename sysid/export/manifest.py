@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
-from sysid.export.layout import SpaceState
+from sysid.export.layout import HiddenState
 from sysid.export.parity import Parity, ParityCase
 from sysid.export.stage import Port, Range, Stage
 from sysid.export.surrogate import Surrogate
@@ -113,10 +113,10 @@ def describe(
 
 def _stage(stage: Stage, fit: FitResult | None) -> dict[str, Any]:
     """One of the models: how it is scaled, what it is held within, and the fit that it comes from."""
-    cell, n = stage.cell, stage.cell.n_inputs
+    form, n = stage.form, stage.form.n_inputs
     bounds = [
-        [bound * scale + offset for bound in (cell.low, cell.high)]
-        for offset, scale in zip(cell.offset[n:], cell.scale[n:], strict=True)
+        [bound * scale + offset for bound in (form.low, form.high)]
+        for offset, scale in zip(form.offset[n:], form.scale[n:], strict=True)
     ]
     return {
         "mapping": str(stage.model.mapping),
@@ -124,10 +124,10 @@ def _stage(stage: Stage, fit: FitResult | None) -> dict[str, Any]:
         "structure": stage.model.to_dict()["structure"],
         "n_parameters": stage.model.n_parameters,
         "scaling": {
-            "input_offset": list(cell.offset[:n]),
-            "input_scale": list(cell.scale[:n]),
-            "output_offset": list(cell.offset[n:]),
-            "output_scale": list(cell.scale[n:]),
+            "input_offset": list(form.offset[:n]),
+            "input_scale": list(form.scale[:n]),
+            "output_offset": list(form.offset[n:]),
+            "output_scale": list(form.scale[n:]),
         },
         "output_bounds": bounds,
         "fit": None
@@ -314,7 +314,7 @@ def _channel(port: Port, traces: TraceSet, estimation: tuple[Trace, ...]) -> dic
 def _initialisation(surrogate: Surrogate, example: Trace) -> dict[str, Any]:
     first = surrogate.inputs_of(example)[0]
     lines = "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale"
-    spaces = [stage for stage in surrogate.stages if isinstance(stage.state, SpaceState)]
+    spaces = [stage for stage in surrogate.stages if isinstance(stage.state, HiddenState)]
     levels = surrogate.levels(first).tolist()
     return {
         "rule": lines

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from sysid.export.cell import Cell
 from sysid.export.incremental_form import IncrementalForm
+from sysid.export.lagged_form import LaggedForm
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.onnx_space import space_step, within_bound
+from sysid.export.onnx_state_space import state_space_step, within_bound
 from sysid.export.onnx_step import added
 from sysid.export.stage import Side, Stage
 
@@ -40,9 +40,9 @@ def clip_range(stage: Stage) -> tuple[float, float] | None:
     Returns:
         The model's own bounds, drawn in to the declared limits where these are numbers and there is one output.
     """
-    cell, (low, high) = stage.cell, (stage.cell.low, stage.cell.high)
+    form, (low, high) = stage.form, (stage.form.low, stage.form.high)
     if merges_limits(stage):
-        offset, scale = cell.offset[-1], cell.scale[-1]
+        offset, scale = form.offset[-1], form.scale[-1]
         for side in stage.limits[0]:
             value = (side.value - offset) / scale
             low, high = (low, min(high, value)) if side.upper else (max(low, value), high)
@@ -59,14 +59,14 @@ def merges_limits(stage: Stage) -> bool:
 
 
 def lagged_body(
-    outer: Nodes, stage: Stage, form: IncrementalForm, carried: Sequence[str], scanned: Sequence[str]
+    outer: Nodes, stage: Stage, incremental: IncrementalForm, carried: Sequence[str], scanned: Sequence[str]
 ) -> Body:
     """The body for a model over lagged regressors.
 
     Args:
         outer: The graph around it.
         stage: The stage.
-        form: Its weights, with the outputs in blocks.
+        incremental: Its weights, with the outputs in blocks.
         carried: Names of what is carried: ``level`` and perhaps ``rates`` and ``remainder``, or ``line``.
         scanned: Names of the rows of a sample: ``x``, and channels that are limits.
 
@@ -74,20 +74,20 @@ def lagged_body(
         The body.
     """
     nodes = Nodes(outer.dtype, prefix=f"{outer.prefix}body_")
-    cell, layout = stage.lagged
+    form, layout = stage.lagged
     past = [nodes.prefix + name for name in carried]
-    if not cell.adds:
-        rows = [layout.outputs[term.channel - cell.n_inputs].column(term.lag) for term in form.outputs]
+    if not form.adds:
+        rows = [layout.outputs[term.channel - form.n_inputs].column(term.lag) for term in incremental.outputs]
         rows = [row - layout.outputs[0].first for row in rows]
         past = [nodes.add("Gather", [past[0], nodes.integers(rows)], "lagged", axis=0)] if rows else []
     z = nodes.add("Concat", [f"{nodes.prefix}x", *past], "regressors", axis=0)
-    change = _network(nodes, cell, form, z, keeps="remainder" in carried)
-    total = nodes.add("Add", [f"{nodes.prefix}level", change], "sum") if cell.adds else change
+    change = _network(nodes, form, incremental, z, keeps="remainder" in carried)
+    total = nodes.add("Add", [f"{nodes.prefix}level", change], "sum") if form.adds else change
     held = _held(nodes, stage, total)
     output = total if merges_limits(stage) and held != total else nodes.add("Identity", [held], "y")
-    sizes = _sizes(cell, layout)
+    sizes = _sizes(form, layout)
     after = _carry(nodes, stage, carried, sizes, _Sums(change=change, total=total, held=held))
-    n_x = max(1, len(form.inputs))
+    n_x = max(1, len(incremental.inputs))
     graph = nodes.graph(
         "one_step",
         [nodes.value(name, [sizes[name], "batch"]) for name in carried]
@@ -96,15 +96,15 @@ def lagged_body(
             nodes.value(name.removeprefix(nodes.prefix), [sizes[c], "batch"])
             for c, name in zip(carried, after, strict=True)
         ]
-        + [nodes.value(output.removeprefix(nodes.prefix), [cell.n_outputs, "batch"])],
+        + [nodes.value(output.removeprefix(nodes.prefix), [form.n_outputs, "batch"])],
     )
     return Body(graph=graph, held=output != total)
 
 
-def _sizes(cell: Cell, layout: StateLayout) -> dict[str, int]:
+def _sizes(form: LaggedForm, layout: StateLayout) -> dict[str, int]:
     """Rows of everything that can be carried."""
     longest = max(line.length for line in layout.outputs)
-    n = cell.n_outputs
+    n = form.n_outputs
     return {
         "level": n,
         "rates": n * (longest - 1),
@@ -113,25 +113,27 @@ def _sizes(cell: Cell, layout: StateLayout) -> dict[str, int]:
     }
 
 
-def _network(nodes: Nodes, cell: Cell, form: IncrementalForm, z: str, *, keeps: bool) -> str:
+def _network(nodes: Nodes, form: LaggedForm, incremental: IncrementalForm, z: str, *, keeps: bool) -> str:
     """The network's sums; the remainder, last among the regressors, is added by a weight of one."""
-    n = cell.n_outputs
-    pad = 0 if form.inputs else 1  # the loop needs a row to run over
+    n = form.n_outputs
+    pad = 0 if incremental.inputs else 1  # the loop needs a row to run over
     wide = ((0, 0), (pad, n if keeps else 0))
-    weights, gates, linear = (np.pad(table, wide) for table in (form.hidden_weights, form.gates, form.linear))
+    weights, gates, linear = (
+        np.pad(table, wide) for table in (incremental.hidden_weights, incremental.gates, incremental.linear)
+    )
     if keeps:
         linear[:, -n:] = np.eye(n)
-    if cell.neurons:
-        bias = nodes.numbers("b", cell.hidden_bias[:, np.newaxis])
+    if form.neurons:
+        bias = nodes.numbers("b", form.hidden_bias[:, np.newaxis])
         hidden = nodes.add("Tanh", [nodes.add("Gemm", [nodes.numbers("W", weights), z, bias], "hidden_sum")], "hidden")
-        readout = cell.readout
-        if cell.gated:
+        readout = form.readout
+        if form.gated:
             opened = nodes.add("Gemm", [nodes.numbers("G", gates), z, nodes.numbers("v", readout.T)], "gates")
             hidden, readout = nodes.add("Mul", [hidden, opened], "behind_gates"), np.ones_like(readout)
         # Side by side, neurons and regressors reach the outputs in one product.
         z = nodes.add("Concat", [hidden, z], "neurons_and_regressors", axis=0)
         linear = np.concatenate([readout, linear], axis=1)
-    constant = nodes.numbers("c", cell.constant[:, np.newaxis])
+    constant = nodes.numbers("c", form.constant[:, np.newaxis])
     return nodes.add("Gemm", [nodes.numbers("V_and_w", linear), z, constant], "change")
 
 
@@ -146,12 +148,12 @@ class _Sums:
 
 def _carry(nodes: Nodes, stage: Stage, carried: Sequence[str], sizes: dict[str, int], sums: _Sums) -> list[str]:
     """What the next step begins with."""
-    cell, layout = stage.lagged
+    form, layout = stage.lagged
     held = sums.held
     after = {"level": held}
     if "rates" in carried:
         rate = nodes.add("Sub", [held, f"{nodes.prefix}level"], "rate")
-        kept = sizes["rates"] - cell.n_outputs
+        kept = sizes["rates"] - form.n_outputs
         if kept:
             span = [nodes.integers([0]), nodes.integers([kept]), nodes.integers([0])]
             rate = nodes.add("Concat", [rate, nodes.add("Slice", [f"{nodes.prefix}rates", *span], "kept")], "r", axis=0)
@@ -160,7 +162,7 @@ def _carry(nodes: Nodes, stage: Stage, carried: Sequence[str], sizes: dict[str, 
         moved = nodes.add("Sub", [sums.total, f"{nodes.prefix}level"], "moved")
         after["remainder"] = nodes.add("Sub", [sums.change, moved], "lost")
     if "line" in carried:
-        first, n = layout.outputs[0].first, cell.n_outputs
+        first, n = layout.outputs[0].first, form.n_outputs
         rows = [
             j if lag == 1 else n + line.column(lag - 1) - first
             for j, line in enumerate(layout.outputs)
@@ -208,12 +210,12 @@ def scanned_limits(stage: Stage) -> list[tuple[int, Side]]:
 
 def _limit(nodes: Nodes, stage: Stage, j: int, side: Side, rows: Sequence[str]) -> str:
     """A limit from within the stage in the scaled numbers of an output."""
-    cell, n = stage.cell, stage.cell.n_inputs
-    offset, scale = cell.offset[n + j], cell.scale[n + j]
+    form, n = stage.form, stage.form.n_inputs
+    offset, scale = form.offset[n + j], form.scale[n + j]
     if side.column is None:
         return nodes.numbers("limit", [[(side.value - offset) / scale]])
     i = stage.targets.index(side.column)
-    slope, shift = cell.scale[n + i] / scale, (cell.offset[n + i] - offset) / scale
+    slope, shift = form.scale[n + i] / scale, (form.offset[n + i] - offset) / scale
     return nodes.add(
         "Add",
         [nodes.add("Mul", [rows[i], nodes.numbers("slope", slope)], "sloped"), nodes.numbers("shift", shift)],
@@ -221,7 +223,7 @@ def _limit(nodes: Nodes, stage: Stage, j: int, side: Side, rows: Sequence[str]) 
     )
 
 
-def space_body(outer: Nodes, stage: Stage, *, keeps: bool) -> Body:
+def state_space_body(outer: Nodes, stage: Stage, *, keeps: bool) -> Body:
     """The body for a state space: it carries its state, and each step is two products.
 
     Args:
@@ -232,19 +234,19 @@ def space_body(outer: Nodes, stage: Stage, *, keeps: bool) -> Body:
     Returns:
         The body; declared limits hold the output alone, after the loop.
     """
-    nodes, cell = Nodes(outer.dtype, prefix=f"{outer.prefix}body_"), stage.space
-    n, x = cell.n_state, f"{nodes.prefix}state"
+    nodes, form = Nodes(outer.dtype, prefix=f"{outer.prefix}body_"), stage.state_space
+    n, x = form.n_state, f"{nodes.prefix}state"
     z = nodes.add("Concat", [x, f"{nodes.prefix}x"], "state_and_inputs", axis=0)
-    output, change = space_step(nodes, cell, z, rows=True)
+    output, change = state_space_step(nodes, form, z, rows=True)
     following, lost = added(nodes, x, change, f"{nodes.prefix}remainder" if keeps else None)
-    following = within_bound(nodes, cell, following)
+    following = within_bound(nodes, form, following)
     carried = {"state": following} | ({} if lost is None else {"remainder": lost})
     graph = nodes.graph(
         "one_step",
-        [*(nodes.value(name, [n, "batch"]) for name in carried), nodes.value("x", [cell.n_inputs, "batch"])],
+        [*(nodes.value(name, [n, "batch"]) for name in carried), nodes.value("x", [form.n_inputs, "batch"])],
         [
             *(nodes.value(name.removeprefix(nodes.prefix), [n, "batch"]) for name in carried.values()),
-            nodes.value(output.removeprefix(nodes.prefix), [cell.n_outputs, "batch"]),
+            nodes.value(output.removeprefix(nodes.prefix), [form.n_outputs, "batch"]),
         ],
     )
     return Body(graph=graph, held=False)

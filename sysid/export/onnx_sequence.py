@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import DTypeLike
 from onnx import helper, numpy_helper
 
-from sysid.export.cell import Cell
 from sysid.export.flags import Flag
 from sysid.export.incremental_form import IncrementalForm, Term
+from sysid.export.lagged_form import LaggedForm
 from sysid.export.layout import DelayLine
 from sysid.export.onnx_blocks import in_blocks
-from sysid.export.onnx_body import Body, clip_range, lagged_body, limit_name, scanned_limits, space_body
+from sysid.export.onnx_body import Body, clip_range, lagged_body, limit_name, scanned_limits, state_space_body
 from sysid.export.onnx_nodes import TO_END, Nodes
 from sysid.export.onnx_step import (
     INT32,
@@ -36,8 +36,8 @@ from sysid.export.onnx_step import (
     step_nodes,
     within_a_body,
 )
-from sysid.export.space import SpaceCell
 from sysid.export.stage import Stage
+from sysid.export.state_space_form import StateSpaceForm
 from sysid.export.surrogate import Surrogate
 
 
@@ -105,24 +105,24 @@ class _Sequence:
     def made(self) -> Made:
         """Add the nodes; ``outputs`` has the names of the outputs in units afterwards."""
         nodes = self.nodes
-        numbers, state = self._space() if isinstance(self.stage.cell, SpaceCell) else self._lagged()
+        numbers, state = self._state_space() if isinstance(self.stage.form, StateSpaceForm) else self._lagged()
         limited = self._in_units(numbers)
         lost = nodes.add("Transpose", [f"{nodes.prefix}remainder_end"], "lost", perm=[1, 0]) if self.keeps else None
         return Made(scaled=tuple(numbers), state=state, remainder=lost, limited=tuple(limited))
 
     def _lagged(self) -> tuple[list[str], str]:
-        nodes, (cell, layout) = self.nodes, self.stage.lagged
-        form = IncrementalForm.of(cell, blocks=True)
+        nodes, (form, layout) = self.nodes, self.stage.lagged
+        incremental = IncrementalForm.of(form, blocks=True)
         scaled = [self._scaled(self.known[source], i, f"u{i}") for i, source in enumerate(self.stage.sources)]
         histories = [self._with_past(name, line) for name, line in zip(scaled, layout.inputs, strict=True)]
-        scanned = {"x": self._terms(form.inputs, histories, layout.inputs)}
+        scanned = {"x": self._terms(incremental.inputs, histories, layout.inputs)}
         for j, side in scanned_limits(self.stage):
-            row = self._scaled(self.known[side.column or 0], cell.n_inputs + j, limit_name(j, side))
+            row = self._scaled(self.known[side.column or 0], form.n_inputs + j, limit_name(j, side))
             scanned[limit_name(j, side)] = nodes.add(
                 "Unsqueeze", [row, nodes.integers([1])], f"{limit_name(j, side)}_row"
             )
-        begin = self._begin(cell, layout.outputs)
-        body = lagged_body(nodes, self.stage, form, list(begin), list(scanned))
+        begin = self._begin(form, layout.outputs)
+        body = lagged_body(nodes, self.stage, incremental, list(begin), list(scanned))
         numbers = self._loop(begin, list(scanned.values()), body)
         pieces = [self._newest(history, line) for history, line in zip(histories, layout.inputs, strict=True)]
         for number, line in zip(numbers, layout.outputs, strict=True):
@@ -131,12 +131,12 @@ class _Sequence:
             pieces.append(self._newest(self._with_past(tail, line), line))
         return numbers, nodes.add("Concat", [piece for piece in pieces if piece], "next_state", axis=1)
 
-    def _space(self) -> tuple[list[str], str]:
+    def _state_space(self) -> tuple[list[str], str]:
         """A state space: the loop carries its state."""
         nodes = self.nodes
         rows = [self._scaled(self.known[source], i, f"u{i}") for i, source in enumerate(self.stage.sources)]
         begin = {"state": self.state} | dict(zip(["remainder"], self.remainder, strict=False))
-        body = space_body(nodes, self.stage, keeps=self.keeps)
+        body = state_space_body(nodes, self.stage, keeps=self.keeps)
         numbers = self._loop(begin, [_rows(nodes, rows, "x") if rows else self._nothing()], body)
         return numbers, nodes.add("Transpose", [f"{nodes.prefix}state_end"], "next_state", perm=[1, 0])
 
@@ -154,7 +154,7 @@ class _Sequence:
 
     def _loop(self, begin: dict[str, str], scanned: list[str], body: Body) -> list[str]:
         """The loop; gives back the scaled outputs, each ``(time, batch)``."""
-        nodes, n, one = self.nodes, self.stage.cell.n_outputs, self.nodes.integers([1])
+        nodes, n, one = self.nodes, self.stage.form.n_outputs, self.nodes.integers([1])
         ends_of = [f"{name}_end" for name in begin]
         numbers = nodes.add_scan(list(begin.values()), scanned, ends_of, "y_loop", body.graph)
         span = clip_range(self.stage)
@@ -164,10 +164,10 @@ class _Sequence:
         rows = nodes.split(numbers, [f"y_row{j}" for j in range(n)], axis=1)
         return [nodes.add("Squeeze", [row, one], f"y_scaled{j}") for j, row in enumerate(rows)]
 
-    def _begin(self, cell: Cell, lines: Sequence[DelayLine]) -> dict[str, str]:
+    def _begin(self, form: LaggedForm, lines: Sequence[DelayLine]) -> dict[str, str]:
         """What the loop carries, before the first sample."""
         nodes = self.nodes
-        if not cell.adds:
+        if not form.adds:
             count = sum(line.length for line in lines)
             return {"line": self._gathered(range(lines[0].first, lines[0].first + count), "line")}
         begin = {"level": self._gathered([line.column(1) for line in lines], "level")}
@@ -186,9 +186,9 @@ class _Sequence:
 
     def _scaled(self, channel: str, column: int, name: str) -> str:
         """A channel in the numbers of one of the stage's columns."""
-        nodes, cell = self.nodes, self.stage.cell
-        centred = nodes.add("Sub", [channel, nodes.numbers(f"{name}_offset", cell.offset[column])], f"{name}_centred")
-        return nodes.add("Div", [centred, nodes.numbers(f"{name}_scale", cell.scale[column])], f"{name}_scaled")
+        nodes, form = self.nodes, self.stage.form
+        centred = nodes.add("Sub", [channel, nodes.numbers(f"{name}_offset", form.offset[column])], f"{name}_centred")
+        return nodes.add("Div", [centred, nodes.numbers(f"{name}_scale", form.scale[column])], f"{name}_scaled")
 
     def _with_past(self, channel: str, line: DelayLine) -> str:
         """A channel with the samples before it, oldest first; as it is where none are held."""
@@ -233,10 +233,10 @@ class _Sequence:
 
     def _in_units(self, numbers: Sequence[str]) -> list[str]:
         """Outputs in units, held within their declared limits to the last digit; gives back where they are."""
-        nodes, cell, limited = self.nodes, self.stage.cell, []
+        nodes, form, limited = self.nodes, self.stage.form, []
         for j, (number, sides) in enumerate(zip(numbers, self.stage.limits, strict=True)):
-            scale = nodes.numbers(f"y{j}_scale", cell.scale[cell.n_inputs + j])
-            offset = nodes.numbers(f"y{j}_offset", cell.offset[cell.n_inputs + j])
+            scale = nodes.numbers(f"y{j}_scale", form.scale[form.n_inputs + j])
+            offset = nodes.numbers(f"y{j}_offset", form.offset[form.n_inputs + j])
             value = nodes.add("Add", [nodes.add("Mul", [number, scale], f"y{j}_centred"), offset], f"y{j}_in_units")
             for side in sides:
                 part = nodes.within(f"{nodes.prefix}{limit_name(j, side)}_")

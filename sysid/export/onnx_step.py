@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from sysid.export.cell import Cell
 from sysid.export.flags import MEANING, Flag
 from sysid.export.incremental_form import IncrementalForm
+from sysid.export.lagged_form import LaggedForm
 from sysid.export.layout import StateLayout
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.onnx_space import space_step, within_bound
-from sysid.export.space import SpaceCell
+from sysid.export.onnx_state_space import state_space_step, within_bound
 from sysid.export.stage import Port, Side, Stage
+from sysid.export.state_space_form import StateSpaceForm
 from sysid.export.surrogate import Surrogate
 
 STATE_TEXT = "past samples, scaled; the layout stands in model.json under state"
@@ -80,7 +80,7 @@ def step_nodes(surrogate: Surrogate, dtype: DTypeLike) -> Nodes:
         if stage.known_sources != tuple(range(n_known)):
             read = "u" if len(surrogate.stages) > 1 else "read"  # alone, "u" is what goes in
             inputs = part.add("Gather", [known, nodes.integers(list(stage.known_sources))], read, axis=-1)
-        add_stage = _space_stage if isinstance(stage.cell, SpaceCell) else _stage
+        add_stage = _state_space_stage if isinstance(stage.form, StateSpaceForm) else _stage
         one = add_stage(part, stage, inputs, *stage_state(part, surrogate, stage))
         made.append(_within_limits(part, stage, one, known))
         if k + 1 < len(surrogate.stages):
@@ -167,25 +167,25 @@ class _Draft:
 
 
 def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str | None) -> _Draft:
-    cell, layout = stage.lagged
-    form = IncrementalForm.of(cell)
-    scaled = scaled_inputs(nodes, inputs, cell)
+    form, layout = stage.lagged
+    incremental = IncrementalForm.of(form)
+    scaled = scaled_inputs(nodes, inputs, form)
     known = nodes.add("Concat", [scaled, state], "inputs_and_state", axis=1)
-    terms, order = _terms(nodes, layout, form, known)
-    linear = [nodes.numbers("w", form.linear[:, order].T), nodes.numbers("c", cell.constant)]
+    terms, order = _terms(nodes, layout, incremental, known)
+    linear = [nodes.numbers("w", incremental.linear[:, order].T), nodes.numbers("c", form.constant)]
     output = nodes.add("Gemm", [terms, *linear], "linear_part")
-    if cell.neurons:
-        hidden = [nodes.numbers("W", form.hidden_weights[:, order].T), nodes.numbers("b", cell.hidden_bias)]
+    if form.neurons:
+        hidden = [nodes.numbers("W", incremental.hidden_weights[:, order].T), nodes.numbers("b", form.hidden_bias)]
         neurons = nodes.add("Tanh", [nodes.add("Gemm", [terms, *hidden], "hidden_sum")], "hidden")
-        readout = cell.readout
-        if cell.gated:
-            slopes = [nodes.numbers("G", form.gates[:, order].T), nodes.numbers("v", cell.readout[0])]
+        readout = form.readout
+        if form.gated:
+            slopes = [nodes.numbers("G", incremental.gates[:, order].T), nodes.numbers("v", form.readout[0])]
             neurons = nodes.add("Mul", [neurons, nodes.add("Gemm", [terms, *slopes], "gates")], "behind_gates")
             readout = np.ones_like(readout)
         output = nodes.add("Gemm", [neurons, nodes.numbers("V", readout.T), output], "network")
     lost = None
-    if cell.adds:
-        columns = nodes.integers([layout.column(cell.n_inputs + j, 1) for j in range(cell.n_outputs)])
+    if form.adds:
+        columns = nodes.integers([layout.column(form.n_inputs + j, 1) for j in range(form.n_outputs)])
         output, lost = added(nodes, nodes.add("Gather", [known, columns], "last", axis=1), output, remainder)
 
     def following(held: str) -> str:
@@ -195,9 +195,9 @@ def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str |
     return _Draft(scaled=clipped(nodes, output, stage), following=following, remainder=lost)
 
 
-def _terms(nodes: Nodes, layout: StateLayout, form: IncrementalForm, known: str) -> tuple[str, list[int]]:
+def _terms(nodes: Nodes, layout: StateLayout, incremental: IncrementalForm, known: str) -> tuple[str, list[int]]:
     """Levels, then rates, of ``[scaled inputs | state]``, and the place of each in the form."""
-    terms = (*form.inputs, *form.outputs)
+    terms = (*incremental.inputs, *incremental.outputs)
     levels = [i for i, term in enumerate(terms) if term.older is None]
     rates = [i for i, term in enumerate(terms) if term.older is not None]
     picked = nodes.integers([layout.column(terms[i].channel, terms[i].lag) for i in levels])
@@ -233,28 +233,28 @@ def added(nodes: Nodes, last: str, change: str, remainder: str | None) -> tuple[
     return total, nodes.add("Sub", [whole, nodes.add("Sub", [total, last], "moved")], "lost")
 
 
-def _space_stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str | None) -> _Draft:
-    cell = stage.space
-    scaled = scaled_inputs(nodes, inputs, cell)
+def _state_space_stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str | None) -> _Draft:
+    form = stage.state_space
+    scaled = scaled_inputs(nodes, inputs, form)
     z = nodes.add("Concat", [state, scaled], "state_and_inputs", axis=1)
-    output, change = space_step(nodes, cell, z, rows=False)
+    output, change = state_space_step(nodes, form, z, rows=False)
     following, lost = added(nodes, state, change, remainder)
-    following = within_bound(nodes, cell, following)
+    following = within_bound(nodes, form, following)
     return _Draft(scaled=clipped(nodes, output, stage), following=lambda _: following, remainder=lost)
 
 
 def _within_limits(nodes: Nodes, stage: Stage, draft: _Draft, known: str) -> Made:
     """The outputs within their declared limits, in scaled numbers and in units, and the state that follows."""
-    cell, scaled, limited = stage.cell, draft.scaled, []
-    outputs = unscaled_outputs(nodes, scaled, cell)
+    form, scaled, limited = stage.form, draft.scaled, []
+    outputs = unscaled_outputs(nodes, scaled, form)
     if stage.limited:
-        numbers = nodes.split(scaled, [f"scaled_{j}" for j in range(cell.n_outputs)])
-        values = nodes.split(outputs, [f"output_{j}" for j in range(cell.n_outputs)])
+        numbers = nodes.split(scaled, [f"scaled_{j}" for j in range(form.n_outputs)])
+        values = nodes.split(outputs, [f"output_{j}" for j in range(form.n_outputs)])
         for j, sides in enumerate(stage.limits):
             for side in sides:
                 part = nodes.within(f"{nodes.prefix}limit{j}_{'high' if side.upper else 'low'}_")
                 limit = _limit(part, stage, side, values, known)
-                offset, scale = cell.offset[cell.n_inputs + j], cell.scale[cell.n_inputs + j]
+                offset, scale = form.offset[form.n_inputs + j], form.scale[form.n_inputs + j]
                 centred = part.add("Sub", [limit, part.numbers("offset", offset)], "centred")
                 number = part.add("Div", [centred, part.numbers("scale", scale)], "scaled")
                 beyond = part.add("Greater" if side.upper else "Less", [values[j], limit], "beyond")
@@ -323,17 +323,17 @@ def _channels(ports: tuple[Port, ...]) -> str:
     return ", ".join(f"{port.name} [{port.unit}]" for port in ports)
 
 
-def scaled_inputs(nodes: Nodes, inputs: str, cell: Cell | SpaceCell) -> str:
+def scaled_inputs(nodes: Nodes, inputs: str, form: LaggedForm | StateSpaceForm) -> str:
     """Inputs in the model's numbers, scaled on the last axis."""
-    offset = nodes.numbers("input_offset", cell.offset[: cell.n_inputs])
-    scale = nodes.numbers("input_scale", cell.scale[: cell.n_inputs])
+    offset = nodes.numbers("input_offset", form.offset[: form.n_inputs])
+    scale = nodes.numbers("input_scale", form.scale[: form.n_inputs])
     return nodes.add("Div", [nodes.add("Sub", [inputs, offset], "u_centred"), scale], "u_scaled")
 
 
-def unscaled_outputs(nodes: Nodes, scaled: str, cell: Cell | SpaceCell) -> str:
+def unscaled_outputs(nodes: Nodes, scaled: str, form: LaggedForm | StateSpaceForm) -> str:
     """The stage's outputs in their units, on the last axis."""
-    scale = nodes.numbers("output_scale", cell.scale[cell.n_inputs :])
-    offset = nodes.numbers("output_offset", cell.offset[cell.n_inputs :])
+    scale = nodes.numbers("output_scale", form.scale[form.n_inputs :])
+    offset = nodes.numbers("output_offset", form.offset[form.n_inputs :])
     return nodes.add("Add", [nodes.add("Mul", [scaled, scale], "y_centred"), offset], "in_units")
 
 
@@ -341,7 +341,7 @@ def clipped(nodes: Nodes, output: str, stage: Stage) -> str:
     """Outputs within the model's own bounds; no node where there are none. NaN stays NaN, as in the model."""
     if not stage.bounded:
         return output
-    low, high = nodes.numbers("low", stage.cell.low), nodes.numbers("high", stage.cell.high)
+    low, high = nodes.numbers("low", stage.form.low), nodes.numbers("high", stage.form.high)
     return nodes.add("Clip", [output, low, high], "bounded")
 
 
@@ -374,8 +374,8 @@ def held_outputs(nodes: Nodes, surrogate: Surrogate, made: Sequence[Made]) -> li
     held = []
     for k, (stage, one) in enumerate(zip(surrogate.stages, made, strict=True)):
         for j, output in enumerate(one.scaled if stage.bounded else ()):
-            part, cell = nodes.within(f"held{k}_{j}_"), stage.cell
-            low = part.add("LessOrEqual", [output, part.numbers("low", cell.low)], "at_low")
-            high = part.add("GreaterOrEqual", [output, part.numbers("high", cell.high)], "at_high")
+            part, form = nodes.within(f"held{k}_{j}_"), stage.form
+            low = part.add("LessOrEqual", [output, part.numbers("low", form.low)], "at_low")
+            high = part.add("GreaterOrEqual", [output, part.numbers("high", form.high)], "at_high")
             held.append(part.add("Or", [low, high], "at_bound"))
     return held

@@ -135,14 +135,14 @@ def _from_rest(
 
 def _somewhere(rng: np.random.Generator, surrogate: Surrogate) -> NDArray[np.float64]:
     """What is computed before the first sample, within its scaling's range, in numbers that float32 can hold."""
-    cells = [(stage.cell, stage.cell.n_inputs) for stage in surrogate.stages]
-    offset = np.concatenate([np.array(cell.offset[n:]) for cell, n in cells])
-    scale = np.concatenate([np.array(cell.scale[n:]) for cell, n in cells])
+    forms = [(stage.form, stage.form.n_inputs) for stage in surrogate.stages]
+    offset = np.concatenate([np.array(form.offset[n:]) for form, n in forms])
+    scale = np.concatenate([np.array(form.scale[n:]) for form, n in forms])
     return (offset + scale * rng.uniform(-1.0, 1.0, len(offset))).astype(np.float32).astype(np.float64)
 
 
 def _disturbances(surrogate: Surrogate) -> NDArray[np.float64]:
-    scales = [scale for stage in surrogate.stages for scale in stage.cell.scale[stage.cell.n_inputs :]]
+    scales = [scale for stage in surrogate.stages for scale in stage.form.scale[stage.form.n_inputs :]]
     return DISTURBANCE * np.array(scales)
 
 
@@ -185,8 +185,8 @@ def random_cases(
 def _ranges(surrogate: Surrogate) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     scale: dict[int, tuple[float, float]] = {}
     for stage in surrogate.stages:
-        cell = stage.cell
-        for column, offset, half in zip(stage.sources, cell.offset, cell.scale, strict=False):
+        form = stage.form
+        for column, offset, half in zip(stage.sources, form.offset, form.scale, strict=False):
             scale.setdefault(column, (offset - half, offset + half))
     ranges = [port.range or scale.get(i, (0.0, 1.0)) for i, port in enumerate(surrogate.inputs)]
     return np.array([low for low, _ in ranges]), np.array([high for _, high in ranges])

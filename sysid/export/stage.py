@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from sysid.errors import ConfigError
-from sysid.export.cell import Cell, cell_of
-from sysid.export.layout import SpaceState, StateLayout, layout_of
-from sysid.export.space import SpaceCell
+from sysid.export.lagged_form import LaggedForm, lowered_form
+from sysid.export.layout import HiddenState, StateLayout, layout_of
+from sysid.export.state_space_form import StateSpaceForm
 from sysid.models import Limit
 from sysid.models.wiring import Member, Wiring
 
@@ -110,27 +110,27 @@ class Stage:
     first_remainder: int
 
     @cached_property
-    def cell(self) -> Cell | SpaceCell:
+    def form(self) -> LaggedForm | StateSpaceForm:
         """What is written."""
-        return cell_of(self.model)
+        return lowered_form(self.model)
 
     @cached_property
-    def state(self) -> StateLayout | SpaceState:
+    def state(self) -> StateLayout | HiddenState:
         """The layout of its own state, counted from ``first``."""
         return layout_of(self.model)
 
     @property
-    def lagged(self) -> tuple[Cell, StateLayout]:
-        """Cell and layout of a model over lagged regressors."""
-        cell = Cell.of(self.model)
-        return cell, StateLayout.of_cell(cell)
+    def lagged(self) -> tuple[LaggedForm, StateLayout]:
+        """Lowered form and layout of a model over lagged regressors."""
+        form = LaggedForm.of(self.model)
+        return form, StateLayout.of_form(form)
 
     @property
-    def space(self) -> SpaceCell:
-        """The cell of a model that is a state space."""
-        if isinstance(self.cell, SpaceCell):
-            return self.cell
-        raise ConfigError("not a state space", got=self.cell.ends.outputs)
+    def state_space(self) -> StateSpaceForm:
+        """The form of a model that is a state space."""
+        if isinstance(self.form, StateSpaceForm):
+            return self.form
+        raise ConfigError("not a state space", got=self.form.ends.outputs)
 
     @property
     def known_sources(self) -> tuple[int, ...]:
@@ -152,14 +152,14 @@ class Stage:
     @property
     def remainders(self) -> int:
         """Numbers more in its state in float32: what rounding took from its newest numbers, for the next step."""
-        if isinstance(self.cell, SpaceCell):
+        if isinstance(self.form, StateSpaceForm):
             return self.state.size
-        return self.cell.n_outputs if self.cell.adds else 0
+        return self.form.n_outputs if self.form.adds else 0
 
     @property
     def bounded(self) -> bool:
         """Whether its outputs are held within bounds of the model itself."""
-        return bool(np.isfinite(self.cell.low) or np.isfinite(self.cell.high))
+        return bool(np.isfinite(self.form.low) or np.isfinite(self.form.high))
 
     @property
     def limited(self) -> bool:
@@ -185,7 +185,7 @@ def stages_of(
     stages: list[Stage] = []
     first = remainder = 0
     for model in models:
-        ends = cell_of(model).ends
+        ends = lowered_form(model).ends
         stage = Stage(
             model=model,
             sources=tuple(columns[name] for name in ends.inputs),

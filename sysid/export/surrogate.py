@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.cell import cell_of
-from sysid.export.layout import DelayLine, SpaceState
+from sysid.export.lagged_form import lowered_form
+from sysid.export.layout import DelayLine, HiddenState
 from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
 from sysid.models import AbstractModel, Cascade, History
 from sysid.models.form import unheeded
@@ -310,7 +310,7 @@ class Surrogate:
 
     def state_text(self) -> dict[str, Any]:
         """The state as JSON values, with how to read it."""
-        spaces = [(stage.first, stage.state) for stage in self.stages if isinstance(stage.state, SpaceState)]
+        spaces = [(stage.first, stage.state) for stage in self.stages if isinstance(stage.state, HiddenState)]
         text = {
             "size": self.state_size,
             "order": "delay line after delay line; within a line the newest sample first",
@@ -346,6 +346,6 @@ def _levels(source: AbstractModel | Cascade, wiring: Wiring) -> dict[str, Level]
     """Every channel's level; an input without a declared one stands at its own first sample."""
     levels: dict[str, Level] = {name: name for name in wiring.inputs}
     models = source.models if isinstance(source, Cascade) else (source,)
-    for ends in (cell_of(model).ends for model in models):
+    for ends in (lowered_form(model).ends for model in models):
         levels |= dict(zip(ends.outputs, ends.rest_outputs, strict=True))
     return levels | dict(source.rest if isinstance(source, Cascade) else {})

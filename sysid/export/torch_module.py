@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from sysid.export.cell import Cell
 from sysid.export.flags import Flag
-from sysid.export.space import SpaceCell
+from sysid.export.lagged_form import LaggedForm
 from sysid.export.stage import Stage
+from sysid.export.state_space_form import StateSpaceForm
 from sysid.export.surrogate import Surrogate
 
 
@@ -32,10 +32,10 @@ class Limits(nn.Module):
 
     def __init__(self, stage: Stage) -> None:
         super().__init__()
-        cell, n = stage.cell, stage.cell.n_inputs
+        form, n = stage.form, stage.form.n_inputs
         self.first = int(stage.targets[0])
-        self.offsets = [float(value) for value in cell.offset[n:]]
-        self.scales = [float(value) for value in cell.scale[n:]]
+        self.offsets = [float(value) for value in form.offset[n:]]
+        self.scales = [float(value) for value in form.scale[n:]]
         sides = [(j, side) for j, own in enumerate(stage.limits) for side in own]
         self.outputs = [j for j, _ in sides]
         self.told = [stage.told[j] for j, _ in sides]
@@ -72,7 +72,7 @@ class Limits(nn.Module):
         return torch.cat(numbers, dim=1), torch.cat(channels[self.first :], dim=1), reached
 
 
-class StageStep(nn.Module):
+class LaggedStep(nn.Module):
     """One step of one stage with explicit state.
 
     Args:
@@ -96,25 +96,25 @@ class StageStep(nn.Module):
 
     def __init__(self, stage: Stage, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
-        cell, layout = stage.lagged
+        form, layout = stage.lagged
         numbers = {
-            **_scaling(cell),
-            "hidden_weights": cell.hidden_weights.T,
-            "hidden_bias": cell.hidden_bias,
-            "readout": cell.readout.T,
-            "linear": cell.linear.T,
-            "gates": cell.gates.T,
-            "constant": cell.constant,
+            **_scaling(form),
+            "hidden_weights": form.hidden_weights.T,
+            "hidden_bias": form.hidden_bias,
+            "readout": form.readout.T,
+            "linear": form.linear.T,
+            "gates": form.gates.T,
+            "constant": form.constant,
         }
         for name, values in numbers.items():
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
-        regressors = [layout.column(channel, lag) for channel, own in enumerate(cell.lags) for lag in own]
+        regressors = [layout.column(channel, lag) for channel, own in enumerate(form.lags) for lag in own]
         self.register_buffer("sources", torch.tensor(stage.known_sources, dtype=torch.long))
         self.register_buffer("regressor_columns", torch.tensor(regressors))
         self.register_buffer("state_columns", torch.tensor(layout.next_columns()))
         self.first, self.size = int(stage.first), int(layout.size)
-        self.bounded, self.limited, self.gated = stage.bounded, stage.limited, cell.gated
-        self.low, self.high = float(cell.low), float(cell.high)
+        self.bounded, self.limited, self.gated = stage.bounded, stage.limited, form.gated
+        self.low, self.high = float(form.low), float(form.high)
         self.limits = Limits(stage)
 
     def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -147,7 +147,7 @@ class StageStep(nn.Module):
         return outputs, following, held, reached
 
 
-class SpaceStep(nn.Module):
+class StateSpaceStep(nn.Module):
     """One step of a stage that is a state space, linear or neural.
 
     Args:
@@ -173,31 +173,31 @@ class SpaceStep(nn.Module):
 
     def __init__(self, stage: Stage, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
-        cell = stage.space
+        form = stage.state_space
         numbers = {
-            **_scaling(cell),
-            "change": cell.change.T,
-            "drift": cell.drift,
-            "readout": cell.readout.T,
-            "constant": cell.constant,
-            "state_weights": cell.state_neurons.weights.T,
-            "state_bias": cell.state_neurons.bias,
-            "state_readout": cell.state_neurons.readout.T,
-            "output_weights": cell.output_neurons.weights.T,
-            "output_bias": cell.output_neurons.bias,
-            "output_readout": cell.output_neurons.readout.T,
+            **_scaling(form),
+            "change": form.change.T,
+            "drift": form.drift,
+            "readout": form.readout.T,
+            "constant": form.constant,
+            "state_weights": form.state_neurons.weights.T,
+            "state_bias": form.state_neurons.bias,
+            "state_readout": form.state_neurons.readout.T,
+            "output_weights": form.output_neurons.weights.T,
+            "output_bias": form.output_neurons.bias,
+            "output_readout": form.output_neurons.readout.T,
         }
         for name, values in numbers.items():
             self.register_buffer(name, torch.tensor(np.array(values, order="C"), dtype=dtype))
         self.register_buffer("sources", torch.tensor(stage.known_sources, dtype=torch.long))
-        self.first, self.size = int(stage.first), cell.n_state
+        self.first, self.size = int(stage.first), form.n_state
         self.bounded, self.limited = stage.bounded, stage.limited
-        self.low, self.high, self.bound = float(cell.low), float(cell.high), float(cell.bound)
-        self.cubic, self.rectified = cell.cubic, cell.rectified
+        self.low, self.high, self.bound = float(form.low), float(form.high), float(form.bound)
+        self.cubic, self.rectified = form.cubic, form.rectified
         self.limits = Limits(stage)
 
     def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """One step; see :class:`StageStep`."""
+        """One step; see :class:`LaggedStep`."""
         state = whole_state.narrow(1, self.first, self.size)
         scaled = (known.index_select(1, self.sources) - self.input_offset) / self.input_scale
         x = torch.cat([state, scaled], dim=1)
@@ -222,13 +222,13 @@ class SpaceStep(nn.Module):
         return total * total * total if self.cubic else torch.tanh(total)
 
 
-def _scaling(cell: Cell | SpaceCell) -> dict[str, tuple[float, ...]]:
-    n = cell.n_inputs
+def _scaling(form: LaggedForm | StateSpaceForm) -> dict[str, tuple[float, ...]]:
+    n = form.n_inputs
     return {
-        "input_offset": cell.offset[:n],
-        "input_scale": cell.scale[:n],
-        "output_offset": cell.offset[n:],
-        "output_scale": cell.scale[n:],
+        "input_offset": form.offset[:n],
+        "input_scale": form.scale[:n],
+        "output_offset": form.offset[n:],
+        "output_scale": form.scale[n:],
     }
 
 
@@ -252,7 +252,7 @@ class SurrogateStep(nn.Module):
         super().__init__()
         self.stages = nn.ModuleList(
             [
-                SpaceStep(stage, dtype) if isinstance(stage.cell, SpaceCell) else StageStep(stage, dtype)
+                StateSpaceStep(stage, dtype) if isinstance(stage.form, StateSpaceForm) else LaggedStep(stage, dtype)
                 for stage in surrogate.stages
             ]
         )

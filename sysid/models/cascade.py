@@ -16,8 +16,8 @@ from sysid.models.cascade_batch import simulate_records
 from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
-from sysid.models.part import Part
 from sysid.models.wiring import Member, Wiring
 from sysid.traces import Trace
 
@@ -359,7 +359,7 @@ class Cascade:
 
 def _check_circles(models: Sequence[Member], wiring: Wiring) -> None:
     """Members in a circle must run sample by sample, which a model with a state of its own does not."""
-    alone = [model for model in models if Part.of(model) is None]
+    alone = [model for model in models if ColumnRecursion.of(model) is None]
     if alone and any(wiring.feeds_back(Ends.of(model)) for model in models):
         raise ConfigError(
             "the models cannot be wired",

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import Program
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
-from sysid.models.part import Part
 
 _Number = TypeVar("_Number", np.int64, np.float64)
 
@@ -44,12 +44,12 @@ class Limit:
 
 
 def program_of(
-    parts: Sequence[Part], ends: Sequence[Ends], channels: Sequence[str], limits: Dict[str, Limit]
+    members: Sequence[ColumnRecursion], ends: Sequence[Ends], channels: Sequence[str], limits: Dict[str, Limit]
 ) -> Program:
     """The tables of some members.
 
     Args:
-        parts: The members, in the order in which they run.
+        members: The members, in the order in which they run.
         ends: Their inputs and outputs.
         channels: Columns of the array that they read and write.
         limits: Limits by output.
@@ -62,22 +62,27 @@ def program_of(
     held = [_limit(limits.get(name, Limit()), column_of) for name in written]
     # Of each member the columns that it reads, and then its outputs: a regressor is one of them and a lag.
     columns = [np.array([column_of[name] for name in (*end.inputs, *end.outputs)], dtype=np.int64) for end in ends]
-    regressors = [part.lags.input_channel for part in parts]
-    offsets, scales = [np.array(part.offset) for part in parts], [np.array(part.scale) for part in parts]
+    regressors = [member.lags.input_channel for member in members]
+    offsets, scales = (
+        [np.array(member.offset) for member in members],
+        [np.array(member.scale) for member in members],
+    )
     return Program(
-        theta=np.concatenate([part.theta for part in parts]),
-        theta_first=_firsts([len(part.theta) for part in parts]),
-        neurons=np.array([part.neurons for part in parts], dtype=np.int64),
+        theta=np.concatenate([member.theta for member in members]),
+        theta_first=_firsts([len(member.theta) for member in members]),
+        neurons=np.array([member.neurons for member in members], dtype=np.int64),
         regressor_first=_firsts([len(some) for some in regressors]),
         regressor_channel=_of_each(columns, regressors),
-        regressor_lag=np.concatenate([part.lags.input_lag for part in parts]),
+        regressor_lag=np.concatenate([member.lags.input_lag for member in members]),
         regressor_offset=_of_each(offsets, regressors),
         regressor_scale=_of_each(scales, regressors),
         output_first=_firsts([len(end.outputs) for end in ends]),
         output_channel=np.array([column_of[name] for name in written], dtype=np.int64),
         output_offset=np.concatenate([some[len(end.inputs) :] for some, end in zip(offsets, ends, strict=True)]),
         output_scale=np.concatenate([some[len(end.inputs) :] for some, end in zip(scales, ends, strict=True)]),
-        bounds=np.array([[part.low, part.high] for part, end in zip(parts, ends, strict=True) for _ in _range(end)]),
+        bounds=np.array(
+            [[member.low, member.high] for member, end in zip(members, ends, strict=True) for _ in _range(end)]
+        ),
         limits=np.array([values for values, _ in held]),
         limit_channel=np.array([indices for _, indices in held], dtype=np.int64),
     )

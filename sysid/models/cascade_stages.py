@@ -14,9 +14,9 @@ from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, Program
 from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit, program_of
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
 from sysid.models.history import History
-from sysid.models.part import Part
 from sysid.models.wiring import Member
 
 _NOTHING = np.empty((0, 0))
@@ -105,16 +105,16 @@ def stages_of(
         As few stages as there can be.
     """
     stages: list[CompiledStage | ModelStage] = []
-    lowered = [(model, Part.of(model)) for model in models]
+    lowered = [(model, ColumnRecursion.of(model)) for model in models]
     for compiled, together in groupby(lowered, key=lambda entry: entry[1] is not None):
         run = list(together)
         if compiled:
-            parts, ends = [part for _, part in run if part is not None], [Ends.of(model) for model, _ in run]
+            members, ends = [one for _, one in run if one is not None], [Ends.of(model) for model, _ in run]
             stages.append(
                 CompiledStage(
                     n_outputs=sum(len(end.outputs) for end in ends),
-                    depth=max(part.lags.depth for part in parts),
-                    program=program_of(parts, ends, channels, limits),
+                    depth=max(member.lags.depth for member in members),
+                    program=program_of(members, ends, channels, limits),
                 )
             )
         else:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.history import History
-from sysid.models.part import Part
 from sysid.models.scaling import Scaling, VectorScaling
 
 
@@ -46,7 +46,7 @@ class AbstractForm(ABC):
         """Every number of the form, flat."""
 
     @property
-    def part(self) -> Part | None:
+    def columns(self) -> ColumnRecursion | None:
         """What runs in the compiled pass of a cascade; ``None`` for a form that is no function of lagged samples."""
         return None
 

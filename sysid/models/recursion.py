@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.kernels import recursion as kernel
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import read_now
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lags
-from sysid.models.part import Part
 from sysid.models.scaling import Scaling
 
 
@@ -116,9 +116,9 @@ class Recursion(AbstractForm):
         return flat.reshape(self.neurons, r) if len(flat) else None
 
     @property
-    def part(self) -> Part:
+    def columns(self) -> ColumnRecursion:
         """Its output is one more column of lagged regressors."""
-        return Part(
+        return ColumnRecursion(
             lags=Lags(inputs=(*self.lags.inputs, self.lags.output), output=()),
             neurons=self.neurons,
             theta=self.theta,

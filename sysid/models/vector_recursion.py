@@ -12,11 +12,11 @@ from sysid.errors import TraceError
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import Program
 from sysid.models.cascade_program import program_of
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends, read_now
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lags
-from sysid.models.part import Part
 from sysid.models.recursion import gauss_newton
 from sysid.models.scaling import VectorScaling
 
@@ -72,10 +72,10 @@ class VectorRecursion(AbstractForm):
         return read_now(inputs, self.lags.inputs)
 
     @property
-    def part(self) -> Part:
+    def columns(self) -> ColumnRecursion:
         """It as a member of a cascade."""
         scaling = self.scaling
-        return Part(
+        return ColumnRecursion(
             lags=self.lags,
             neurons=self.neurons,
             theta=self.theta,
@@ -99,7 +99,7 @@ class VectorRecursion(AbstractForm):
             rest_outputs=(0.0,) * p,
             direct=frozenset(),
         )
-        return program_of([self.part], [ends], (*inputs, *outputs), {})
+        return program_of([self.columns], [ends], (*inputs, *outputs), {})
 
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""

@@ -11,9 +11,9 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.export import EXPORTERS
-from sysid.export.cell import Cell
 from sysid.export.compiler import CompilerError, build_library
 from sysid.export.incremental_form import IncrementalForm
+from sysid.export.lagged_form import LaggedForm
 from sysid.models import NARX
 
 STRICT = ["-O2", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror"]
@@ -190,9 +190,9 @@ def test_parameters_are_written_to_the_last_bit(sources):
     surrogate, folder = sources["NARX 4/4/20"]
     text = (folder / f"{surrogate.identifier}.c").read_text()
     written = {float(number) for number in re.findall(r"R\(([^)]+)\)", text) if number[0] in "-0123456789"}
-    cell = Cell.of(surrogate.stages[0].model)
-    form = IncrementalForm.of(cell)
-    numbers = (form.hidden_weights, form.linear, cell.hidden_bias, cell.readout, cell.constant)
+    form = LaggedForm.of(surrogate.stages[0].model)
+    incremental = IncrementalForm.of(form)
+    numbers = (incremental.hidden_weights, incremental.linear, form.hidden_bias, form.readout, form.constant)
     assert {float(number) for part in numbers for number in part.ravel()} <= written
 
 

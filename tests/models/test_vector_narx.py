@@ -41,7 +41,7 @@ def test_one_output_is_predicted_as_by_a_network_of_one_output():
     one = network("BP -> AR", neurons=4, inputs=(0, 2), outputs=(1, 2))
     several = block("BP -> AR")
     scaling = one.scaling
-    like = one.recursion.part
+    like = one.recursion.columns
     assert like is not None
     same = several.__class__(
         **{name: getattr(several, name) for name in several.__dataclass_fields__}

@@ -17,7 +17,7 @@ from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.models import Ends, Lags, Member
-from sysid.models.part import Part
+from sysid.models.column_recursion import ColumnRecursion
 
 MAX_ROWS = 50_000
 """Samples that the basis is scaled to; more say nothing new about the range of a regressor."""
@@ -44,18 +44,18 @@ class MemberLayout:
     gated: bool = False
 
     @classmethod
-    def of(cls, model: Member, part: Part) -> MemberLayout:
+    def of(cls, model: Member, columns: ColumnRecursion) -> MemberLayout:
         """The layout of a member and of what it lowers to."""
         ends = Ends.of(model)
         n = len(ends.inputs)
-        lags = part.lags.inputs
+        lags = columns.lags.inputs
         return cls(
             name="+".join(ends.outputs),
             inputs=lags[:n],
             outputs=lags[n:],
-            neurons=part.neurons,
-            linear=part.linear,
-            gated=part.gated,
+            neurons=columns.neurons,
+            linear=columns.linear,
+            gated=columns.gated,
         )
 
     @property
@@ -166,18 +166,18 @@ def basis_of(model: Member, layout: MemberLayout, records: Sequence[dict[str, ND
     Returns:
         The basis; the plain one where the member has no linear part, which takes up the shift.
     """
-    part = Part.of(model)
-    if not layout.linear or part is None:
+    columns = ColumnRecursion.of(model)
+    if not layout.linear or columns is None:
         return RegressorBasis.identity(layout.lags)
-    ends, depth = Ends.of(model), part.lags.depth
+    ends, depth = Ends.of(model), columns.lags.depth
     names = (*ends.inputs, *ends.outputs)
     rows = []
     for record in records:
         z = np.column_stack([record[name] for name in names])
-        z = (z - np.array(part.offset)) / np.array(part.scale)
+        z = (z - np.array(columns.offset)) / np.array(columns.scale)
         z = np.concatenate([np.repeat(z[:1], depth, axis=0), z])
         n = len(z) - depth
-        pairs = zip(part.lags.input_channel, part.lags.input_lag, strict=True)
+        pairs = zip(columns.lags.input_channel, columns.lags.input_lag, strict=True)
         rows.append(np.column_stack([z[depth - lag : depth - lag + n, column] for column, lag in pairs]))
     regressors = np.concatenate(rows)
     return RegressorBasis.incremental(layout.lags, regressors[:: 1 + len(regressors) // MAX_ROWS])
@@ -208,9 +208,9 @@ class JointLayout:
         """
         layouts, blocks = [], []
         for model in models:
-            part = Part.of(model)
-            if part is not None:
-                layout = MemberLayout.of(model, part)
+            columns = ColumnRecursion.of(model)
+            if columns is not None:
+                layout = MemberLayout.of(model, columns)
                 basis = basis_of(model, layout, records)
                 layouts.append(layout)
                 blocks.append(layout.to_plain(basis))

@@ -12,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.kernels.cascade_layout import Program
 from sysid.models import Cascade, Ends, Member
 from sysid.models.cascade_program import program_of
-from sysid.models.part import Part
+from sysid.models.column_recursion import ColumnRecursion
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +57,9 @@ class TrainedMembers:
             ConfigError: If a member that would have to pass on sensitivities cannot.
         """
         run, flags = _to_run(cascade, trained)
-        parts = [_part(model) for model in run]
-        program = program_of(parts, [Ends.of(model) for model in run], cascade.wiring.channels, cascade.limits)
-        places = _places(parts, flags)
+        members = [_columns(model) for model in run]
+        program = program_of(members, [Ends.of(model) for model in run], cascade.wiring.channels, cascade.limits)
+        places = _places(members, flags)
         output_of = {int(channel): i for i, channel in enumerate(program.output_channel)}
         source = np.array([output_of.get(int(channel), -1) for channel in program.regressor_channel], dtype=np.int64)
         own_first = np.full(len(run), -1, dtype=np.int64)
@@ -67,7 +67,7 @@ class TrainedMembers:
         return cls(
             members=tuple(m for m, yes in zip(run, flags, strict=True) if yes),
             program=program,
-            depth=max(part.lags.depth for part in parts),
+            depth=max(columns.lags.depth for columns in members),
             places=places,
             own_first=own_first,
             extent=_extent(program, source, flags, [own for _, own in places]),
@@ -132,11 +132,11 @@ def _to_run(cascade: Cascade, trained: Sequence[str] | None) -> tuple[list[Membe
     return run, flags
 
 
-def _part(model: Member) -> Part:
-    part = Part.of(model)
-    if part is None:
+def _columns(model: Member) -> ColumnRecursion:
+    columns = ColumnRecursion.of(model)
+    if columns is None:
         raise _cannot(model)
-    return part
+    return columns
 
 
 def _cannot(model: Member) -> ConfigError:
@@ -149,10 +149,10 @@ def _cannot(model: Member) -> ConfigError:
     )
 
 
-def _places(parts: Sequence[Part], trained: Sequence[bool]) -> tuple[tuple[slice, slice], ...]:
+def _places(members: Sequence[ColumnRecursion], trained: Sequence[bool]) -> tuple[tuple[slice, slice], ...]:
     places, first, own = [], 0, 0
-    for part, yes in zip(parts, trained, strict=True):
-        n = len(part.theta)
+    for columns, yes in zip(members, trained, strict=True):
+        n = len(columns.theta)
         if yes:
             places.append((slice(first, first + n), slice(own, own + n)))
             own += n

@@ -24,7 +24,7 @@ from sysid.models import (
     VectorNARXModel,
     VectorScaling,
 )
-from sysid.models.part import Part
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.traces import Trace
 
 DEFAULT = JointTraining(max_iterations=500, patience=50)
@@ -175,5 +175,5 @@ def _template(
             for name in mapping.outputs
         ),
     )
-    part = Part.of(model)
-    return model.with_theta(MemberLayout.of(model, part).centre()) if part else model
+    columns = ColumnRecursion.of(model)
+    return model.with_theta(MemberLayout.of(model, columns).centre()) if columns else model

@@ -13,7 +13,7 @@ from sysid.estimation import JointTraining, fit_vector_narx
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.member_layout import MemberLayout
 from sysid.models import Mapping, VectorNARX
-from sysid.models.part import Part
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.traces import Channel, Trace
 from tests.models.cascades import block, command, network
 
@@ -62,7 +62,7 @@ def test_a_fit_is_its_seed():
 
 def test_layout_of_a_single_output_is_that_of_a_network_alone():
     model = network("BP+AR -> BC", neurons=4)
-    layout = MemberLayout.of(model, Part.of(model))
+    layout = MemberLayout.of(model, ColumnRecursion.of(model))
     plain = Layout(lags=model.network.lags(2), neurons=4, linear=True)
     assert layout.plain == plain
     assert layout.count == model.n_parameters
@@ -79,14 +79,14 @@ def test_layout_of_a_single_output_is_that_of_a_network_alone():
     "model", [block("BP -> AR+BC"), block("BP -> AR+BC", feedthrough=False)], ids=["linear", "not"]
 )
 def test_groups_cover_every_parameter_once(model):
-    layout = MemberLayout.of(model, Part.of(model))
+    layout = MemberLayout.of(model, ColumnRecursion.of(model))
     members = np.concatenate([group.members for group in layout.groups(0)])
     assert sorted(members.tolist()) == list(range(model.n_parameters))
 
 
 def test_the_centre_holds_every_output():
     model = block("BP -> AR+BC", output_delays=[[1, 2], [1, 3, 4]])
-    layout = MemberLayout.of(model, Part.of(model))
+    layout = MemberLayout.of(model, ColumnRecursion.of(model))
     w = layout.centre()[-2 * layout.lags.n_regressors :].reshape(2, -1)
     assert_allclose(w, [[0, 0, 1, 0, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0]])
 

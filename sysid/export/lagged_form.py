@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.space import SpaceCell
+from sysid.export.state_space_form import StateSpaceForm
 from sysid.models import NeuralForm, StateSpace
+from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
-from sysid.models.part import Part
 from sysid.models.wiring import Member
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cell:
+class LaggedForm:
     r"""``y = clip(w x + c + V tanh(W x + b))`` in scaled numbers, with the regressors of each column side by side.
 
     With gates each neuron of a single output multiplies a linear function: ``(v + G x) . tanh(W x + b)`` in place of
@@ -52,20 +52,20 @@ class Cell:
     high: float
 
     @classmethod
-    def of(cls, model: Member) -> Cell:
-        """A model as a cell.
+    def of(cls, model: Member) -> LaggedForm:
+        """A model, lowered.
 
         Args:
             model: A model of one output or several.
 
         Returns:
-            The cell.
+            The lowered form.
 
         Raises:
             ConfigError: If the model does not lower to lagged regressors.
         """
-        part = Part.of(model)
-        if part is None:
+        columns = ColumnRecursion.of(model)
+        if columns is None:
             raise ConfigError(
                 "this kind of model cannot be exported",
                 expected="a model over lagged inputs and outputs (ARX, NARX), or a state space, linear or neural",
@@ -73,22 +73,22 @@ class Cell:
                 remedy="fit one of these to what this model puts out, and export that",
             )
         ends = Ends.of(model)
-        m, k, n = len(ends.outputs), part.neurons, part.lags.n_regressors
-        cuts = np.cumsum([k * n, k, m * k, m, m * n if part.linear else 0])
-        hidden, bias, readout, constant, linear, gates = np.split(part.theta, cuts)
+        m, k, n = len(ends.outputs), columns.neurons, columns.lags.n_regressors
+        cuts = np.cumsum([k * n, k, m * k, m, m * n if columns.linear else 0])
+        hidden, bias, readout, constant, linear, gates = np.split(columns.theta, cuts)
         return cls(
             ends=ends,
-            lags=part.lags.inputs,
+            lags=columns.lags.inputs,
             hidden_weights=hidden.reshape(k, n),
             hidden_bias=bias,
             readout=readout.reshape(m, k),
             constant=constant,
-            linear=linear.reshape(m, n) if part.linear else np.zeros((m, n)),
-            gates=gates.reshape(k if part.gated else 0, n),
-            offset=part.offset,
-            scale=part.scale,
-            low=part.low,
-            high=part.high,
+            linear=linear.reshape(m, n) if columns.linear else np.zeros((m, n)),
+            gates=gates.reshape(k if columns.gated else 0, n),
+            offset=columns.offset,
+            scale=columns.scale,
+            low=columns.low,
+            high=columns.high,
         )
 
     @property
@@ -117,22 +117,25 @@ class Cell:
         return all(1 in own for own in self.lags[self.n_inputs :])
 
 
-def cell_of(model: Member) -> Cell | SpaceCell:
-    """A model as a cell, whichever kind it lowers to.
+def lowered_form(model: Member) -> LaggedForm | StateSpaceForm:
+    """A model, lowered to whichever kind it is.
 
     Args:
         model: The model.
 
     Returns:
-        The cell.
+        The lowered form.
 
     Raises:
         ConfigError: If it lowers to neither kind.
     """
     form = model.recursion
-    lowered = SPACES.get(type(form))
-    return Cell.of(model) if lowered is None else lowered(form, model.ends)
+    lowered = HIDDEN.get(type(form))
+    return LaggedForm.of(model) if lowered is None else lowered(form, model.ends)
 
 
-SPACES: dict[type, Callable[..., SpaceCell]] = {StateSpace: SpaceCell.linear, NeuralForm: SpaceCell.neural}
+HIDDEN: dict[type, Callable[..., StateSpaceForm]] = {
+    StateSpace: StateSpaceForm.linear,
+    NeuralForm: StateSpaceForm.neural,
+}
 """Forms with hidden states, and what they become; every other form is lagged."""

@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.space import Neurons, SpaceCell
+from sysid.export.state_space_form import Neurons, StateSpaceForm
 
 
-def space_step(nodes: Nodes, cell: SpaceCell, z: str, *, rows: bool) -> tuple[str, str]:
+def state_space_step(nodes: Nodes, form: StateSpaceForm, z: str, *, rows: bool) -> tuple[str, str]:
     """One step of a state space.
 
     Args:
         nodes: The graph.
-        cell: The state space.
+        form: The state space.
         z: State and scaled inputs.
         rows: Whether ``z`` is ``(n_state + n_inputs, batch)``; ``(batch, n_state + n_inputs)`` otherwise.
 
@@ -35,22 +35,22 @@ def space_step(nodes: Nodes, cell: SpaceCell, z: str, *, rows: bool) -> tuple[st
         if not len(neurons):
             return total
         hidden = product(f"{name}_W", neurons.weights, z, column(f"{name}_b", neurons.bias), f"{name}_hidden_sum")
-        if cell.cubic:
+        if form.cubic:
             square = nodes.add("Mul", [hidden, hidden], f"{name}_square")
             hidden = nodes.add("Mul", [square, hidden], f"{name}_hidden")
         else:
             hidden = nodes.add("Tanh", [hidden], f"{name}_hidden")
         return product(f"{name}_V", neurons.readout, hidden, total, f"{name}_network")
 
-    output = summed("output", cell.readout, cell.constant, cell.output_neurons)
-    if cell.rectified:
+    output = summed("output", form.readout, form.constant, form.output_neurons)
+    if form.rectified:
         output = nodes.add("Abs", [output], "output_rectified")
-    return output, summed("change", cell.change, cell.drift, cell.state_neurons)
+    return output, summed("change", form.change, form.drift, form.state_neurons)
 
 
-def within_bound(nodes: Nodes, cell: SpaceCell, state: str) -> str:
+def within_bound(nodes: Nodes, form: StateSpaceForm, state: str) -> str:
     """A state within its bound; no node where there is none."""
-    if not np.isfinite(cell.bound):
+    if not np.isfinite(form.bound):
         return state
-    bounds = [nodes.numbers(f"state_{name}", value) for name, value in (("low", -cell.bound), ("high", cell.bound))]
+    bounds = [nodes.numbers(f"state_{name}", value) for name, value in (("low", -form.bound), ("high", form.bound))]
     return nodes.add("Clip", [state, *bounds], "state_bounded")

@@ -31,14 +31,14 @@ class Neurons:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SpaceCell:
+class StateSpaceForm:
     r"""``x(t+1) = clip(x + T z + d + V s(W z + b))``, ``y = clip(r(C z + c + v s(Wy z + by)))`` with ``z = [x; u]``.
 
     All in scaled numbers.
 
     Args:
         ends: Names, units and values at rest of what goes in and comes out.
-        form: What the model runs.
+        lowered: What the model runs.
         change: ``T``, what a step adds to the state, shape ``(n_states, n_states + n_inputs)``: a slow mode is nearly
             an integrator, so that ``A - 1`` is kept and not ``A``.
         drift: ``d``, shape ``(n_states,)``.
@@ -55,7 +55,7 @@ class SpaceCell:
     """
 
     ends: Ends
-    form: StateSpace | NeuralForm
+    lowered: StateSpace | NeuralForm
     change: NDArray[np.float64]
     drift: NDArray[np.float64]
     readout: NDArray[np.float64]
@@ -69,25 +69,25 @@ class SpaceCell:
     rest: NDArray[np.float64]
 
     @classmethod
-    def linear(cls, form: StateSpace, ends: Ends) -> SpaceCell:
+    def linear(cls, lowered: StateSpace, ends: Ends) -> StateSpaceForm:
         """A linear state space: no neurons, no bound."""
-        n, row = form.n_state, form.n_state + form.n_inputs
-        units, none = np.eye(form.n_inputs), np.zeros(form.n_inputs)
-        silent = np.zeros(form.n_outputs)
-        gain, rest = [form.equilibrium(unit) for unit in units], np.zeros(n)
-        if form.K is not None:
-            rest = form.standing(none, silent)
-            gain = [form.standing(unit, silent) - rest for unit in units]
-            gain += [form.standing(none, unit) - rest for unit in np.eye(form.n_outputs)]
+        n, row = lowered.n_state, lowered.n_state + lowered.n_inputs
+        p = lowered.n_outputs
+        units, none, silent = np.eye(lowered.n_inputs), np.zeros(lowered.n_inputs), np.zeros(p)
+        gain, rest = [lowered.equilibrium(unit) for unit in units], np.zeros(n)
+        if lowered.K is not None:
+            rest = lowered.standing(none, silent)
+            gain = [lowered.standing(unit, silent) - rest for unit in units]
+            gain += [lowered.standing(none, unit) - rest for unit in np.eye(p)]
         return cls(
             ends=ends,
-            form=form,
-            change=np.concatenate([form.A - np.eye(n), form.B], axis=1),
+            lowered=lowered,
+            change=np.concatenate([lowered.A - np.eye(n), lowered.B], axis=1),
             drift=np.zeros(n),
-            readout=np.concatenate([form.C, form.D], axis=1),
-            constant=form.constant,
+            readout=np.concatenate([lowered.C, lowered.D], axis=1),
+            constant=lowered.constant,
             state_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((n, 0))),
-            output_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((form.n_outputs, 0))),
+            output_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((p, 0))),
             cubic=False,
             rectified=False,
             bound=np.inf,
@@ -96,9 +96,9 @@ class SpaceCell:
         )
 
     @classmethod
-    def neural(cls, form: NeuralForm, ends: Ends) -> SpaceCell:
+    def neural(cls, lowered: NeuralForm, ends: Ends) -> StateSpaceForm:
         """A neural state space."""
-        sizes, theta = form.sizes, form.theta
+        sizes, theta = lowered.sizes, lowered.theta
         n, k, q, row = sizes.states, sizes.neurons, sizes.output_neurons, sizes.row
         M, W, Wy = (theta[part].reshape(-1, row) for part in (sizes.linear, sizes.hidden, sizes.output_hidden))
         L, E = theta[sizes.output_linear], theta[sizes.start].reshape(n, -1)
@@ -106,7 +106,7 @@ class SpaceCell:
         change[:, :n] -= np.eye(n)
         return cls(
             ends=ends,
-            form=form,
+            lowered=lowered,
             change=change,
             drift=M[:, -1],
             readout=L[np.newaxis, :-1],
@@ -115,9 +115,9 @@ class SpaceCell:
             output_neurons=Neurons(
                 weights=Wy[:, :-1], bias=Wy[:, -1], readout=theta[sizes.output_readout].reshape(1, q)
             ),
-            cubic=form.cubic,
-            rectified=form.rectified,
-            bound=form.bound,
+            cubic=lowered.cubic,
+            rectified=lowered.rectified,
+            bound=lowered.bound,
             gain=E[:, :-1],
             rest=E[:, -1],
         )
@@ -125,7 +125,7 @@ class SpaceCell:
     @property
     def scaling(self) -> Scaling | VectorScaling:
         """Between units and scaled numbers."""
-        return self.form.scaling
+        return self.lowered.scaling
 
     @property
     def n_state(self) -> int:
@@ -155,12 +155,12 @@ class SpaceCell:
     @property
     def low(self) -> float:
         """Lower bound of the output in scaled numbers."""
-        return self.form.low
+        return self.lowered.low
 
     @property
     def high(self) -> float:
         """Upper bound of the output in scaled numbers."""
-        return self.form.high
+        return self.lowered.high
 
     def rest_of(self, levels: NDArray[np.float64]) -> float | NDArray[np.float64]:
         """The levels of the outputs, shape ``(n_outputs,)``, as a history has them."""
@@ -180,7 +180,7 @@ class SpaceCell:
         Returns:
             Shape ``(n_states,)``.
         """
-        return self.form.state(history)
+        return self.lowered.state(history)
 
 
 def _each(value: float | tuple[float, ...]) -> tuple[float, ...]:

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from sysid.models.lags import Lags
 
 
-class _HasPart(Protocol):
+class _Lowers(Protocol):
     @property
-    def part(self) -> Part | None: ...
+    def columns(self) -> ColumnRecursion | None: ...
 
 
 class _Lowered(Protocol):
     @property
-    def recursion(self) -> _HasPart: ...
+    def recursion(self) -> _Lowers: ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Part:
+class ColumnRecursion:
     """A recursion over columns, its inputs' and then its outputs'.
 
     Args:
@@ -48,6 +48,6 @@ class Part:
     high: float
 
     @staticmethod
-    def of(model: _Lowered) -> Part | None:
-        """A model as a part; ``None`` for one that is no recursion over lagged regressors."""
-        return model.recursion.part
+    def of(model: _Lowered) -> ColumnRecursion | None:
+        """What a model runs, over columns; ``None`` for one that is no recursion over lagged regressors."""
+        return model.recursion.columns
