@@ -133,13 +133,13 @@ def run_neural(form: NeuralForm, inputs: NDArray[np.float64], x: NDArray[np.floa
         x: State before the first sample, shape ``(n_states,)``.
 
     Returns:
-        Scaled output of shape ``(n_samples,)``.
+        Scaled outputs of shape ``(n_samples, n_outputs)``.
     """
     s, theta = form.sizes, form.theta
     M, W = theta[s.linear].reshape(s.states, s.row), theta[s.hidden].reshape(s.neurons, s.row)
     V = theta[s.readout].reshape(s.states, s.neurons)
-    L, Wy = theta[s.output_linear], theta[s.output_hidden].reshape(s.output_neurons, s.row)
-    v = theta[s.output_readout]
+    L, Wy = theta[s.output_linear].reshape(s.outputs, s.row), theta[s.output_hidden].reshape(s.output_neurons, s.row)
+    v = theta[s.output_readout].reshape(s.outputs, s.output_neurons)
 
     def activation(a: NDArray[np.float64]) -> NDArray[np.float64]:
         return a**3 if form.cubic else np.tanh(a)
@@ -148,7 +148,7 @@ def run_neural(form: NeuralForm, inputs: NDArray[np.float64], x: NDArray[np.floa
     for u in inputs:
         z = np.concatenate([x, u, [1.0]])
         output = L @ z + v @ activation(Wy @ z)
-        y.append(float(np.clip(abs(output) if form.rectified else output, form.low, form.high)))
+        y.append(np.clip(abs(output) if form.rectified else output, form.low, form.high))
         x = np.clip(M @ z + V @ activation(W @ z), -form.bound, form.bound)
     return np.array(y)
 

@@ -43,12 +43,14 @@ from sysid.models import (
     Start,
     TransferFunction,
     VectorNARX,
+    VectorNeuralStateSpace,
     VectorStateSpace,
 )
 from sysid.traces import Role
 
 __all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "OrderSearch", "Role", "StabilityOptions", "Start"]
 __all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining", "VectorStateSpace"]
+__all__ += ["VectorNeuralStateSpace"]
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
 __all__ += ["advise", "excite", "frequency_response", "impulse_response"]
 __all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]

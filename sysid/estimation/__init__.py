@@ -13,7 +13,7 @@ from sysid.estimation.linear.transfer_function_search import TransferFunctionTra
 from sysid.estimation.networks.joint import CascadeFit, JointTraining
 from sysid.estimation.networks.joint_training import fit_cascade, with_upstream_outputs
 from sysid.estimation.networks.narx import fit_narx
-from sysid.estimation.networks.neural_state_space import fit_neural_state_space
+from sysid.estimation.networks.neural_state_space import fit_neural_state_space, fit_vector_neural_state_space
 from sysid.estimation.networks.posterior import Posterior
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.vector_narx import fit_vector_narx
@@ -51,6 +51,7 @@ __all__ = [
     "fit_state_space",
     "fit_transfer_function",
     "fit_vector_narx",
+    "fit_vector_neural_state_space",
     "fit_vector_state_space",
     "state_orders",
     "with_upstream_outputs",

@@ -29,7 +29,12 @@ from sysid.estimation.linear.transfer_function_search import TransferFunctionTra
 from sysid.estimation.linear_posteriors import LinearPosterior, arx_posterior, transfer_function_posterior
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.narx import fit_narx
-from sysid.estimation.networks.neural_state_space import STARTS, check_training, fit_neural_state_space
+from sysid.estimation.networks.neural_state_space import (
+    STARTS,
+    check_training,
+    fit_neural_state_space,
+    fit_vector_neural_state_space,
+)
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
@@ -56,6 +61,7 @@ from sysid.models import (
     Start,
     TransferFunction,
     VectorNARX,
+    VectorNeuralStateSpace,
     VectorStateSpace,
 )
 from sysid.traces import Trace
@@ -293,15 +299,21 @@ ESTIMATORS: dict[str, Estimator] = {
             no_posterior=ENDED,
             joins=True,
         ),
-        Estimator(
-            structure=NeuralStateSpace,
-            name="a neural state space",
-            fit=fit_neural_state_space,
-            training=Training,
-            check_training=check_training,
-            no_posterior=ENDED,
-            begins="a neural state space begins at the best linear one",
-            starts=STARTS,
+        *(
+            Estimator(
+                structure=structure,
+                name=name,
+                fit=fit_by,
+                training=Training,
+                check_training=check_training,
+                no_posterior=ENDED,
+                begins="a neural state space begins at the best linear one",
+                starts=STARTS,
+            )
+            for structure, name, fit_by in (
+                (NeuralStateSpace, "a neural state space", fit_neural_state_space),
+                (VectorNeuralStateSpace, "a neural state space of several outputs", fit_vector_neural_state_space),
+            )
         ),
         Estimator(
             structure=TransferFunction,

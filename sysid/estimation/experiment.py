@@ -18,6 +18,7 @@ from sysid.models import (
     Scaling,
     Start,
     StartKind,
+    VectorScaling,
     beginning,
 )
 from sysid.traces import Trace
@@ -29,7 +30,7 @@ class Experiment:
 
     Args:
         inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
-        output: Measured output, shape ``(n_samples,)``.
+        output: Measured output, shape ``(n_samples,)``, or ``(n_samples, n_outputs)`` for a model of several outputs.
         history: The samples before the first.
         weights: Weight of each squared residual, shape ``(n_samples,)``; zero where a sample does not count.
             ``None`` for all ones.
@@ -46,14 +47,16 @@ class Experiment:
     past: NDArray[np.bool_] | None = None
 
     @classmethod
-    def from_trace(cls, trace: Trace, mapping: Mapping, start: Start, rest_output: float) -> Experiment:
+    def from_trace(
+        cls, trace: Trace, mapping: Mapping, start: Start, rest_output: float | NDArray[np.float64]
+    ) -> Experiment:
         """The record of one trace.
 
         Args:
             trace: The trace.
             mapping: Which channels go in, which comes out.
             start: Where its history comes from.
-            rest_output: Output at rest.
+            rest_output: Output at rest; an array, one value an output, for a model of several outputs.
 
         Returns:
             The experiment, without the samples that became history. For an estimated start it is the whole record,
@@ -63,7 +66,10 @@ class Experiment:
             ChannelError: If the trace lacks a channel of the mapping.
             TraceError: If the trace is not longer than a measured start.
         """
-        inputs, output = trace.columns(mapping.inputs), trace.columns([mapping.output])[:, 0]
+        inputs, output = trace.columns(mapping.inputs), trace.columns(mapping.outputs)
+        if not isinstance(rest_output, np.ndarray):
+            mapping.check_single()
+            output = output[:, 0]
         history = start.history(inputs, output, rest_output, trace.usable_samples)
         if start.kind is StartKind.ESTIMATED:
             return cls._of(trace, inputs, output, Beginning(history=history, first=0), np.zeros(1, dtype=np.bool_))
@@ -87,7 +93,7 @@ class Experiment:
             ChannelError: If the trace lacks a channel of the model's mapping.
             TraceError: If the trace is not longer than a measured start.
         """
-        inputs, output = trace.columns(model.mapping.inputs), trace.columns([model.mapping.output])[:, 0]
+        inputs, output = trace.columns(model.mapping.inputs), model.measured(trace)
         begun = beginning(model, inputs, output, start, trace.usable_samples)
         return cls._of(trace, inputs, output, begun, trace.usable_samples[: begun.first] if begun.first else None)
 
@@ -211,7 +217,7 @@ class Experiment:
 
 
 def experiments_of(
-    traces: Sequence[Trace], mapping: Mapping, start: Start, rest_output: float
+    traces: Sequence[Trace], mapping: Mapping, start: Start, rest_output: float | NDArray[np.float64]
 ) -> tuple[Experiment, ...]:
     """The experiments of several traces.
 
@@ -219,7 +225,7 @@ def experiments_of(
         traces: The traces; never concatenated.
         mapping: Which channels go in, which comes out.
         start: Where each history comes from.
-        rest_output: Output at rest.
+        rest_output: Output at rest, as for :meth:`Experiment.from_trace`.
 
     Returns:
         One experiment per trace.
@@ -235,7 +241,7 @@ def unit_range(experiments: Sequence[Experiment]) -> Scaling:
     """The scaling that maps what the samples range over, but for masked ones, onto -1 to 1.
 
     Args:
-        experiments: The records.
+        experiments: The records, of one output.
 
     Returns:
         The scaling.
@@ -243,3 +249,16 @@ def unit_range(experiments: Sequence[Experiment]) -> Scaling:
     seen = [(e.inputs, e.output) if e.usable is None else (e.inputs[e.usable], e.output[e.usable]) for e in experiments]
     kept = [pair for pair in seen if len(pair[1])] or [(e.inputs, e.output) for e in experiments]
     return Scaling.to_unit_range([inputs for inputs, _ in kept], [output for _, output in kept])
+
+
+def unit_ranges(experiments: Sequence[Experiment]) -> VectorScaling:
+    """The same for records of several outputs.
+
+    Args:
+        experiments: The records, whose outputs have columns.
+
+    Returns:
+        The scaling.
+    """
+    each = [[replace(e, output=e.output[:, at]) for e in experiments] for at in range(experiments[0].output.shape[1])]
+    return VectorScaling.of([unit_range(of_one) for of_one in each])

@@ -50,7 +50,7 @@ class StateSpaceForm:
         rectified: ``r`` is the absolute value; the identity otherwise.
         bound: Bound of each state; ``inf`` for none.
         gain: From scaled channels at rest to the state, shape ``(n_states, n_channels)``; the channels are the inputs,
-            and the output where the state at rest depends on it.
+            and the outputs where the state at rest depends on them.
         rest: The state at rest where these are zero, shape ``(n_states,)``.
     """
 
@@ -101,7 +101,7 @@ class StateSpaceForm:
         sizes, theta = lowered.sizes, lowered.theta
         n, k, q, row = sizes.states, sizes.neurons, sizes.output_neurons, sizes.row
         M, W, Wy = (theta[part].reshape(-1, row) for part in (sizes.linear, sizes.hidden, sizes.output_hidden))
-        L, E = theta[sizes.output_linear], theta[sizes.start].reshape(n, -1)
+        L, E = theta[sizes.output_linear].reshape(-1, row), theta[sizes.start].reshape(n, -1)
         change = M[:, :-1].copy()
         change[:, :n] -= np.eye(n)
         return cls(
@@ -109,11 +109,11 @@ class StateSpaceForm:
             lowered=lowered,
             change=change,
             drift=M[:, -1],
-            readout=L[np.newaxis, :-1],
-            constant=L[-1:],
+            readout=L[:, :-1],
+            constant=L[:, -1],
             state_neurons=Neurons(weights=W[:, :-1], bias=W[:, -1], readout=theta[sizes.readout].reshape(n, k)),
             output_neurons=Neurons(
-                weights=Wy[:, :-1], bias=Wy[:, -1], readout=theta[sizes.output_readout].reshape(1, q)
+                weights=Wy[:, :-1], bias=Wy[:, -1], readout=theta[sizes.output_readout].reshape(len(L), q)
             ),
             cubic=lowered.cubic,
             rectified=lowered.rectified,

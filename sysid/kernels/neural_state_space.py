@@ -5,23 +5,23 @@ step is
 
 .. math::
     x_{t+1} = \mathrm{clip}\bigl(M z_t + V\,\sigma(W z_t)\bigr), \qquad
-    \hat y_t = \mathrm{clip}\bigl(\rho(L z_t + v^T \sigma(\bar W z_t))\bigr),
+    \hat y_t = \mathrm{clip}\bigl(\rho(L z_t + \bar V \sigma(\bar W z_t))\bigr),
 
-with ``k`` neurons in the state equation and ``q`` in the output's; :math:`\sigma` is tanh or the cube, :math:`\rho` the
-identity or the absolute value (what a sensor that counts pulses makes of a speed). The sensitivities
+with ``k`` neurons in the state equation, ``q`` in the output's and ``o`` outputs; :math:`\sigma` is tanh or the cube,
+:math:`\rho` the identity or the absolute value (what a sensor that counts pulses makes of a speed). The sensitivities
 :math:`S_t = dx_t/d\theta` obey
 
 .. math::
     S_{t+1} = F_t S_t + \partial x_{t+1}/\partial\theta, \qquad
     F_t = M_x + V\,\mathrm{diag}(\sigma'(W z_t))\,W_x,
 
-and the row of the Jacobian is :math:`\rho' (G_t S_t + \partial\hat y_t/\partial\theta)` with
-:math:`G_t = L_x + v^T \mathrm{diag}(\sigma'(\bar W z_t))\,\bar W_x` (real-time recurrent learning, Williams and Zipser
-1989). Only the parameters of the state equation and the initial state have sensitivities that live on, so a sample
-costs some :math:`n^2 p + n k (n+m)` multiply-adds: with few states this yields the whole Jacobian, which Gauss-Newton
-methods need, for a few times the price of a free run.
+and the rows of the Jacobian are :math:`\rho' (G_t S_t + \partial\hat y_t/\partial\theta)` with
+:math:`G_t = L_x + \bar V \mathrm{diag}(\sigma'(\bar W z_t))\,\bar W_x` (real-time recurrent learning, Williams and
+Zipser 1989). Only the parameters of the state equation and the initial state have sensitivities that live on, so a
+sample costs some :math:`n^2 p + n k (n+m)` multiply-adds, and :math:`n p` more for each output: with few states this
+yields the whole Jacobian, which Gauss-Newton methods need, for a few times the price of a free run.
 
-Parameters are one flat vector ``[M (n, n+m+1) | W (k, n+m+1) | V (n, k) | L (n+m+1) | Wy (q, n+m+1) | v (q)]``;
+Parameters are one flat vector ``[M (n, n+m+1) | W (k, n+m+1) | V (n, k) | L (o, n+m+1) | Wy (q, n+m+1) | v (o, q)]``;
 what follows it (the map to the initial state) is not read here. A row of the Jacobian is
 ``[M, W, V | initial state (n) | L, Wy, v]``.
 
@@ -82,18 +82,19 @@ def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
         bound: Bound of each state.
         low: Lower bound of the output.
         high: Upper bound of the output.
-        y: Shape ``(n_samples,)``, written.
+        y: Shape ``(n_samples, n_outputs)``, written.
     """
-    n, m = len(x), u.shape[1]
+    n, m, n_y = len(x), u.shape[1], y.shape[1]
     r = n + m + 1
     M = theta[: n * r].reshape(n, r)
     W = np.ascontiguousarray(theta[n * r : (n + k) * r].reshape(k, r).T)
     at = (n + k) * r
     V = theta[at : at + n * k].reshape(n, k)
     at += n * k
-    L = theta[at : at + r]
-    Wy = np.ascontiguousarray(theta[at + r : at + r + q * r].reshape(q, r).T)
-    v = theta[at + r + q * r : at + r + q * r + q]
+    L = theta[at : at + n_y * r].reshape(n_y, r)
+    at += n_y * r
+    Wy = np.ascontiguousarray(theta[at : at + q * r].reshape(q, r).T)
+    v = theta[at + q * r : at + q * r + n_y * q].reshape(n_y, q)
     z = np.ones(r)
     h, slope = np.empty(k), np.empty(k)
     hy, slope_y = np.empty(q), np.empty(q)
@@ -102,15 +103,16 @@ def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
             z[i] = x[i]
         for i in range(m):
             z[n + i] = u[t, i]
-        total = 0.0
-        for i in range(r):
-            total += L[i] * z[i]
         _activate(Wy, z, cubic, hy, slope_y)
-        for j in range(q):
-            total += v[j] * hy[j]
-        if rectified:
-            total = abs(total)
-        y[t] = _clip(total, low, high)
+        for o in range(n_y):
+            total = 0.0
+            for i in range(r):
+                total += L[o, i] * z[i]
+            for j in range(q):
+                total += v[o, j] * hy[j]
+            if rectified:
+                total = abs(total)
+            y[t, o] = _clip(total, low, high)
         _activate(W, z, cubic, h, slope)
         for i in range(n):
             new = 0.0
@@ -122,40 +124,44 @@ def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
-def _output_row(row, S, z, sign, L, v, Wy, hy, slope, G):
-    """Derivative of an output that nothing clips: through the state, and through the output's own parameters.
+def _output_row(row, S, z, o, sign, L, v, Wy, hy, slope, G):
+    """Derivative of output ``o``, which nothing clips: through the state, and through the output's own parameters.
 
     Args:
         row: Shape ``(n_dynamic + n_states + n_output,)``, written.
         S: Derivative of the state, shape ``(n_states, n_dynamic + n_states)``.
         z: State, inputs and 1, shape ``(n_row,)``.
+        o: Which output.
         sign: -1 where a rectified output was negative, else 1.
-        L: Linear output weights, shape ``(n_row,)``.
-        v: Readout of the output's neurons, shape ``(n_output_neurons,)``.
+        L: Linear output weights, shape ``(n_outputs, n_row)``.
+        v: Readout of the output's neurons, shape ``(n_outputs, n_output_neurons)``.
         Wy: Their weights, shape ``(n_output_neurons, n_row)``.
         hy: Their activations.
         slope: Derivatives of the activations.
         G: Room for the derivative by the state, shape ``(n_states,)``, written.
     """
     n, n_S = S.shape
-    r, q = len(z), len(v)
+    r, n_y, q = len(z), len(v), v.shape[1]
     for i in range(n):
-        G[i] = sign * L[i]
+        G[i] = sign * L[o, i]
         for j in range(q):
-            G[i] += sign * v[j] * slope[j] * Wy[j, i]
+            G[i] += sign * v[o, j] * slope[j] * Wy[j, i]
     row[:n_S] = 0.0
     for i in range(n):
         factor, past = G[i], S[i]
         for p in range(n_S):
             row[p] += factor * past[p]
+    if n_y > 1:  # of the other outputs' weights it is no function
+        row[n_S:] = 0.0
     for i in range(r):
-        row[n_S + i] = sign * z[i]
+        row[n_S + o * r + i] = sign * z[i]
+    hidden, readout = n_S + n_y * r, n_S + (n_y + q) * r + o * q
     for j in range(q):
-        factor = sign * v[j] * slope[j]
-        place = n_S + r + j * r
+        factor = sign * v[o, j] * slope[j]
+        place = hidden + j * r
         for i in range(r):
             row[place + i] = factor * z[i]
-        row[n_S + r + q * r + j] = sign * hy[j]
+        row[readout + j] = sign * hy[j]
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
@@ -211,9 +217,9 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
         low: As in :func:`free_run`.
         high: As in :func:`free_run`.
         y: As in :func:`free_run`.
-        J: Shape ``(n_samples, n_dynamic + n_states + n_output)``, written.
+        J: Shape ``(n_samples, n_outputs, n_dynamic + n_states + n_output)``, written.
     """
-    n, m = len(x), u.shape[1]
+    n, m, n_y = len(x), u.shape[1], y.shape[1]
     r = n + m + 1
     M = theta[: n * r].reshape(n, r)
     plain_W = theta[n * r : (n + k) * r].reshape(k, r)
@@ -221,10 +227,11 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
     at = (n + k) * r
     V = theta[at : at + n * k].reshape(n, k)
     at += n * k
-    L = theta[at : at + r]
-    plain_Wy = theta[at + r : at + r + q * r].reshape(q, r)
+    L = theta[at : at + n_y * r].reshape(n_y, r)
+    at += n_y * r
+    plain_Wy = theta[at : at + q * r].reshape(q, r)
     Wy = np.ascontiguousarray(plain_Wy.T)
-    v = theta[at + r + q * r : at + r + q * r + q]
+    v = theta[at + q * r : at + q * r + n_y * q].reshape(n_y, q)
     following = np.empty_like(S)
     G = np.empty(n)
     z = np.ones(r)
@@ -236,22 +243,23 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
             z[i] = x[i]
         for i in range(m):
             z[n + i] = u[t, i]
-        # the output
-        total = 0.0
-        for i in range(r):
-            total += L[i] * z[i]
+        # the outputs
         _activate(Wy, z, cubic, hy, slope_y)
-        for j in range(q):
-            total += v[j] * hy[j]
-        sign = -1.0 if rectified and total < 0.0 else 1.0
-        total *= sign
-        bounded = _clip(total, low, high)
-        y[t] = bounded
-        row = J[t]
-        if bounded != total:
-            row[:] = 0.0
-        else:
-            _output_row(row, S, z, sign, L, v, plain_Wy, hy, slope_y, G)
+        for o in range(n_y):
+            total = 0.0
+            for i in range(r):
+                total += L[o, i] * z[i]
+            for j in range(q):
+                total += v[o, j] * hy[j]
+            sign = -1.0 if rectified and total < 0.0 else 1.0
+            total *= sign
+            bounded = _clip(total, low, high)
+            y[t, o] = bounded
+            row = J[t, o]
+            if bounded != total:
+                row[:] = 0.0
+            else:
+                _output_row(row, S, z, o, sign, L, v, plain_Wy, hy, slope_y, G)
         # the state
         _activate(W, z, cubic, h, slope)
         for i in range(n):

@@ -22,7 +22,12 @@ from sysid.models.linear_state_space import (
 from sysid.models.mapping import Mapping
 from sysid.models.narx import NARX, NARXModel
 from sysid.models.neural_form import NeuralForm
-from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
+from sysid.models.neural_state_space import (
+    NeuralStateSpace,
+    NeuralStateSpaceModel,
+    VectorNeuralStateSpace,
+    VectorNeuralStateSpaceModel,
+)
 from sysid.models.orthonormal_basis import Domain
 from sysid.models.polynomial import ARMAX, BJ, OE, PolynomialModel
 from sysid.models.recursion import Recursion, parameter_count
@@ -75,6 +80,8 @@ __all__ = [
     "TransferFunctionModel",
     "VectorNARX",
     "VectorNARXModel",
+    "VectorNeuralStateSpace",
+    "VectorNeuralStateSpaceModel",
     "VectorRecursion",
     "VectorScaling",
     "VectorStateSpace",

@@ -245,7 +245,8 @@ class AbstractModel(ABC):
             history: The samples before.
 
         Returns:
-            Derivatives along each direction, shape ``(n_samples, n_directions)``; ``None`` for a recursion over lags.
+            Derivatives along each direction, shape ``(n_samples, n_directions)``, or ``(n_samples, n_outputs,
+            n_directions)`` of a model of several outputs; ``None`` for a recursion over lags.
         """
         del factor, inputs, history
         return None

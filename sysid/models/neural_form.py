@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from sysid.errors import TraceError
 from sysid.kernels import neural_state_space as kernel
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
-from sysid.models.scaling import Scaling
+from sysid.models.scaling import Scaling, VectorScaling
 
 STATE_BOUND = 10.0
 """Bound of each state. Fits scale the states to -1 to 1 over their records; ten times that is lost, and the bound
@@ -24,6 +25,9 @@ sample says is of order 1: weak enough to matter only where the history does not
 SHARPENED, LEAST_NOISE = 4, 1e-10
 """Times that the history's noise is taken from what the state leaves of it, where that is less; and its least."""
 
+MOST_SIGNED = 4
+"""Outputs whose signs are tried in all ways where a sensor cannot tell them; of more, all with the same sign."""
+
 CORRECTIONS = 50
 """Levenberg-Marquardt steps at most to find the state that a history shows; mostly a handful suffice."""
 
@@ -32,14 +36,15 @@ CORRECTIONS = 50
 class Sizes:
     """Where each part of the flat parameters ``[M | W | V | L | Wy | v | E]`` stands; the kernel has the equations.
 
-    ``E``, of shape ``(n_states, n_inputs + 2)``, takes the oldest sample of a history (scaled inputs, scaled output, 1)
-    to the state there.
+    ``E``, of shape ``(n_states, n_inputs + n_outputs + 1)``, takes the oldest sample of a history (scaled inputs,
+    scaled outputs, 1) to the state there.
 
     Args:
         states: ``n``.
         inputs: ``m``.
         neurons: ``k``, in the state equation.
         output_neurons: ``q``, in the output equation.
+        outputs: ``o``.
 
     Example:
         >>> Sizes(states=2, inputs=1, neurons=5, output_neurons=0).count
@@ -50,6 +55,7 @@ class Sizes:
     inputs: int
     neurons: int
     output_neurons: int
+    outputs: int = 1
 
     @property
     def row(self) -> int:
@@ -80,12 +86,12 @@ class Sizes:
     def output(self) -> slice:
         """``L``, ``Wy`` and ``v``: the output equation."""
         start = self.dynamic.stop
-        return slice(start, start + self.row + self.output_neurons * (self.row + 1))
+        return slice(start, start + self.outputs * (self.row + self.output_neurons) + self.output_neurons * self.row)
 
     @property
     def output_linear(self) -> slice:
         """``L``."""
-        return slice(self.output.start, self.output.start + self.row)
+        return slice(self.output.start, self.output.start + self.outputs * self.row)
 
     @property
     def output_hidden(self) -> slice:
@@ -100,7 +106,7 @@ class Sizes:
     @property
     def start(self) -> slice:
         """``E``: the map to the initial state."""
-        return slice(self.output.stop, self.output.stop + self.states * (self.inputs + 2))
+        return slice(self.output.stop, self.output.stop + self.states * (self.inputs + self.outputs + 1))
 
     @property
     def count(self) -> int:
@@ -112,6 +118,8 @@ class Sizes:
 class NeuralForm(AbstractForm):
     r"""``x(t+1) = M z + V s(W z)``, ``y(t) = L z + v s(Wy z)`` with ``z = [x; u; 1]``, in scaled numbers.
 
+    There may be several outputs, which share the states and the output's neurons.
+
     A history gives the state thus: its oldest sample is a system that has stood there (``E``); where it holds more
     samples, the state :math:`x_0` there minimises :math:`|\hat y(x_0) - y|^2/\sigma^2 + |x_0 - E z_0|^2` over the
     history, :math:`\sigma` being what is left of the output there, and the model runs on through it.
@@ -119,17 +127,17 @@ class NeuralForm(AbstractForm):
     Args:
         sizes: States, inputs, neurons.
         theta: Flat parameters.
-        scaling: Between units and scaled numbers.
+        scaling: Between units and scaled numbers; one of several outputs makes arrays of outputs have columns.
         cubic: Cubes instead of tanh.
-        rectified: The output is an absolute value.
+        rectified: The outputs are absolute values.
         bound: Bound of each state.
-        low: Lower bound of the output in scaled numbers.
-        high: Upper bound of the output in scaled numbers.
+        low: Lower bound of the outputs in scaled numbers.
+        high: Upper bound of the outputs in scaled numbers.
     """
 
     sizes: Sizes
     theta: NDArray[np.float64]
-    scaling: Scaling
+    scaling: Scaling | VectorScaling
     cubic: bool = False
     rectified: bool = False
     bound: float = STATE_BOUND
@@ -162,7 +170,7 @@ class NeuralForm(AbstractForm):
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""
         scaled = self.scaled(inputs)
-        return self.scaling.unscale_output(self.run(scaled, self.state(history)))
+        return self.scaling.unscale_columns(self.run(scaled, self.state(history)))
 
     def predict(
         self,
@@ -190,26 +198,26 @@ class NeuralForm(AbstractForm):
 
     def followed(self, history: History) -> NDArray[np.float64]:
         """The free run over a history itself; see the base class."""
-        return self.scaling.unscale_output(self.run(self.scaled(history.inputs), self._begun(history)))
+        return self.scaling.unscale_columns(self.run(self.scaled(history.inputs), self._begun(history)))
 
     def _begun(self, history: History) -> NDArray[np.float64]:
         """The state before the oldest sample of a history; of a single one, the state after it."""
-        scaled, output = self.scaled(history.inputs), self.scaling.scale_output(history.output)
-        x = self.resting(scaled[0], float(output[0]))
+        scaled, output = self.scaled(history.inputs), self.scaled_outputs(history.output)
+        x = self.resting(scaled[0], output[0])
         return x if len(output) == 1 else self.corrected(scaled, output, x, history.known)
 
-    def resting(self, inputs: NDArray[np.float64], output: float) -> NDArray[np.float64]:
+    def resting(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:
         """The state of a system that has stood at these scaled values, by the map ``E``.
 
         Args:
             inputs: Scaled inputs, shape ``(n_inputs,)``.
-            output: Scaled output.
+            output: Scaled outputs, shape ``(n_outputs,)``.
 
         Returns:
             Shape ``(n_states,)``.
         """
         E = self.theta[self.sizes.start].reshape(self.sizes.states, -1)
-        return np.asarray(np.clip(E @ np.concatenate([inputs, [output, 1.0]]), -self.bound, self.bound))
+        return np.asarray(np.clip(E @ np.concatenate([inputs, output, [1.0]]), -self.bound, self.bound))
 
     def corrected(
         self,
@@ -222,7 +230,7 @@ class NeuralForm(AbstractForm):
 
         Args:
             scaled: Scaled inputs, shape ``(n_samples, n_inputs)``.
-            output: Scaled output, shape ``(n_samples,)``.
+            output: Scaled outputs, shape ``(n_samples, n_outputs)``.
             x: State expected, shape ``(n_states,)``.
             known: Which outputs are not masked, shape ``(n_samples,)``; all by default.
 
@@ -237,14 +245,15 @@ class NeuralForm(AbstractForm):
         if self.rectified:
             # Across the kink of an absolute value no descent leads. With either sign given there is no kink.
             signed = replace(self, rectified=False, low=-np.inf, high=np.inf)
+            n = self.sizes.outputs
             around += [
-                signed._descended(replace(seen, output=sign * output), around[1], expected, HISTORY_NOISE)
-                for sign in (1.0, -1.0)
+                signed._descended(replace(seen, output=np.array(signs) * output), around[1], expected, HISTORY_NOISE)
+                for signs in product((1.0, -1.0), repeat=n if n <= MOST_SIGNED else 1)
             ]
         descents = [self._descended(seen, begin, expected, HISTORY_NOISE) for begin in around]
         found = min(descents, key=lambda x: self._misfit(seen, x, expected, HISTORY_NOISE))
         # The less the state leaves of the output, the less what was expected has a say.
-        noise, spare = HISTORY_NOISE, int(np.count_nonzero(seen.known)) - len(x)
+        noise, spare = HISTORY_NOISE, int(np.count_nonzero(seen.known)) * self.sizes.outputs - len(x)
         for _ in range(SHARPENED if spare > 0 else 0):
             level = max(float(np.linalg.norm(self._away(seen, found))) / spare**0.5, LEAST_NOISE)
             if not level < noise / 2.0:
@@ -260,8 +269,8 @@ class NeuralForm(AbstractForm):
         n = len(x)
         damping, best = 1e-3, self._misfit(seen, x, expected, noise)
         for _ in range(CORRECTIONS):
-            J = self._linearised(seen.inputs, x)[seen.known]
-            away = self._away(seen, x)[seen.known]
+            J = self._linearised(seen.inputs, x)[seen.known].reshape(-1, n)
+            away = self._away(seen, x)[seen.known].ravel()
             if not np.isfinite(J).all():
                 break
             # By orthogonal factors: squared, the precision of a state that is seen well leaves no digit to the others.
@@ -280,16 +289,16 @@ class NeuralForm(AbstractForm):
         return x
 
     def run(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Scaled output over some scaled inputs; ``x`` becomes the state after them.
+        """Scaled outputs over some scaled inputs; ``x`` becomes the state after them.
 
         Args:
             scaled: Scaled inputs, shape ``(n_samples, n_inputs)``.
             x: State before the first sample, shape ``(n_states,)``; overwritten.
 
         Returns:
-            Shape ``(n_samples,)``.
+            Shape ``(n_samples, n_outputs)``.
         """
-        y = np.empty(len(scaled))
+        y = np.empty((len(scaled), self.sizes.outputs))
         kernel.free_run(scaled, x, *self.arguments(self.theta), y)
         return y
 
@@ -327,28 +336,39 @@ class NeuralForm(AbstractForm):
             )
         return self.scaling.scale_inputs(inputs)
 
+    def scaled_outputs(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Outputs in the model's numbers.
+
+        Args:
+            output: As a history has them, in their units.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``.
+        """
+        return np.asarray(self.scaling.scale_output(output)).reshape(len(output), self.sizes.outputs)
+
     def _linearised(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivative of the output with respect to the state before the first sample."""
+        """Derivative of the outputs by the state before the first sample: ``(n_samples, n_outputs, n_states)``."""
         n, dynamic = self.sizes.states, self.sizes.dynamic.stop
         S = np.zeros((n, dynamic + n))
         S[:, dynamic:] = np.eye(n)
-        y = np.empty(len(scaled))
-        J = np.empty((len(scaled), dynamic + n + self.sizes.output.stop - self.sizes.output.start))
+        y = np.empty((len(scaled), self.sizes.outputs))
+        J = np.empty((*y.shape, dynamic + n + self.sizes.output.stop - self.sizes.output.start))
         kernel.sensitivities(scaled, x.copy(), S, *self.arguments(self.theta), y, J)
-        return J[:, dynamic : dynamic + n]
+        return J[:, :, dynamic : dynamic + n]
 
     def _away(self, seen: _Seen, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Output minus what was seen, zero where that is masked."""
-        return np.where(seen.known, self.run(seen.inputs, x.copy()) - seen.output, 0.0)
+        """Outputs minus what was seen, zero where that is masked."""
+        return np.where(seen.known[:, None], self.run(seen.inputs, x.copy()) - seen.output, 0.0)
 
     def _misfit(self, seen: _Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float) -> float:
-        away = self._away(seen, x)
+        away = self._away(seen, x).ravel()
         return float(away @ away / noise**2 + np.sum((x - expected) ** 2))
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """Scaled inputs and output of a history, and which outputs are not masked."""
+    """Scaled inputs and outputs of a history, and which samples are not masked."""
 
     inputs: NDArray[np.float64]
     output: NDArray[np.float64]

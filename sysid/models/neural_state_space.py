@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
+from dataclasses import fields as dataclass_fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
 from sysid.models.history import History
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.narx import CLAMP
 from sysid.models.neural_form import NeuralForm, Sizes
-from sysid.models.scaling import Scaling
+from sysid.models.scaling import Scaling, VectorScaling
 
 ACTIVATIONS = ("tanh", "cubic")
 OUTPUTS = ("plain", "absolute")
@@ -78,20 +79,31 @@ class NeuralStateSpace(AbstractStructure):
         """States and neurons as ``NSS 2/10``, with the output's neurons and what is not the default."""
         numbers = [self.states, self.neurons, *([self.output_neurons] if self.output_neurons else [])]
         words = [self.activation] * (self.activation != "tanh") + [self.output] * (self.output != "plain")
-        return " ".join(["NSS", "/".join(str(number) for number in numbers), *words])
+        return " ".join([self.kind, "/".join(str(number) for number in numbers), *words])
 
-    def sizes(self, n_inputs: int) -> Sizes:
-        """Where the parameters stand for a number of inputs.
+    def for_outputs(self, n_outputs: int) -> NeuralStateSpace:
+        """One state space for all outputs, where there are several: they share its states."""
+        if n_outputs == 1 or self.several_outputs:
+            return self
+        return VectorNeuralStateSpace(**{field.name: getattr(self, field.name) for field in dataclass_fields(self)})
+
+    def sizes(self, n_inputs: int, n_outputs: int = 1) -> Sizes:
+        """Where the parameters stand for a number of inputs and outputs.
 
         Args:
             n_inputs: Inputs of the mapping.
+            n_outputs: Outputs of the mapping.
 
         Returns:
             The sizes.
         """
         return Sizes(
-            states=self.states, inputs=n_inputs, neurons=self.neurons, output_neurons=self.output_neurons
-        )  # fmt: skip
+            states=self.states,
+            inputs=n_inputs,
+            neurons=self.neurons,
+            output_neurons=self.output_neurons,
+            outputs=n_outputs,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
@@ -105,34 +117,35 @@ class NeuralStateSpace(AbstractStructure):
         }
 
 
+@dataclass(frozen=True, kw_only=True)
+class VectorNeuralStateSpace(NeuralStateSpace):
+    """A neural state space that all outputs of a mapping share; see :class:`NeuralStateSpace`.
+
+    What one output says of the states is used for the others; neurons of the output equation are read by all of them.
+
+    Example:
+        >>> VectorNeuralStateSpace(states=4, neurons=10).label
+        'VectorNSS 4/10'
+    """
+
+    kind = "VectorNSS"
+    several_outputs = True
+
+
 _APART = 1e-3
 """Step of a difference, in standard deviations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NeuralStateSpaceModel(AbstractModel):
-    """A fitted neural state space.
-
-    Args:
-        network: The structure.
-        theta: Flat parameters in scaled numbers (see :class:`Sizes`).
-        scaling: Between units and scaled numbers.
-        mapping: Which channels go in, which comes out.
-        sample_time: Seconds.
-        input_units: Unit of each input.
-        output_unit: Unit of the output.
-        rest_output: Output at rest, in its unit.
-        clamp: Bound of the output in scaled numbers; infinite for none.
-    """
+class _NeuralModel(AbstractModel):
+    """What neural state spaces of one output and of several have in common; both have the fields below."""
 
     network: NeuralStateSpace
     theta: NDArray[np.float64]
-    scaling: Scaling
+    scaling: Scaling | VectorScaling
     mapping: Mapping
     sample_time: float
     input_units: tuple[str, ...]
-    output_unit: str
-    rest_output: float
     clamp: float = CLAMP
 
     def __post_init__(self) -> None:
@@ -155,7 +168,7 @@ class NeuralStateSpaceModel(AbstractModel):
     def recursion(self) -> NeuralForm:
         """The form that is run."""
         return NeuralForm(
-            sizes=self.network.sizes(len(self.mapping.inputs)),
+            sizes=self.network.sizes(len(self.mapping.inputs), len(self.mapping.outputs)),
             theta=self.theta,
             scaling=self.scaling,
             cubic=self.network.activation == "cubic",
@@ -174,40 +187,109 @@ class NeuralStateSpaceModel(AbstractModel):
         form = self.recursion
         scaled = form.scaled(inputs)
         known = form.state(history) if len(history.output) > 1 else None
-        columns = []
-        for column in factor.T:
+        found = np.zeros((len(inputs), form.sizes.outputs, factor.shape[1]))
+        for at, column in enumerate(factor.T):
             runs = []
             for sign in (1.0, -1.0):
                 moved = replace(form, theta=self.theta + sign * _APART * column)
                 runs.append(moved.run(scaled, moved.state(history) if known is None else known.copy()))
-            columns.append((runs[0] - runs[1]) * form.scaling.output_scale / (2.0 * _APART))
-        return np.column_stack(columns) if columns else np.zeros((len(inputs), 0))
+            found[:, :, at] = (runs[0] - runs[1]) * self.scaling.output_scale / (2.0 * _APART)
+        return found if self.structure.several_outputs else found[:, 0]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
+    def _fields(self) -> dict[str, Any]:
+        """What is stored of either kind."""
         return {
             "structure": self.network.to_dict(),
             "mapping": str(self.mapping),
             "sample_time": self.sample_time,
             "input_units": list(self.input_units),
-            "output_unit": self.output_unit,
-            "rest_output": self.rest_output,
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
             "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
         }
 
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        """The arguments that are the same for either kind."""
+        return {
+            "theta": np.array(fields["theta"], dtype=np.float64),
+            "mapping": Mapping.parse(fields["mapping"]),
+            "sample_time": fields["sample_time"],
+            "input_units": tuple(fields["input_units"]),
+            "clamp": np.inf if fields["clamp"] is None else fields["clamp"],
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NeuralStateSpaceModel(_NeuralModel):
+    """A fitted neural state space.
+
+    Args:
+        network: The structure.
+        theta: Flat parameters in scaled numbers (see :class:`Sizes`).
+        scaling: Between units and scaled numbers.
+        mapping: Which channels go in, which comes out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+        clamp: Bound of the output in scaled numbers; infinite for none.
+    """
+
+    scaling: Scaling
+    output_unit: str
+    rest_output: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return self._fields() | {"output_unit": self.output_unit, "rest_output": self.rest_output}
+
     @classmethod
     def from_dict(cls, fields: Dict[str, Any]) -> NeuralStateSpaceModel:
         """The model that :meth:`to_dict` wrote."""
         network = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output")}
         return cls(
             network=NeuralStateSpace(**network),
-            theta=np.array(fields["theta"], dtype=np.float64),
             scaling=Scaling.from_dict(fields["scaling"]),
-            mapping=Mapping.parse(fields["mapping"]),
-            input_units=tuple(fields["input_units"]),
-            clamp=np.inf if fields["clamp"] is None else fields["clamp"],
-            **rest,
+            output_unit=fields["output_unit"],
+            rest_output=fields["rest_output"],
+            **cls._read(fields),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VectorNeuralStateSpaceModel(_NeuralModel, SeveralOutputs):
+    """A fitted neural state space of several outputs.
+
+    Args:
+        network: The structure.
+        theta: Flat parameters in scaled numbers (see :class:`Sizes`).
+        scaling: Between units and scaled numbers.
+        mapping: Which channels go in, which come out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_units: Unit of each output.
+        rest_outputs: Each output at rest, in its unit.
+        clamp: Bound of the outputs in scaled numbers; infinite for none.
+    """
+
+    network: VectorNeuralStateSpace
+    scaling: VectorScaling
+    output_units: tuple[str, ...]
+    rest_outputs: tuple[float, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return self._fields() | {"output_units": list(self.output_units), "rest_outputs": list(self.rest_outputs)}
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> VectorNeuralStateSpaceModel:
+        """The model that :meth:`to_dict` wrote."""
+        network = {key: value for key, value in fields["structure"].items() if key != "kind"}
+        return cls(
+            network=VectorNeuralStateSpace(**network),
+            scaling=VectorScaling.from_dict(fields["scaling"]),
+            output_units=tuple(fields["output_units"]),
+            rest_outputs=tuple(fields["rest_outputs"]),
+            **cls._read(fields),
         )

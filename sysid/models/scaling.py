@@ -98,6 +98,15 @@ class Scaling:
         """Outputs in the channel's unit, any shape."""
         return output * self.output_scale + self.output_offset
 
+    def unscale_columns(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Scaled outputs, shape ``(n_samples, 1)``, in the channel's unit and without that axis."""
+        return self.unscale_output(columns[:, 0])
+
+    @property
+    def error_unit(self) -> float:
+        """A squared error of 1 in scaled numbers, as errors are told: in the output's unit squared."""
+        return self.output_scale**2
+
 
 @dataclass(frozen=True, kw_only=True)
 class VectorScaling:
@@ -145,3 +154,12 @@ class VectorScaling:
     def unscale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in the channels' units, the last axis that of the outputs."""
         return np.asarray(output * np.array(self.output_scale) + np.array(self.output_offset))
+
+    def unscale_columns(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Scaled outputs, shape ``(n_samples, n_outputs)``, in the channels' units."""
+        return self.unscale_output(columns)
+
+    @property
+    def error_unit(self) -> float:
+        """A squared error of 1 in scaled numbers, as errors are told: several outputs have no unit in common."""
+        return 1.0

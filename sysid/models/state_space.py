@@ -247,8 +247,7 @@ class StateSpace(AbstractForm):
 
     def _in_units(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in their units, within bounds; of a single one without an axis of its own."""
-        bounded = np.clip(y, self.low, self.high)
-        return self.scaling.unscale_output(bounded if isinstance(self.scaling, VectorScaling) else bounded[:, 0])
+        return self.scaling.unscale_columns(np.clip(y, self.low, self.high))
 
     def _correction(
         self,

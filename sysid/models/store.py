@@ -17,7 +17,12 @@ from sysid.models.linear_state_space import (
     VectorStateSpaceModel,
 )
 from sysid.models.narx import NARX, NARXModel
-from sysid.models.neural_state_space import NeuralStateSpace, NeuralStateSpaceModel
+from sysid.models.neural_state_space import (
+    NeuralStateSpace,
+    NeuralStateSpaceModel,
+    VectorNeuralStateSpace,
+    VectorNeuralStateSpaceModel,
+)
 from sysid.models.polynomial import POLYNOMIALS, PolynomialModel
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
 from sysid.models.vector_narx import VectorNARX, VectorNARXModel
@@ -26,6 +31,7 @@ _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
     (ARX, ARXModel),
     (NARX, NARXModel),
     (NeuralStateSpace, NeuralStateSpaceModel),
+    (VectorNeuralStateSpace, VectorNeuralStateSpaceModel),
     (TransferFunction, TransferFunctionModel),
     (LinearStateSpace, LinearStateSpaceModel),
     (VectorStateSpace, VectorStateSpaceModel),

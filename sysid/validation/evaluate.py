@@ -185,7 +185,7 @@ def case_results(
         seconds.append(time.perf_counter() - began)
     predicts = model.recursion.predicts
     predicted = model.predict(inputs, target, history) if predicts else np.full(target.shape, np.nan)
-    intervals = None
+    intervals: tuple[CaseIntervals | None, ...] = (None,) * len(model.mapping.outputs)
     if posterior is not None:
         experiment = Experiment.for_model(trace, model, start)
         intervals = case_intervals(posterior, model, experiment, simulated, predicted)
@@ -202,9 +202,9 @@ def case_results(
             target=measured,
             simulated=run,
             predicted=ahead,
-            intervals=intervals,
+            intervals=interval,
         )
-        for output, unit, measured, run, ahead in zip(
-            model.mapping.outputs, model.ends.output_units, *columns, strict=True
+        for output, unit, measured, run, ahead, interval in zip(
+            model.mapping.outputs, model.ends.output_units, *columns, intervals, strict=True
         )
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,12 +30,15 @@ class OutputInterval:
         noise_deviation: Standard deviation of the residuals.
         spread: Factor of both together that was found on traces which trained nothing; 1 where there were none.
         level: Probability that the interval holds the measured output.
+
+    Of a model of several outputs, signals have shape ``(n_samples, n_outputs)``, and the last but the level one figure
+    an output.
     """
 
     output: NDArray[np.float64]
     parameter_deviation: NDArray[np.float64]
-    noise_deviation: float
-    spread: float
+    noise_deviation: float | NDArray[np.float64]
+    spread: float | NDArray[np.float64]
     level: float
 
     @property
@@ -54,8 +57,17 @@ class OutputInterval:
         """Upper end, in the output's unit, shape ``(n_samples,)``."""
         return self.output + self.half_width
 
+    def of_outputs(self) -> tuple[OutputInterval, ...]:
+        """The interval of each output, of which none has an axis of its own."""
+        columns = [array.reshape(len(array), -1).T for array in (self.output, self.parameter_deviation)]
+        noises, spreads = np.atleast_1d(self.noise_deviation), np.atleast_1d(self.spread)
+        return tuple(
+            replace(self, output=run, parameter_deviation=moved, noise_deviation=float(noise), spread=float(spread))
+            for run, moved, noise, spread in zip(*columns, noises, spreads, strict=True)
+        )
+
     def coverage(self, target: NDArray[np.float64], counted: NDArray[np.bool_] | None = None) -> Coverage:
-        """How often the interval holds the measured output.
+        """How often the interval of one output, or of all of them, holds what was measured.
 
         Args:
             target: Measured output, shape ``(n_samples,)``.
@@ -203,27 +215,31 @@ def case_intervals(
     experiment: Experiment,
     simulated: NDArray[np.float64],
     predicted: NDArray[np.float64],
-) -> CaseIntervals:
-    """The intervals of a case whose outputs are computed already.
+) -> tuple[CaseIntervals, ...]:
+    """The intervals of each output of a case whose outputs are computed already.
 
     Args:
         posterior: Of the model's parameters.
         model: The model.
         experiment: The case.
-        simulated: Free run, shape ``(n_samples,)``.
-        predicted: One step ahead, shape ``(n_samples,)``.
+        simulated: Free run, of the shape of the experiment's output.
+        predicted: One step ahead, likewise.
 
     Returns:
-        The intervals at the level that is reported.
+        The intervals at the level that is reported, output by output.
     """
     counted = None if experiment.weights is None else experiment.weights > 0.0
     free_run = _interval((posterior, model), experiment, simulated, Loop.CLOSED, LEVEL)
     one_step = _interval((posterior, model), experiment, predicted, Loop.OPEN, LEVEL)
-    return CaseIntervals(
-        low=free_run.low,
-        high=free_run.high,
-        free_run=free_run.coverage(experiment.output, counted),
-        one_step=one_step.coverage(experiment.output, counted),
+    targets = experiment.output.reshape(len(experiment.output), -1).T
+    return tuple(
+        CaseIntervals(
+            low=closed.low,
+            high=closed.high,
+            free_run=closed.coverage(target, counted),
+            one_step=opened.coverage(target, counted),
+        )
+        for closed, opened, target in zip(free_run.of_outputs(), one_step.of_outputs(), targets, strict=True)
     )
 
 
@@ -238,7 +254,7 @@ def _interval(
     return OutputInterval(
         output=output,
         parameter_deviation=np.sqrt(posterior.parameter_variance(model, experiment, loop)),
-        noise_deviation=float(np.sqrt(posterior.noise.of(loop))),
+        noise_deviation=np.sqrt(posterior.noise.of(loop)),
         spread=posterior.spread.of(loop),
         level=level,
     )

@@ -120,7 +120,7 @@ def _record(rng: Rng, length: int, *, kinds: list[str], output: str, scales: Arr
     return {**dict(zip(names, u.T, strict=True)), "y": y}
 
 
-KINDS = ["ARX", "TF", "NARX", "NSS", "SS", "VectorSS", "OE", "BJ", "ARMAX"]
+KINDS = ["ARX", "TF", "NARX", "NSS", "SS", "VectorSS", "VectorNSS", "OE", "BJ", "ARMAX"]
 
 
 def _starts() -> st.SearchStrategy[sysid.Start]:
@@ -170,8 +170,9 @@ def _fits(draw: st.DrawFn, n_inputs: int) -> tuple[AbstractStructure, Options | 
     training = sysid.Training(
         max_iterations=draw(st.integers(5, 15)), workers=1, starts=draw(st.sampled_from([1, 1, 2]))
     )
-    if kind == "NSS":
-        return sysid.NeuralStateSpace(states=draw(st.integers(1, 2)), neurons=draw(st.integers(0, 2))), training
+    if kind in {"NSS", "VectorNSS"}:
+        network = sysid.NeuralStateSpace if kind == "NSS" else sysid.VectorNeuralStateSpace
+        return network(states=draw(st.integers(1, 2)), neurons=draw(st.integers(0, 2))), training
     loop = draw(st.sampled_from(["open", "closed"]))
     lags, own = draw(st.sampled_from(["0:1", "1:2", "1"])), draw(st.integers(1, 2))
     return sysid.NARX(input_delays=lags, output_delays=own, neurons=draw(st.integers(1, 3))), replace(

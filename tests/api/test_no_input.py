@@ -57,6 +57,7 @@ def test_a_history_is_taken() -> None:
 MODELS = {
     "AR": ("-> y", sysid.ARX(na=1, nb=(), nk=())),
     "NSS": ("-> y", sysid.NeuralStateSpace(states=1, neurons=1)),
+    "one NSS of two outputs": ("-> y+z", sysid.NeuralStateSpace(states=1, neurons=1)),
     "AR of two outputs": ("-> y+z", sysid.ARX(na=1, nb=(), nk=())),
     "one network of two outputs": ("-> y+z", sysid.VectorNARX(input_delays=[], output_delays=1, neurons=1)),
 }

@@ -43,6 +43,7 @@ def test_a_row_says_what_its_function_knows() -> None:
         "NSS",
         "TransferFunction",
         "VectorNARX",
+        "VectorNSS",
     }
     assert {kind for kind, row in ESTIMATORS.items() if row.resumes} == {"NARX"} == set(JOINING)
     assert {kind for kind, row in ESTIMATORS.items() if row.linear} == {

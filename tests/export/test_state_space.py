@@ -31,6 +31,8 @@ from sysid.models import (
     Scaling,
     Start,
     TransferFunction,
+    VectorNeuralStateSpace,
+    VectorNeuralStateSpaceModel,
     VectorScaling,
     VectorStateSpace,
     VectorStateSpaceModel,
@@ -126,6 +128,21 @@ def build_vector() -> VectorStateSpaceModel:
     )  # fmt: skip
 
 
+def build_vector_neural(**options) -> VectorNeuralStateSpaceModel:
+    """Two outputs that share three states, and the output's neurons."""
+    network = VectorNeuralStateSpace(states=3, **options)
+    sizes = network.sizes(2, 2)
+    rng = np.random.default_rng(9)
+    theta = 0.1 * rng.normal(size=sizes.count)
+    theta[sizes.linear] = np.concatenate([np.diag([0.97, 0.9, 0.8]), 0.05 * rng.normal(size=(3, 3))], axis=1).ravel()
+    theta[sizes.output_linear] += [0.6, -0.4, 0.3, 0.0, 0.0, 0.1, -0.2, 0.5, 0.4, 0.0, 0.0, -0.1]
+    vector = build_vector()
+    names = ("scaling", "mapping", "sample_time", "input_units", "output_units", "rest_outputs")
+    return VectorNeuralStateSpaceModel(
+        network=network, theta=theta, clamp=3.0, **{name: getattr(vector, name) for name in names}
+    )
+
+
 def build_polynomial(orders: AbstractPolynomial, theta: list[float]) -> PolynomialModel:
     model = build()
     return PolynomialModel(orders=orders, theta=np.array(theta), **{name: getattr(model, name) for name in TERMS})
@@ -140,6 +157,10 @@ MODELS = {
         BJ(nb=(1, 2), nc=1, nd=1, nf=(2, 1), nk=(3, 0)), [0.1, 0.2, -0.1, -1.8, 0.85, -0.9, 0.4, -0.9, 0.1]
     ),
     "neural": lambda: build_neural(neurons=6),
+    "neural, two outputs": lambda: build_vector_neural(neurons=4),
+    "neural, two outputs, output neurons, absolute": lambda: build_vector_neural(
+        neurons=3, output_neurons=2, output="absolute"
+    ),
     "neural, cubes, output neurons, absolute": lambda: build_neural(
         neurons=4, output_neurons=3, activation="cubic", output="absolute"
     ),

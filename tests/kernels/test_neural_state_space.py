@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.provider import BLOCK
-from sysid.models import History, NeuralForm, NeuralStateSpace, Scaling
+from sysid.models import History, NeuralForm, NeuralStateSpace, Scaling, VectorNeuralStateSpace, VectorScaling
 from sysid.testing import finite_difference_jacobian, run_neural
 
 STRUCTURES = [
@@ -16,35 +16,46 @@ STRUCTURES = [
     pytest.param(NeuralStateSpace(states=2, neurons=3, activation="cubic"), id="cubic"),
     pytest.param(NeuralStateSpace(states=2, neurons=3, output_neurons=2, output="absolute"), id="absolute output"),
     pytest.param(NeuralStateSpace(states=1, neurons=0), id="linear"),
+    pytest.param(VectorNeuralStateSpace(states=3, neurons=4), id="three outputs"),
+    pytest.param(
+        VectorNeuralStateSpace(states=2, neurons=3, output_neurons=4, output="absolute"),
+        id="three absolute outputs with neurons",
+    ),
 ]
 
 
 def a_form(network: NeuralStateSpace, *, seed: int = 0, size: float = 0.3, **bounds: float) -> NeuralForm:
-    sizes = network.sizes(2)
+    n_outputs = 3 if network.several_outputs else 1
+    sizes = network.sizes(2, n_outputs)
     return NeuralForm(
         sizes=sizes,
         theta=size * np.random.default_rng(seed).standard_normal(sizes.count),
-        scaling=Scaling.identity(2),
+        scaling=VectorScaling.of([Scaling.identity(2)] * n_outputs) if n_outputs > 1 else Scaling.identity(2),
         cubic=network.activation == "cubic",
         rectified=network.output == "absolute",
         **bounds,
     )
 
 
-def a_provider(form: NeuralForm, *, n: int = 40, weights=None) -> NeuralProvider:
+def a_provider(form: NeuralForm, *, n: int = 40, weights=None, of_outputs=None) -> NeuralProvider:
     rng = np.random.default_rng(1)
+
+    def output(length: int) -> np.ndarray:
+        return rng.uniform(-1.0, 1.0, (length, form.sizes.outputs) if form.sizes.outputs > 1 else length)
+
     return NeuralProvider(
         template=form,
         experiments=[
             Experiment(
                 inputs=rng.uniform(-1.0, 1.0, (length, 2)),
-                output=rng.uniform(-1.0, 1.0, length),
-                history=History(inputs=rng.uniform(-1, 1, (past, 2)), output=rng.uniform(-1, 1, past)),
+                output=output(length),
+                history=History(inputs=rng.uniform(-1, 1, (past, 2)), output=output(past)),
                 weights=None if weights is None else rng.choice(weights, length),
                 past=np.ones(past, dtype=np.bool_),
             )
             for length, past in ((n, 9), (n // 2, 1), (n // 2, 4))
         ],
+        output_weights=of_outputs,
     )
 
 
@@ -81,7 +92,7 @@ def test_bounds_of_state_and_output_hold():
 def test_sensitivities_equal_finite_differences(network):
     provider = a_provider(a_form(network))
     theta = parameters(provider)
-    expected = finite_difference_jacobian(provider.outputs, theta)
+    expected = finite_difference_jacobian(lambda p: provider.outputs(p).ravel(), theta)
     assert np.abs(expected).max() > 0.1
     assert_allclose(provider.jacobian(theta), expected, atol=1e-7)
 
@@ -91,17 +102,27 @@ def test_sensitivities_hold_where_state_and_output_are_clipped():
     theta = parameters(provider, 0.8)
     inside = np.abs(provider.outputs(theta)) < 0.5
     assert 0.1 < inside.mean() < 0.9
-    expected = finite_difference_jacobian(provider.outputs, theta)
+    expected = finite_difference_jacobian(lambda p: provider.outputs(p).ravel(), theta)
     assert_allclose(provider.jacobian(theta), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("weights", [None, (0.0, 1.0, 2.5)], ids=["plain", "weighted and masked"])
-def test_normal_equations_equal_the_dense_ones(weights):
-    provider = a_provider(a_form(NeuralStateSpace(states=2, neurons=3)), weights=weights)
+@pytest.mark.parametrize(
+    ("network", "of_outputs"),
+    [
+        (NeuralStateSpace(states=2, neurons=3), None),
+        (VectorNeuralStateSpace(states=2, neurons=3), None),
+        (VectorNeuralStateSpace(states=2, neurons=3), (4.0, 1.0, 0.25)),
+    ],
+    ids=["one output", "three outputs", "three outputs of unlike noise"],
+)
+def test_normal_equations_equal_the_dense_ones(network, of_outputs, weights):
+    provider = a_provider(a_form(network), weights=weights, of_outputs=of_outputs)
     theta = parameters(provider)
     J, at = provider.jacobian(theta), provider.linearise(theta)
-    e = provider.outputs(theta) - np.concatenate([y for _, y in provider.signals])
+    e = (provider.outputs(theta) - np.concatenate([y for _, y in provider.signals])).ravel()
     w = np.concatenate([all_weights(experiment) for experiment in provider.experiments])
+    w = np.outer(w, np.ones(provider.template.sizes.outputs) if of_outputs is None else of_outputs).ravel()
     assert_allclose(at.loss, 0.5 * np.sum(w * e**2))
     assert_allclose(provider.loss(theta), at.loss)
     assert_allclose(at.gradient, J.T @ (w * e), atol=1e-10)
@@ -114,7 +135,7 @@ def test_blocks_join_without_a_seam():
     provider = a_provider(form, n=BLOCK + 60)
     theta = parameters(provider)
     seam = slice(BLOCK - 3, BLOCK + 3)
-    few = finite_difference_jacobian(lambda p: provider.outputs(p)[seam], theta)
+    few = finite_difference_jacobian(lambda p: provider.outputs(p)[seam].ravel(), theta)
     assert_allclose(provider.jacobian(theta)[seam], few, atol=1e-7)
 
 

@@ -87,7 +87,7 @@ def test_a_history_shows_the_sign_that_a_rectified_output_hides():
     theta = [0.9, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.5]
     form = NeuralForm(sizes=network.sizes(1), theta=np.array(theta), scaling=Scaling.identity(1), rectified=True)
     u = np.ones((12, 1))
-    y = form.run(u, np.array([-0.8]))
+    y = form.run(u, np.array([-0.8]))[:, 0]
     assert form.state(History(inputs=u[:5], output=y[:5]))[0] == pytest.approx(1.0 - 1.8 * 0.9**5, abs=1e-3)
 
 

@@ -40,6 +40,7 @@ NARX = {"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": 2}
 NSS = {"kind": "NSS", "states": 1, "neurons": 2}
 ARX = {"kind": "ARX", "na": 1, "nb": [1, 1], "nk": [1, 1]}
 VECTOR_SS = {"kind": "VectorSS", "states": 2}
+VECTOR_NSS = {"kind": "VectorNSS", "states": 1, "neurons": 1}
 VECTOR = {"kind": "VectorNARX", "input_delays": 1, "output_delays": 1, "neurons": 2}
 SS = {"kind": "SS", "states": 1}
 OE = {"kind": "OE", "nb": [1, 1], "nf": [1, 1], "nk": [1, 1]}
@@ -70,6 +71,7 @@ FITS = [
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
     pytest.param(VECTOR_SS, None, ALONE, id="VectorSS, of one"),
+    pytest.param(VECTOR_NSS, {"seed": 7, "max_iterations": 4, "starts": 1}, ALONE, id="VectorNSS, of one"),
     pytest.param(VECTOR, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="NARX of several outputs, of one"),
 ]  # fmt: skip
 
@@ -176,6 +178,7 @@ TWO |= {"stability": STABILITY, "export": None}
     [
         pytest.param(VECTOR, {"seed": 7, "max_iterations": 3}, id="VectorNARX"),
         pytest.param(SS | {"kind": "VectorSS"}, None, id="VectorSS"),
+        pytest.param(VECTOR_NSS, {"seed": 7, "max_iterations": 3, "starts": 2}, id="VectorNSS"),
     ],
 )
 def test_several_outputs_are_the_same_at_every_door(

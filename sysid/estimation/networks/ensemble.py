@@ -129,7 +129,7 @@ def selected(
     if not usable:
         return None
     training = multistart.training
-    scale = multistart.template.scaling.output_scale**2
+    scale = multistart.template.scaling.error_unit
 
     def report(pick: int) -> None:
         multistart.on_progress(

@@ -31,7 +31,7 @@ from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import Loop, Status
-from sysid.models import NARXModel, NeuralStateSpaceModel, Start, beginning
+from sysid.models import NARXModel, NeuralStateSpaceModel, Start, VectorNeuralStateSpaceModel, beginning
 from sysid.traces import Trace
 
 RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
@@ -39,12 +39,15 @@ RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
 (successive halving, Jamieson and Talwalkar 2016). Who stays is decided by the error on the estimation traces: early
 on, what the selection traces say of a start is noise; they choose at the end, among all states looked at."""
 
+SETTLED = 5
+"""Iterations after which a candidate with other weights of its residuals is near a minimum again."""
+
 INITIAL_ALPHA = 1e-2
 """Precision of the weights before the evidence has spoken: weak, but enough to keep the first steps of an
 underdetermined network small."""
 
 
-Network: TypeAlias = NARXModel | NeuralStateSpaceModel
+Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel
 """What is trained here."""
 
 
@@ -100,7 +103,8 @@ class Candidate:
         seed: Its seed; ``None`` for the one that was given.
         solution: Where its fit stands.
         model: The model there.
-        score: Geometric mean over the selection traces of the mean squared error; NaN without such traces.
+        score: Geometric mean over the selection traces, and over outputs, of the mean squared error; NaN without
+            such traces.
         members: Starts that an ensemble unites, once for each pick; empty for a single start.
         without: Inputs that it does without.
     """
@@ -261,12 +265,42 @@ def _advance(multistart: Multistart, number: int, before: Candidate | None, shar
     return Candidate(number=number, seed=seed, solution=solution, model=model, score=score(multistart, model))
 
 
+def advanced(
+    multistart: Multistart, provider: AbstractProvider, before: Candidate, *, name: str, iterations: int
+) -> Candidate:
+    """A candidate that is trained on with other weights of its residuals.
+
+    Args:
+        multistart: What the candidates have in common.
+        provider: The residuals.
+        before: The candidate.
+        name: Of this run among those that are kept.
+        iterations: At most.
+
+    Returns:
+        The candidate that it becomes; its iterations go on from those before.
+    """
+    keep, state = multistart.checkpoints, before.solution.state
+    with one_blas_thread():
+        at = provider.linearise(state.theta)
+        # Precisions that suited the residuals as they were may hold the weights where they are.
+        prior = first_prior(multistart.training, multistart.layout, provider, state.theta, state.prior.centre)
+        begun = replace(state, at=at, prior=prior, losses=(at.loss,), damping=DAMPINGS[multistart.training.damping]())
+        seconds = multistart.training.max_time_s - state.curve[-1].elapsed_s
+        engine = _engine(multistart, before.number, state.iteration + iterations, seconds)
+        if engine.evidence_after is not None:
+            engine = replace(engine, evidence_after=state.iteration + SETTLED)
+        solution = keep.resume(name, engine, provider, begun)
+    model = multistart.model(solution.theta)
+    return replace(before, solution=solution, model=model, score=score(multistart, model))
+
+
 def _pretraining(
     multistart: Multistart, pretraining: StepSamples, number: int, seed: int, centre: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """A random start after its pretraining."""
     training = multistart.training
-    scale = multistart.template.scaling.output_scale**2
+    scale = multistart.template.scaling.error_unit
 
     def report(entry: Iteration) -> None:
         multistart.on_progress(
@@ -341,7 +375,7 @@ def _in_basis(multistart: Multistart, theta: NDArray[np.float64]) -> NDArray[np.
 
 def _engine(multistart: Multistart, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
     training = multistart.training
-    scale = multistart.template.scaling.output_scale**2
+    scale = multistart.template.scaling.error_unit
     work = training.max_iterations * _work(training.n_starts, _rungs(training))
 
     def report(entry: Iteration) -> None:
@@ -379,16 +413,17 @@ def score(multistart: Multistart, model: Network) -> float:
         model: A model.
 
     Returns:
-        Of the mean squared errors, in the output's unit squared; NaN without selection traces.
+        Of the mean squared errors, in the output's unit squared, or of several outputs in scaled numbers; NaN without
+        selection traces.
     """
-    errors = []
+    errors, unit = [], model.scaling.error_unit / np.square(model.scaling.output_scale)
     for trace in multistart.selection:
-        inputs, target = trace.columns(model.mapping.inputs), trace[model.mapping.output]
+        inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
         begun = beginning(model, inputs, target, multistart.start, trace.usable_samples)
         n, history = begun.first, begun.history
         if multistart.training.loop is Loop.CLOSED:
             output = model.simulate(inputs[n:], history)
         else:
             output = model.predict(inputs[n:], target[n:], history)
-        errors.append(float(np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2)))
+        errors.append(np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2, axis=0) * unit)
     return float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")

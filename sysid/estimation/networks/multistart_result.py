@@ -68,7 +68,7 @@ def multistart_result(
     """
     chosen = choice.chosen
     curve = chosen.solution.curve
-    scale = chosen.model.scaling.output_scale**2
+    scale = chosen.model.scaling.error_unit
     return FitResult(
         model=chosen.model,
         status=status,
@@ -88,7 +88,7 @@ def multistart_result(
 
 
 def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[Attempt, ...]:
-    scale = choice.chosen.model.scaling.output_scale**2
+    scale = choice.chosen.model.scaling.error_unit
     found = [
         Attempt(
             start=candidate.number + 1,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.linear.segments import Segment
 from sysid.estimation.networks.provider import BLOCK
 from sysid.kernels import neural_state_space as kernel
 from sysid.models import NeuralForm
@@ -20,8 +21,9 @@ from sysid.models import NeuralForm
 class _Record:
     """An experiment in scaled numbers, the samples of its history included.
 
-    ``oldest`` is what the map to the initial state reads: scaled inputs, scaled output, 1. ``free`` says where the
-    record's own initial state stands among the parameters; ``None`` where the map gives it.
+    ``target`` has shape ``(n_samples, n_outputs)``, ``root_weights`` one that goes with it. ``oldest`` is what the map
+    to the initial state reads: scaled inputs, scaled outputs, 1. ``free`` says where the record's own initial state
+    stands among the parameters; ``None`` where the map gives it.
     """
 
     u: NDArray[np.float64]
@@ -31,10 +33,11 @@ class _Record:
     free: slice | None
 
     def weighted(self, values: NDArray[np.float64], rows: slice = slice(None)) -> NDArray[np.float64]:
-        if self.root_weights is None:
-            return values
-        roots = self.root_weights[rows]
-        return values * (roots if values.ndim == 1 else roots[:, None])
+        """Residuals, or rows of the Jacobian, ``(n_samples, n_outputs, ...)``, with an axis for both and weights."""
+        if self.root_weights is not None:
+            roots = self.root_weights[rows]
+            values = values * (roots if values.ndim == 2 else roots[:, :, None])
+        return values.reshape(len(values) * values.shape[1], *values.shape[2:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,10 +51,12 @@ class NeuralProvider(AbstractProvider):
     Args:
         template: Sizes, flags, scaling and bounds; its parameters are ignored.
         experiments: The records.
+        output_weights: Weight of each output's squared residuals, where they do not all count alike.
     """
 
     template: NeuralForm
     experiments: tuple[Experiment, ...]
+    output_weights: tuple[float, ...] | None = None
     n_samples: int = field(init=False)
     n_parameters: int = field(init=False)
     """Those of the model and of the records' initial states."""
@@ -66,8 +71,14 @@ class NeuralProvider(AbstractProvider):
             at = at if record.free is None else record.free.stop
         object.__setattr__(self, "_records", tuple(records))
         object.__setattr__(self, "n_parameters", at)
-        counted = [len(r.target) if r.root_weights is None else np.count_nonzero(r.root_weights) for r in records]
-        object.__setattr__(self, "n_samples", int(sum(counted)))
+        object.__setattr__(self, "n_samples", int(sum(map(self._counted, records))))
+
+    def _counted(self, record: _Record) -> int:
+        """Residuals that count."""
+        if record.root_weights is None:
+            return int(record.target.size)
+        per_sample = self.template.sizes.outputs // int(record.root_weights.shape[1])
+        return per_sample * int(np.count_nonzero(record.root_weights))
 
     def _record(self, experiment: Experiment, at: int) -> _Record:
         history, scaling = experiment.history, self.template.scaling
@@ -80,13 +91,15 @@ class NeuralProvider(AbstractProvider):
         before = experiment.past_weights[:n_past]
         if experiment.weights is not None or not before.all():
             weights = np.ones(len(experiment.output)) if experiment.weights is None else experiment.weights
-            roots = np.sqrt(np.concatenate([before, weights]))
+            roots = np.sqrt(np.concatenate([before, weights]))[:, None]
+        if self.output_weights is not None:
+            roots = np.sqrt(self.output_weights) * (np.ones((len(target), 1)) if roots is None else roots)
         oldest = np.concatenate(
-            [scaling.scale_inputs(history.inputs[:1])[0], scaling.scale_output(history.output[:1]), [1.0]]
+            [scaling.scale_inputs(history.inputs[:1])[0], self.template.scaled_outputs(history.output[:1])[0], [1.0]]
         )
         return _Record(
             u=self.template.scaled(u),
-            target=scaling.scale_output(target),
+            target=self.template.scaled_outputs(target),
             root_weights=roots,
             oldest=oldest,
             free=slice(at, at + self.template.sizes.states) if experiment.free and not stood else None,
@@ -99,8 +112,20 @@ class NeuralProvider(AbstractProvider):
 
     @property
     def signals(self) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...]:
-        """Scaled inputs and scaled output of each record, the history's samples included."""
+        """Scaled inputs and scaled outputs of each record, the history's samples included."""
         return tuple((record.u, record.target) for record in self._records)
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """The records as a linear estimator sees them."""
+        scaling, found = self.template, []
+        for record, experiment in zip(self._records, self.experiments, strict=True):
+            weights = np.ones(len(record.u)) if record.root_weights is None else record.root_weights.max(axis=1)
+            history = experiment.history
+            stood = (scaling.scaled(history.inputs[:1])[0], scaling.scaled_outputs(history.output[:1])[0])
+            rest = None if record.free is not None else stood
+            found.append(Segment(inputs=record.u, outputs=record.target, root_weights=weights, rest=rest))
+        return tuple(found)
 
     def states(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         """Every state that the records visit.
@@ -115,7 +140,7 @@ class NeuralProvider(AbstractProvider):
         for record in self._records:
             x = self._begin(record, theta)
             path = np.empty((len(record.u), len(x)))
-            y = np.empty(1)
+            y = np.empty((1, self.template.sizes.outputs))
             for t in range(len(path)):
                 path[t] = x
                 kernel.free_run(record.u[t : t + 1], x, *self.template.arguments(theta), y)
@@ -126,7 +151,7 @@ class NeuralProvider(AbstractProvider):
         """Half the weighted sum of squared residuals; see the base class."""
         total = 0.0
         for record in self._records:
-            y = np.empty(len(record.target))
+            y = np.empty(record.target.shape)
             kernel.free_run(record.u, self._begin(record, theta), *self.template.arguments(theta), y)
             residual = record.weighted(y - record.target)
             with np.errstate(over="ignore", invalid="ignore"):  # a free run that explodes has no loss
@@ -151,25 +176,26 @@ class NeuralProvider(AbstractProvider):
                 gradient += weighted.T @ residual
                 matrix += weighted.T @ weighted  # one array twice: NumPy calls syrk, half the flops
                 residuals.append(residual)
-            whole = np.concatenate(residuals)
-            correlated += len(whole) * correlation_time(whole)
+            for whole in np.concatenate(residuals).reshape(-1, self.template.sizes.outputs).T:
+                correlated += len(whole) * correlation_time(whole)
         return Linearisation(
             loss=loss,
             gradient=gradient,
             gauss_newton=matrix,
-            correlation_time=correlated / sum(len(record.target) for record in self._records),
+            correlation_time=correlated / sum(record.target.size for record in self._records),
         )
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The whole Jacobian of the scaled output, unweighted, records one after the other.
+        """The whole Jacobian of the scaled outputs, unweighted, records one after the other.
 
         Args:
             theta: Flat parameters.
 
         Returns:
-            Shape ``(n_samples_of_all_records, n_parameters)``.
+            Shape ``(n_samples_of_all_records * n_outputs, n_parameters)``, a sample's outputs side by side.
         """
-        return np.concatenate([block.copy() for r in self._records for _, _, block in self._blocks(r, theta)])
+        blocks = [block.copy() for r in self._records for _, _, block in self._blocks(r, theta)]
+        return np.concatenate(blocks).reshape(-1, len(theta))
 
     def outputs(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """The scaled free runs, records one after the other.
@@ -178,9 +204,27 @@ class NeuralProvider(AbstractProvider):
             theta: Flat parameters.
 
         Returns:
-            Shape ``(n_samples_of_all_records,)``.
+            Shape ``(n_samples_of_all_records, n_outputs)``.
         """
         return np.concatenate([y.copy() for record in self._records for _, y, _ in self._blocks(record, theta)])
+
+    def variances(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mean squared residual of each output over the samples that count, in scaled numbers.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            Shape ``(n_outputs,)``.
+        """
+        total, counted = np.zeros(self.template.sizes.outputs), np.zeros(self.template.sizes.outputs)
+        for record in self._records:
+            y = np.empty(record.target.shape)
+            kernel.free_run(record.u, self._begin(record, theta), *self.template.arguments(theta), y)
+            weights = np.ones((len(y), 1)) if record.root_weights is None else record.root_weights**2
+            total += np.sum(weights * (y - record.target) ** 2, axis=0)
+            counted += weights.sum(axis=0)  # with the weights of outputs, which thus are none
+        return np.asarray(total / counted)
 
     def at(self, theta: NDArray[np.float64]) -> NeuralForm:
         """The form with these parameters.
@@ -208,19 +252,19 @@ class NeuralProvider(AbstractProvider):
         x = self._begin(record, theta)
         S = np.zeros((n, dynamic + n))
         S[:, dynamic:] = np.eye(n)
-        raw = np.empty((BLOCK, sizes.output.stop + n))
-        J = np.zeros((BLOCK, len(theta)))
-        y = np.empty(BLOCK)
+        raw = np.empty((BLOCK, sizes.outputs, sizes.output.stop + n))
+        J = np.zeros((BLOCK, sizes.outputs, len(theta)))
+        y = np.empty((BLOCK, sizes.outputs))
         for first in range(0, len(record.target), BLOCK):
             rows = min(BLOCK, len(record.target) - first)
             kernel.sensitivities(
                 record.u[first : first + rows], x, S, *self.template.arguments(theta), y[:rows], raw[:rows]
             )
-            J[:rows, :dynamic] = raw[:rows, :dynamic]
-            J[:rows, sizes.output] = raw[:rows, dynamic + n :]
-            begun = raw[:rows, dynamic : dynamic + n]
+            J[:rows, :, :dynamic] = raw[:rows, :, :dynamic]
+            J[:rows, :, sizes.output] = raw[:rows, :, dynamic + n :]
+            begun = raw[:rows, :, dynamic : dynamic + n]
             if record.free is None:
-                J[:rows, sizes.start] = (begun[:, :, None] * record.oldest).reshape(rows, -1)
+                J[:rows, :, sizes.start] = (begun[..., None] * record.oldest).reshape(rows, sizes.outputs, -1)
             else:
-                J[:rows, record.free] = begun
+                J[:rows, :, record.free] = begun
             yield slice(first, first + rows), y[:rows], J[:rows]

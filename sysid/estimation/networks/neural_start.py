@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.errors import UserError
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.regression import lagged
+from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.kernels import linear as linear_kernel
-from sysid.models import Lags, NeuralForm
+from sysid.models import Lags, LinearStateSpace, NeuralForm
+from sysid.models.linear_state_space import MOST_STATES
 from sysid.models.neural_form import Sizes
 
 ARX_ORDERS = (2, 4, 10)
 """Orders of the regressions whose impulse responses are realised: a regression suits noise in the equation, which a
 free run does not have, so several are tried and the free run decides."""
 
-HORIZON = 150
-"""Samples of impulse response in each direction of the Hankel matrix."""
+HORIZON, LARGEST_HANKEL = 150, 600
+"""Samples of impulse response in each direction of the Hankel matrix, and its rows at most, where outputs are many."""
 
 LARGEST_POLE = 0.999
 """Poles of the linear start are drawn inside this radius: a start must be stable, the fit need not stay inside."""
@@ -46,6 +49,9 @@ makes its neurons move it as far. A system that switches has a linear model from
 TIME_CONSTANTS = (100.0, 5.0, 0.5)
 """How many times faster than the slowest of the random time constants the fastest one is; fewest samples of the
 fastest; and the spread of each around its place between the two, as a natural logarithm."""
+
+SETTLING = 1e-3
+"""What is left of a unit after all that a regression takes of its past, below which its constant is no level."""
 
 FLAT_ALPHA = 1e-6
 """Precision of the prior while the linear model is fitted: enough to hold directions that change nothing, as any change
@@ -122,7 +128,7 @@ class NeuralLayout(AbstractLayout):
     def _random_dynamics(self, rng: np.random.Generator) -> NDArray[np.float64]:
         """States of their own time constants, from the slowest that the linear model has down to fast ones.
 
-        Each is driven by the inputs so that it ranges as far as they do; the output is a random sum of them.
+        Each is driven by the inputs so that it ranges as far as they do; each output is a random sum of them.
         """
         s = self.sizes
         radius = min(float(np.abs(linalg.eigvals(self.base[s.linear].reshape(s.states, -1)[:, : s.states])).max()), 1.0)
@@ -134,8 +140,10 @@ class NeuralLayout(AbstractLayout):
         gains = rng.standard_normal((s.states, s.inputs))
         base = np.zeros(len(self.base))
         base[s.linear] = np.column_stack([np.diag(poles), gains * (1.0 - poles)[:, None], np.zeros(s.states)]).ravel()
-        base[s.output_linear][: s.states] = 0.5 * rng.standard_normal(s.states)
-        base[s.start] = np.column_stack([gains, np.zeros((s.states, 2))]).ravel()
+        base[s.output_linear].reshape(s.outputs, s.row)[:, : s.states] = 0.5 * rng.standard_normal(
+            (s.outputs, s.states)
+        )
+        base[s.start] = np.column_stack([gains, np.zeros((s.states, s.outputs + 1))]).ravel()
         return base
 
     def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -171,7 +179,8 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
     """The best linear model of the records in free run, in the parameters of a provider with neurons.
 
     A regression of high order gives an impulse response; the largest singular vectors of its Hankel matrix give the
-    states (Ho and Kalman 1966); Levenberg-Marquardt then fits matrices and initial states to the free run.
+    states (Ho and Kalman 1966); Levenberg-Marquardt then fits matrices and initial states to the free run. With several
+    outputs the linear state space that is fitted to all of them by subspace methods and the free run is tried, too.
 
     Args:
         provider: The records, and the sizes wanted.
@@ -180,14 +189,17 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
         Flat parameters, shape ``(provider.n_parameters,)``; the neurons' are zero.
     """
     whole = provider.template
-    s = Sizes(states=whole.sizes.states, inputs=whole.sizes.inputs, neurons=0, output_neurons=0)
+    s = replace(whole.sizes, neurons=0, output_neurons=0)
     # Without bounds of the output: a start that lies beyond them throughout would have no gradient to come back by.
     template = NeuralForm(
         sizes=s, theta=np.zeros(s.count), scaling=whole.scaling, rectified=whole.rectified, bound=np.inf
     )
-    linear = NeuralProvider(template=template, experiments=provider.experiments)
+    linear = replace(provider, template=template)
     with one_blas_thread():  # more threads than one cost more than they give at these sizes
-        fits = [_fitted(linear, _realised(linear, order)) for order in ARX_ORDERS]
+        begun = [_realised(linear, order) for order in ARX_ORDERS]
+        if s.outputs > 1 and not whole.rectified:
+            begun += _by_subspace(linear)
+        fits = [_fitted(linear, theta) for theta in begun]
     theta = _levelled(linear, _unit_states(linear, min(fits, key=linear.loss)))
     base = np.zeros(provider.n_parameters)
     for to, of in ((whole.sizes.linear, s.linear), (whole.sizes.output_linear, s.output), (whole.sizes.start, s.start)):
@@ -196,105 +208,135 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
     return base
 
 
-def _levelled(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same model, whose map from one sample heeds the output where the records' own states leave the map free.
+def _by_subspace(provider: NeuralProvider) -> list[NDArray[np.float64]]:
+    """The state space that a linear fit finds; nothing where the records are too short for it."""
+    s = provider.template.sizes
+    if s.states > MOST_STATES:
+        return []
+    orders = LinearStateSpace(states=s.states, feedthrough=True, noise=False)
+    try:
+        found = search(provider.segments, orders, StateSpaceTraining(max_iterations=LINEAR_ITERATIONS)).system
+    except (UserError, np.linalg.LinAlgError):
+        return []
+    return [_parameters(provider, (found.A, found.B, found.C, found.D, found.constant))]
 
-    The map gives the equilibrium at some inputs. What is measured away from the output there moves the state as it does
-    over the records: by the regression of the states' distance from equilibrium on the output's.
+
+def _parameters(provider: NeuralProvider, matrices: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
+    """``A``, ``B``, ``C``, ``D`` and constants as flat parameters; a record begins in equilibrium."""
+    A, B, C, D, constant = matrices
+    s = provider.template.sizes
+    theta = np.zeros(provider.n_parameters)
+    theta[s.linear] = np.column_stack([A, B, np.zeros(s.states)]).ravel()
+    theta[s.output] = np.column_stack([C, D, constant]).ravel()
+    gain = np.linalg.lstsq(np.eye(s.states) - A, B, rcond=None)[0] if s.inputs else B
+    theta[s.start] = np.column_stack([gain, np.zeros((s.states, s.outputs + 1))]).ravel()
+    return theta
+
+
+def _levelled(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same model, whose map from one sample heeds the outputs where the records' own states leave the map free.
+
+    The map gives the equilibrium at some inputs. What is measured away from the outputs there moves the state as it
+    does over the records: by the regression of the states' distance from equilibrium on the outputs'.
     """
     s = provider.template.sizes
     if not provider.all_free or provider.template.rectified:
         return theta
-    E, L = theta[s.start].reshape(s.states, -1).copy(), theta[s.output]
+    E, L = theta[s.start].reshape(s.states, -1).copy(), theta[s.output].reshape(s.outputs, s.row)
     paths, inputs = np.concatenate(provider.states(theta)), np.concatenate([u for u, _ in provider.signals])
     apart = paths - np.column_stack([inputs, np.ones(len(inputs))]) @ E[:, [*range(s.inputs), -1]].T
-    level = apart @ L[: s.states]
-    slope = apart.T @ level / max(float(level @ level), np.finfo(np.float64).tiny)
+    level = apart @ L[:, : s.states].T
+    if not np.isfinite(level).all():
+        return theta
+    slope = np.linalg.lstsq(level.T @ level, level.T @ apart, rcond=None)[0].T
     if not np.isfinite(slope).all():
         return theta
-    # The output in equilibrium, as a function of inputs and 1.
-    steady = np.concatenate([L[s.states : -1], [0.0, L[-1]]]) + L[: s.states] @ E
-    E += np.outer(slope, -steady)
-    E[:, s.inputs] += slope
+    # The outputs in equilibrium, as a function of inputs and 1.
+    steady = np.column_stack([L[:, s.states : -1], np.zeros((s.outputs, s.outputs)), L[:, -1]])
+    E -= slope @ (steady + L[:, : s.states] @ E)
+    E[:, s.inputs : s.inputs + s.outputs] += slope
     changed = theta.copy()
     changed[s.start] = E.ravel()
     return changed
 
 
 def _realised(provider: NeuralProvider, order: int) -> NDArray[np.float64]:
-    """A linear model from a regression; with a rectified output, from one on the signs that the last one found."""
+    """A linear model from a regression; with rectified outputs, from one on the signs that the last one found."""
     s = provider.template.sizes
     signals = list(provider.signals)
     rounds = SIGN_ROUNDS if provider.template.rectified else 1
-    signed = [(u, y * np.sign(u[:, 0])) for u, y in signals] if rounds > 1 else signals
+    signed = [(u, y * (np.sign(u[:, :1]) if s.inputs else 1.0)) for u, y in signals] if rounds > 1 else signals
     for _ in range(rounds):
-        theta = np.zeros(provider.n_parameters)
-        A, B, C, D, constant = _realise(*_regression(signed, s.inputs, order), s)
-        theta[s.linear] = np.column_stack([A, B, np.zeros(s.states)]).ravel()
-        theta[s.output] = np.concatenate([C, D, [constant]])
-        gain = np.linalg.lstsq(np.eye(s.states) - A, B, rcond=None)[0] if s.inputs else B
-        theta[s.start] = np.column_stack([gain, np.zeros((s.states, 2))]).ravel()
+        matrices = _realise(*_regression(signed, s.inputs, order), s)
+        theta = _parameters(provider, matrices)
         if rounds > 1:
-            runs = [_simulate(A, B, C, D, u) + constant for u, _ in signals]
+            runs = [_simulate(matrices, u) for u, _ in signals]
             signed = [(u, y * np.sign(run)) for (u, y), run in zip(signals, runs, strict=True)]
     return theta
 
 
 def _regression(
     signals: list[tuple[NDArray[np.float64], NDArray[np.float64]]], n_inputs: int, order: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Coefficients of the past outputs, of the inputs (lags in columns), and the constant.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """A regression of the outputs on their past and the inputs.
 
     A record that is too short for its lags has no row; the longest one says how many there may be.
+
+    Returns:
+        Coefficients of the past outputs, shape ``(order, n_outputs, n_outputs)``, of the inputs, ``(order + 1,
+        n_outputs, n_inputs)``, and the constants.
     """
-    longest = max(len(y) for _, y in signals)
+    longest, n_y = max(len(y) for _, y in signals), signals[0][1].shape[1]
     order = min(order, max(longest // 4, 1), longest - 1)
     signals = [(u, y) for u, y in signals if len(y) > order]
-    lags = Lags(inputs=(tuple(range(order + 1)),) * n_inputs, output=tuple(range(1, order + 1)))
-    rows = np.concatenate([lagged(u, y, lags, len(y) - order) for u, y in signals])
+    now, past = tuple(range(order + 1)), tuple(range(1, order + 1))
+    lags = Lags(inputs=(*(now,) * n_inputs, *(past,) * n_y), output=())
+    rows = np.concatenate([lagged(np.column_stack([u, y]), y[:, 0], lags, len(y) - order) for u, y in signals])
     target = np.concatenate([y[order:] for _, y in signals])
     found = np.linalg.lstsq(np.column_stack([rows, np.ones(len(rows))]), target, rcond=None)[0]
-    past = found[-1 - order : -1]
-    share = 1.0 - past.sum()
-    return past, found[: -1 - order].reshape(n_inputs, order + 1), float(found[-1] / share) if share > 1e-3 else 0.0
+    own = found[n_inputs * (order + 1) : -1].reshape(n_y, order, n_y).transpose(1, 2, 0)
+    inputs = found[: n_inputs * (order + 1)].reshape(n_inputs, order + 1, n_y).transpose(1, 2, 0)
+    share = np.eye(n_y) - own.sum(axis=0)
+    settles = linalg.eigvals(share).real.min() > SETTLING
+    return own, inputs, np.linalg.solve(share, found[-1]) if settles else np.zeros(n_y)
 
 
 def _realise(
-    past: NDArray[np.float64], inputs: NDArray[np.float64], constant: float, s: Sizes
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
-    """Ho-Kalman realisation of the regression's impulse responses; without an input, of its response to what is new."""
+    past: NDArray[np.float64], inputs: NDArray[np.float64], constant: NDArray[np.float64], s: Sizes
+) -> tuple[NDArray[np.float64], ...]:
+    """Ho-Kalman realisation of the regression's impulse responses; without an input, of those to what is new."""
+    order, n_y = len(past), s.outputs
     if s.inputs == 0:
-        inputs = np.ones((1, 1))
-    n_inputs = len(inputs)
-    responses = np.zeros((2 * HORIZON + 1, n_inputs))
-    companion = np.eye(len(past), k=-1)
-    companion[:1] = past
-    radius = float(np.abs(linalg.eigvals(companion)).max()) if len(past) else 0.0
+        inputs = np.eye(n_y)[np.newaxis]
+    horizon = min(HORIZON, max(LARGEST_HANKEL // n_y, 20))
+    responses = np.zeros((2 * horizon + 1, n_y, inputs.shape[2]))
+    companion = np.eye(n_y * order, k=-n_y)
+    companion[:n_y] = np.concatenate(past, axis=1) if order else 0.0
+    radius = float(np.abs(linalg.eigvals(companion)).max()) if order else 0.0
     # An unstable regression is slowed down to the edge; what is wanted is the shape of its first samples.
     shrink = LARGEST_POLE / max(radius, LARGEST_POLE)
-    past = past * shrink ** np.arange(1, len(past) + 1)
+    past = past * (shrink ** np.arange(1, order + 1))[:, np.newaxis, np.newaxis]
     for t in range(len(responses)):
-        fresh = inputs[:, t] if t < inputs.shape[1] else np.zeros(n_inputs)
-        responses[t] = fresh + sum(past[i] * responses[t - 1 - i] for i in range(min(len(past), t)))
-    places = 1 + np.arange(HORIZON)[:, None] + np.arange(HORIZON)
-    hankel = responses[places].reshape(HORIZON, -1)
+        if t < len(inputs):
+            responses[t] = inputs[t]
+        responses[t] += sum(past[i] @ responses[t - 1 - i] for i in range(min(order, t)))
+    places = 1 + np.arange(horizon)[:, None] + np.arange(horizon)
+    hankel = responses[places].transpose(0, 2, 1, 3).reshape(horizon * n_y, -1)
     left, values, right = linalg.svd(hankel, full_matrices=False)
     root = np.sqrt(np.maximum(values[: s.states], 1e-12 * values[0]))
     observable = left[:, : s.states] * root
-    A = np.linalg.lstsq(observable[:-1], observable[1:], rcond=None)[0]
+    A = np.linalg.lstsq(observable[:-n_y], observable[n_y:], rcond=None)[0]
     A *= min(1.0, LARGEST_POLE / max(float(np.abs(linalg.eigvals(A)).max()), 1e-12))
     B = root[:, None] * right[: s.states, : s.inputs]
-    return A, B, observable[0], responses[0, : s.inputs], constant
+    return A, B, observable[:n_y], responses[0, :, : s.inputs], constant
 
 
-def _simulate(
-    A: NDArray[np.float64], B: NDArray[np.float64], C: NDArray[np.float64], D: NDArray[np.float64],
-    u: NDArray[np.float64],
-) -> NDArray[np.float64]:  # fmt: skip
-    y = np.empty((len(u), 1))
+def _simulate(matrices: tuple[NDArray[np.float64], ...], u: NDArray[np.float64]) -> NDArray[np.float64]:
+    A, B, C, D, constant = matrices
+    y = np.empty((len(u), len(C)))
     x = np.linalg.lstsq(np.eye(len(A)) - A, B @ u[0], rcond=None)[0]
-    linear_kernel.state_space(A, B, C[None], D[None], u, x, y)
-    return y[:, 0]
+    linear_kernel.state_space(A, B, C, D, u, x, y)
+    return y + constant
 
 
 def _fitted(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -313,13 +355,15 @@ def _unit_states(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArra
     low, high = paths.min(axis=0), paths.max(axis=0)
     scale, centre = np.maximum((high - low) / 2.0, 1e-9), (high + low) / 2.0
     M = theta[s.linear].reshape(s.states, s.row).copy()
-    A, L = M[:, : s.states].copy(), theta[s.output].copy()
+    A, L = M[:, : s.states].copy(), theta[s.output].reshape(s.outputs, s.row).copy()
     M[:, : s.states] = A * scale / scale[:, None]
     M[:, s.states :] /= scale[:, None]
     M[:, -1] += (A @ centre - centre) / scale
     changed = theta.copy()
     changed[s.linear] = M.ravel()
-    changed[s.output] = np.concatenate([L[: s.states] * scale, L[s.states : -1], [L[-1] + L[: s.states] @ centre]])
+    L[:, -1] += [row @ centre for row in L[:, : s.states]]
+    L[:, : s.states] *= scale
+    changed[s.output] = L.ravel()
     E = theta[s.start].reshape(s.states, -1) / scale[:, None]
     E[:, -1] -= centre / scale
     changed[s.start] = E.ravel()

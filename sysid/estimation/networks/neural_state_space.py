@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from sysid.errors import ConfigError
-from sysid.estimation.experiment import Experiment, experiments_of, unit_range
+from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
@@ -17,10 +19,20 @@ from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
+from sysid.estimation.networks.output_weights import reweighted, weighed
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import FitResult, Loop
-from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start
+from sysid.models import (
+    Mapping,
+    NeuralStateSpace,
+    NeuralStateSpaceModel,
+    Scaling,
+    Start,
+    VectorNeuralStateSpace,
+    VectorNeuralStateSpaceModel,
+    VectorScaling,
+)
 from sysid.traces import Trace
 
 STARTS = 6
@@ -67,51 +79,148 @@ def fit_neural_state_space(
         ConfigError: If the training is for one step ahead, which a hidden state does not have, or has options that are
             for lagged regressors alone.
     """
-    began = time.perf_counter()
-    training, start = (training or Training()).with_starts(STARTS), start or Start()
-    check_training(training)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
-    experiments = experiments_of(traces, mapping, start, rest)
-    template = _template(traces[0], mapping, network, experiments, rest)
+    experiments = experiments_of(traces, mapping, start or Start(), rest)
+    template = NeuralStateSpaceModel(
+        network=network,
+        theta=np.zeros(network.sizes(len(mapping.inputs)).count),
+        scaling=_signed(unit_range(experiments), network, experiments),
+        mapping=mapping,
+        sample_time=traces[0].sample_time,
+        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
+        output_unit=traces[0].channel(mapping.output).unit,
+        rest_output=rest,
+    )
+    records = Records(traces=traces, selection=selection, start=start or Start(), experiments=experiments)
+    return _fit(template, records, training, vet, on_progress)
+
+
+def fit_vector_neural_state_space(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    network: VectorNeuralStateSpace,
+    training: Training | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: Dict[str, float] | None = None,
+    selection: Sequence[Trace] = (),
+    vet: Callable[[starts.Network], bool] | None = None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> FitResult:
+    """Fit a neural state space of several outputs; see :func:`fit_neural_state_space`.
+
+    Each output counts over what the linear model leaves of it, and the best candidate is trained on with what that
+    leaves, so that a noisy output does not blur what a clean one shows of the states they share.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which come out.
+        network: The structure.
+        training: How to train.
+        start: What stands before each trace; at rest by default.
+        rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
+        selection: Traces that choose between starts.
+        vet: Whether a model's free run is stable.
+        on_progress: Called after every iteration.
+
+    Returns:
+        The fit. Its errors are mean squares over the outputs, in scaled numbers and so weighed.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        ConfigError: As for one output.
+    """
+    given = rest_output or {}
+    rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
+    experiments = experiments_of(traces, mapping, start or Start(), np.array(rests))
+    template = VectorNeuralStateSpaceModel(
+        network=network,
+        theta=np.zeros(network.sizes(len(mapping.inputs), len(mapping.outputs)).count),
+        scaling=_signed(unit_ranges(experiments), network, experiments),
+        mapping=mapping,
+        sample_time=traces[0].sample_time,
+        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
+        output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
+        rest_outputs=rests,
+    )
+    records = Records(traces=traces, selection=selection, start=start or Start(), experiments=experiments)
+    return _fit(template, records, training, vet, on_progress)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Records:
+    """What a fit is made of.
+
+    Args:
+        traces: Estimation traces.
+        selection: Traces that choose.
+        start: What stands before each.
+        experiments: The estimation traces as the fit sees them.
+    """
+
+    traces: Sequence[Trace]
+    selection: Sequence[Trace]
+    start: Start
+    experiments: tuple[Experiment, ...]
+
+    def runs(self, model: starts.Network) -> tuple[list[Experiment], list[Experiment]]:
+        """Estimation and selection traces as the model's free run goes over them."""
+        estimation, selection = (
+            [Experiment.for_model(t, model, self.start) for t in some] for some in (self.traces, self.selection)
+        )
+        return estimation, selection
+
+
+def _fit(
+    template: NeuralStateSpaceModel | VectorNeuralStateSpaceModel,
+    records: Records,
+    training: Training | None,
+    vet: Callable[[starts.Network], bool] | None,
+    on_progress: Callable[[FitProgress], None],
+) -> FitResult:
+    """Fit a model of any number of outputs."""
+    began = time.perf_counter()
+    training = (training or Training()).with_starts(STARTS)
+    check_training(training)
+    experiments = records.experiments
     provider = NeuralProvider(template=template.recursion, experiments=experiments)
     starts.check_samples(provider)
+    base = linear_start(provider)
+    provider = weighed(provider, base)
     multistart = starts.Multistart(
         training=training,
-        layout=NeuralLayout(
-            sizes=template.recursion.sizes, base=linear_start(provider), longest=max(len(e.output) for e in experiments)
-        ),
+        layout=NeuralLayout(sizes=template.recursion.sizes, base=base, longest=max(len(e.output) for e in experiments)),
         provider=provider,
         to_plain=np.eye(template.n_parameters, provider.n_parameters),
         template=template,
-        selection=selection,
-        start=start,
+        selection=records.selection,
+        start=records.start,
         initial=None,
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
     )
     candidates = starts.run(multistart)
+    candidates += reweighted(multistart, provider, choose(candidates, training.choose_by).chosen)
     choice = choose(candidates, training.choose_by, vet)
-    records = [(e.inputs, e.history) for e in experiments]
-    records += [(e.inputs, e.history) for e in experiments_of(selection, mapping, start, rest)]
-    status = multistart_status(choice.chosen, candidates, records, interrupted=multistart.stop.is_set())
-    posterior = _posterior(choice.chosen, provider, traces, selection, start)
+    others = experiments_of(records.selection, template.mapping, records.start, template.resting)
+    status = multistart_status(
+        choice.chosen,
+        candidates,
+        [(e.inputs, e.history) for e in (*experiments, *others)],
+        interrupted=multistart.stop.is_set(),
+    )
+    posterior = _posterior(choice.chosen, provider, records)
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
     return replace(multistart_result(choice, candidates, training, status, seconds), posterior=posterior)
 
 
-def _posterior(
-    chosen: starts.Candidate,
-    provider: NeuralProvider,
-    traces: Sequence[Trace],
-    selection: Sequence[Trace],
-    start: Start,
-) -> Posterior | None:
+def _posterior(chosen: starts.Candidate, provider: NeuralProvider, records: Records) -> Posterior | None:
     """Of the model's weights; those of its map to an initial state only where a record begins by it."""
     model = chosen.model
     to_plain = np.eye(model.n_parameters, provider.n_parameters)
     if provider.all_free:
         to_plain[provider.template.sizes.start] = 0.0
-    runs, others = ([Experiment.for_model(t, model, start) for t in some] for some in (traces, selection))
+    runs, others = records.runs(model)
     found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
     return None if found is None else calibrate(found, model, others)
 
@@ -143,22 +252,15 @@ def check_training(training: Training) -> None:
         )
 
 
-def _template(
-    first: Trace, mapping: Mapping, network: NeuralStateSpace, experiments: Sequence[Experiment], rest: float
-) -> NeuralStateSpaceModel:
-    """The model but for its parameters."""
-    scaling = unit_range(experiments)
-    if network.output == "absolute":
-        # An absolute value is one in scaled numbers only where both have the same zero.
-        largest = max(float(np.abs(e.output).max()) for e in experiments)
-        scaling = replace(scaling, output_offset=0.0, output_scale=largest or 1.0)
-    return NeuralStateSpaceModel(
-        network=network,
-        theta=np.zeros(network.sizes(len(mapping.inputs)).count),
-        scaling=scaling,
-        mapping=mapping,
-        sample_time=first.sample_time,
-        input_units=tuple(first.channel(name).unit for name in mapping.inputs),
-        output_unit=first.channel(mapping.output).unit,
-        rest_output=rest,
-    )
+_Scaling = TypeVar("_Scaling", Scaling, VectorScaling)
+
+
+def _signed(scaling: _Scaling, network: NeuralStateSpace, experiments: Sequence[Experiment]) -> _Scaling:
+    """The scaling of outputs that may be absolute values: such are one in scaled numbers only with the same zero."""
+    if network.output != "absolute":
+        return scaling
+    largest = np.max([np.abs(e.output).max(axis=0) for e in experiments], axis=0)
+    scale = np.where(largest > 0.0, largest, 1.0)
+    if isinstance(scaling, VectorScaling):
+        return replace(scaling, output_offset=(0.0,) * len(scale), output_scale=tuple(scale.tolist()))
+    return replace(scaling, output_offset=0.0, output_scale=float(scale))

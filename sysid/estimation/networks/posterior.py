@@ -40,6 +40,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -64,14 +65,14 @@ class Noise:
     """Errors that remain, of the free run and one step ahead.
 
     Args:
-        free_run: Of the free run.
+        free_run: Of the free run; for a model of several outputs, here and below, an array with one figure an output.
         one_step: One step ahead.
     """
 
-    free_run: float
-    one_step: float
+    free_run: float | NDArray[np.float64]
+    one_step: float | NDArray[np.float64]
 
-    def of(self, loop: Loop) -> float:
+    def of(self, loop: Loop) -> float | NDArray[np.float64]:
         """The figure of one of the two.
 
         Args:
@@ -112,15 +113,15 @@ class Posterior:
             loop: ``CLOSED`` for the free run.
 
         Returns:
-            Shape ``(n_samples,)``, in the output's unit squared; NaN one step ahead where there is no such run.
+            Of the output's shape, in its unit squared; NaN one step ahead where there is no such run.
         """
         form = model.recursion
         if not form.predicts and loop is not Loop.CLOSED:
-            return np.full(len(experiment.output), np.nan)
+            return np.full(experiment.output.shape, np.nan)
         with np.errstate(all="ignore"):  # what the data leave open may move the output beyond all numbers
             moves = model.output_moves(self.factor, experiment.inputs, experiment.history)
             if moves is not None:
-                variance = np.einsum("ij,ij->i", moves, moves)
+                variance = np.einsum("...j,...j->...", moves, moves)
                 return np.where(np.isfinite(variance), variance, np.inf)
         assert isinstance(form, Recursion)  # noqa: S101 - the forms without moves of their own
         provider = RecursionProvider(template=form, experiments=(experiment,), closed=loop is Loop.CLOSED)
@@ -145,9 +146,14 @@ class Posterior:
             The posterior.
         """
         noise, spread = (
-            Noise(free_run=float(arrays[name][0]), one_step=float(arrays[name][1])) for name in ("noise", "spread")
+            Noise(free_run=_figure(arrays[name][0]), one_step=_figure(arrays[name][1])) for name in ("noise", "spread")
         )
         return cls(factor=arrays["factor"], noise=noise, spread=spread)
+
+
+def _figure(stored: Any) -> float | NDArray[np.float64]:
+    """A figure, or those of several outputs."""
+    return np.asarray(stored, dtype=np.float64) if np.ndim(stored) else float(stored)
 
 
 def laplace(
@@ -178,7 +184,7 @@ def laplace(
     root = 1.0 / np.sqrt(state.prior.precision)
     M = (state.prior.beta / copies) * state.at.gauss_newton * root[:, None] * root[None, :]
     M[np.diag_indices_from(M)] += 1.0
-    counted = sum(e.n_counted for e in experiments)
+    counted = len(model.mapping.outputs) * sum(e.n_counted for e in experiments)
     paid = copies * stride * evidence.correlation_time * evidence.total_effective_parameters
     left = max(1.0 - paid / counted, LEAST_NOISE_SHARE)
     errors = remaining(model, experiments)
@@ -194,7 +200,7 @@ def remaining(model: AbstractModel, experiments: Sequence[Experiment]) -> Noise:
         experiments: The records, each with the history that its run begins with.
 
     Returns:
-        Of both runs, in the output's unit squared; NaN one step ahead where there is no such run.
+        Of both runs, in the outputs' units squared; NaN one step ahead where there is no such run.
     """
     form, counted = model.recursion, sum(e.n_counted for e in experiments)
     if isinstance(form, Recursion):
@@ -203,11 +209,16 @@ def remaining(model: AbstractModel, experiments: Sequence[Experiment]) -> Noise:
             provider = RecursionProvider(template=form, experiments=tuple(experiments), closed=closed)
             found.append(2.0 * provider.loss(form.theta) / counted * form.scaling.output_scale**2)
         return Noise(free_run=found[0], one_step=found[1])
-    total = 0.0
-    for e in experiments:
-        error = model.simulate(e.inputs, e.history) - e.output
-        total += float(np.sum(error**2 * (1.0 if e.weights is None else e.weights)))
-    return Noise(free_run=total / max(counted, 1), one_step=float("nan"))
+    figures: list[NDArray[np.float64]] = []
+    for closed in (True, False):
+        total = np.zeros(len(model.mapping.outputs))
+        for e in experiments if closed or form.predicts else ():
+            run = model.simulate(e.inputs, e.history) if closed else model.predict(e.inputs, e.output, e.history)
+            weights = np.ones(len(run)) if e.weights is None else e.weights
+            total += [float(np.sum(column * weights)) for column in ((run - e.output) ** 2).reshape(len(run), -1).T]
+        figures.append(total / max(counted, 1) if closed or form.predicts else np.full(len(total), np.nan))
+    free_run, one_step = (each if model.structure.several_outputs else float(each[0]) for each in figures)
+    return Noise(free_run=free_run, one_step=one_step)
 
 
 def _inverse_root(M: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -234,17 +245,19 @@ def calibrate(posterior: Posterior, model: AbstractModel, experiments: Sequence[
     """
     if not experiments:
         return posterior
-    spreads = {Loop.CLOSED: 1.0, Loop.OPEN: 1.0}
+    one = np.ones(len(model.mapping.outputs))
+    spreads = {Loop.CLOSED: one, Loop.OPEN: one}
     for loop in Loop if model.recursion.predicts else (Loop.CLOSED,):
         ratios = [_standardised(posterior, model, experiment, loop) for experiment in experiments]
         promised = float(scipy.stats.norm.ppf(0.5 + 0.5 * CALIBRATED_AT))
-        found = float(np.quantile(np.concatenate(ratios), CALIBRATED_AT)) / promised
-        spreads[loop] = max(1.0, found) if np.isfinite(found) else 1.0
-    return replace(posterior, spread=Noise(free_run=spreads[Loop.CLOSED], one_step=spreads[Loop.OPEN]))
+        found = np.quantile(np.concatenate(ratios), CALIBRATED_AT, axis=0) / promised
+        spreads[loop] = np.where(np.isfinite(found), np.maximum(found, 1.0), 1.0).reshape(one.shape)
+    closed, opened = (value if model.structure.several_outputs else float(value[0]) for value in spreads.values())
+    return replace(posterior, spread=Noise(free_run=closed, one_step=opened))
 
 
 def _standardised(posterior: Posterior, model: AbstractModel, e: Experiment, loop: Loop) -> NDArray[np.float64]:
-    """Absolute errors over their standard deviations, where samples count."""
+    """Absolute errors over their standard deviations, where samples count; of each output."""
     variance = posterior.parameter_variance(model, e, loop)
     closed = loop is Loop.CLOSED
     output = model.simulate(e.inputs, e.history) if closed else model.predict(e.inputs, e.output, e.history)
