@@ -2,9 +2,9 @@ r"""Outputs weighed by their noise: what maximum likelihood makes of outputs who
 
 With independent noise of unknown variance on each output, the likelihood is largest where
 :math:`\prod_o \sum_t e_{t,o}^2` is least. Its minimum is that of a sum of squares in which each output is divided by
-the variance that is left of it, which is found by turns: from the linear model's on, fit, take the variances, fit again. Weights have the geometric
-mean 1, so that losses and evidence of differently weighed fits can be compared; the inequality of the means says that
-a weighed loss is never above the one it came from.
+the variance that is left of it. That is found by turns, from what a linear model leaves on: fit, take the variances,
+fit again. Weights have the geometric mean 1, so that losses and evidence of differently weighed fits can be compared;
+the inequality of the means says that a weighed loss is never above the one it came from.
 """
 
 from __future__ import annotations
