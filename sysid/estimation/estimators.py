@@ -363,7 +363,7 @@ ESTIMATORS: dict[str, Estimator] = {
             fit=fit_vector_narx,
             training=JointTraining,
             initial=check_vector_initial,
-            no_posterior="networks that are trained together have none",
+            no_posterior=ENDED,
         ),
     )
 }

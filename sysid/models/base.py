@@ -235,20 +235,25 @@ class AbstractModel(ABC):
         return None
 
     def output_moves(
-        self, factor: NDArray[np.float64], inputs: NDArray[np.float64], history: History
+        self,
+        factor: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        history: History,
+        measured: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64] | None:
-        """How the free run moves with the parameters, where that is not the compiled recursion's to say.
+        """How the output moves with the parameters, where that is not the compiled recursion's to say.
 
         Args:
             factor: Directions of the parameters that a fit is uncertain of, shape ``(n_parameters, n_directions)``.
             inputs: Shape ``(n_samples, n_inputs)``.
             history: The samples before.
+            measured: Output from which it is predicted one step ahead, of its shape; ``None`` for the free run.
 
         Returns:
             Derivatives along each direction, shape ``(n_samples, n_directions)``, or ``(n_samples, n_outputs,
             n_directions)`` of a model of several outputs; ``None`` for a recursion over lags.
         """
-        del factor, inputs, history
+        del factor, inputs, history, measured
         return None
 
     def predict_outputs(

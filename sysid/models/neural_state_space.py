@@ -15,6 +15,7 @@ from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
 from sysid.models.history import History
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
+from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP
 from sysid.models.neural_form import NeuralForm, Sizes
 from sysid.models.scaling import Scaling, VectorScaling
@@ -132,10 +133,6 @@ class VectorNeuralStateSpace(NeuralStateSpace):
     several_outputs = True
 
 
-_APART = 1e-3
-"""Step of a difference, in standard deviations."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _NeuralModel(AbstractModel):
     """What neural state spaces of one output and of several have in common; both have the fields below."""
@@ -178,7 +175,11 @@ class _NeuralModel(AbstractModel):
         )
 
     def output_moves(
-        self, factor: NDArray[np.float64], inputs: NDArray[np.float64], history: History
+        self,
+        factor: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        history: History,
+        measured: NDArray[np.float64] | None = None,  # noqa: ARG002 - one step ahead nothing is predicted
     ) -> NDArray[np.float64]:
         """How the free run moves with the weights, by differences; see the base class.
 
@@ -187,13 +188,13 @@ class _NeuralModel(AbstractModel):
         form = self.recursion
         scaled = form.scaled(inputs)
         known = form.state(history) if len(history.output) > 1 else None
-        found = np.zeros((len(inputs), form.sizes.outputs, factor.shape[1]))
-        for at, column in enumerate(factor.T):
-            runs = []
-            for sign in (1.0, -1.0):
-                moved = replace(form, theta=self.theta + sign * _APART * column)
-                runs.append(moved.run(scaled, moved.state(history) if known is None else known.copy()))
-            found[:, :, at] = (runs[0] - runs[1]) * self.scaling.output_scale / (2.0 * _APART)
+
+        def run(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+            moved = replace(form, theta=theta)
+            return moved.run(scaled, moved.state(history) if known is None else known.copy())
+
+        found = moves_of(run, self.theta, factor, (len(inputs), form.sizes.outputs))
+        found *= np.reshape(self.scaling.output_scale, (-1, 1))
         return found if self.structure.several_outputs else found[:, 0]
 
     def _fields(self) -> dict[str, Any]:

@@ -238,7 +238,11 @@ class TransferFunctionModel(AbstractModel):
         )
 
     def output_moves(
-        self, factor: NDArray[np.float64], inputs: NDArray[np.float64], history: History
+        self,
+        factor: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        history: History,
+        measured: NDArray[np.float64] | None = None,  # noqa: ARG002 - one step ahead nothing is predicted
     ) -> NDArray[np.float64]:
         """How the free run moves with numerators, denominators and the constant; see the base class."""
         offset = np.asarray(self.scaling.input_offset)

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
 from sysid.models.base import AbstractStructure, SeveralOutputs
+from sysid.models.history import History
 from sysid.models.lags import Lags, LagSpec
 from sysid.models.mapping import Mapping
+from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP, NARX
 from sysid.models.scaling import VectorScaling
 from sysid.models.vector_recursion import VectorRecursion
@@ -215,6 +217,23 @@ class VectorNARXModel(SeveralOutputs):
     def with_theta(self, theta: NDArray[np.float64]) -> VectorNARXModel:
         """The same network with other weights."""
         return replace(self, theta=theta)
+
+    def output_moves(
+        self,
+        factor: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        history: History,
+        measured: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """How the outputs move with the weights, by differences; see the base class."""
+
+        def run(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+            moved = replace(self.recursion, theta=theta)
+            if measured is None:
+                return moved.simulate(inputs, history)
+            return moved.predict(inputs, measured, history, 1)
+
+        return moves_of(run, self.theta, factor, (len(inputs), len(self.mapping.outputs)))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""

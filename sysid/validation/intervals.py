@@ -60,7 +60,7 @@ class OutputInterval:
     def of_outputs(self) -> tuple[OutputInterval, ...]:
         """The interval of each output, of which none has an axis of its own."""
         columns = [array.reshape(len(array), -1).T for array in (self.output, self.parameter_deviation)]
-        noises, spreads = np.atleast_1d(self.noise_deviation), np.atleast_1d(self.spread)
+        noises, spreads = (np.broadcast_to(each, len(columns[0])) for each in (self.noise_deviation, self.spread))
         return tuple(
             replace(self, output=run, parameter_deviation=moved, noise_deviation=float(noise), spread=float(spread))
             for run, moved, noise, spread in zip(*columns, noises, spreads, strict=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.attempts import Attempt
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
@@ -83,7 +84,9 @@ class JointTraining:
         traces: Sequence[Trace],
         errors: Dict[str, float],
         trained: Sequence[str] | None = None,
+        *,
         begins: Callable[[Trace], Dict[str, float]] = lambda _: {},
+        measured: Callable[[Trace], Experiment] | None = None,
     ) -> CascadeProvider:
         """Residuals and Jacobians of a whole as these options have them count; every option that the provider has.
 
@@ -93,6 +96,7 @@ class JointTraining:
             errors: For each target the error in its unit that counts as one.
             trained: Outputs of the members that are trained; all by default.
             begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
+            measured: From a trace its record, where it begins with measured samples.
 
         Returns:
             The provider.
@@ -112,6 +116,7 @@ class JointTraining:
             robust_scale=self.robust_scale,
             workers=self.workers,
             begins=begins,
+            measured=measured,
         )
 
 
@@ -131,6 +136,7 @@ class CascadeFit:
         notes: Sentences worth knowing: which state was chosen among which, and by what.
         attempts: Every start at every checkpoint, and the one that was chosen; its errors are squared, in the errors
             that count as one.
+        solution: Where the parameters stand in the basis of training; not stored.
     """
 
     model: Cascade
@@ -142,6 +148,7 @@ class CascadeFit:
     evidence: Evidence | None = None
     notes: tuple[str, ...] = field(default=())
     attempts: tuple[Attempt, ...] = ()
+    solution: Solution | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON values."""
@@ -236,6 +243,8 @@ class Joint:
         selection: Traces that choose among the states looked at, by the geometric mean over traces and targets of the
             squared error; without them the least loss chooses.
         on_progress: Called after every iteration.
+        scored: The free run of a model over a selection trace, by name, and the sample of the trace at which it begins;
+            by default from the levels before the trace.
     """
 
     provider: CascadeProvider
@@ -243,6 +252,7 @@ class Joint:
     training: JointTraining
     selection: Sequence[Trace] = ()
     on_progress: Callable[[FitProgress], None] = lambda _: None
+    scored: Callable[[Cascade, Trace], tuple[Dict[str, NDArray[np.float64]], int]] | None = None
 
     def fit(self, starts: Sequence[tuple[int | None, NDArray[np.float64]]]) -> CascadeFit:
         """Train from some starts, dropping half of them at each checkpoint.
@@ -331,10 +341,18 @@ class Joint:
         """As between the starts of a network: one trace on which all fail must not choose alone."""
         scores = []
         for trace in self.selection:
-            run, usable = model.simulate_trace(trace, rest=self.provider.begins(trace)), trace.usable_samples
+            run, first = self._run(model, trace)
+            usable = trace.usable_samples[first:]
             for name, error in self.provider.errors.items():
-                scores.append(float(np.mean((run[name] - trace[name])[usable] ** 2)) / error**2)
+                scores.append(float(np.mean((run[name] - trace[name][first:])[usable] ** 2)) / error**2)
         return float(np.exp(np.mean(np.log(np.maximum(scores, NEGLIGIBLE))))) if scores else float("nan")
+
+    def _run(self, model: Cascade, trace: Trace) -> tuple[Dict[str, NDArray[np.float64]], int]:
+        """The free run that is scored, and where it begins."""
+        if self.scored is not None:
+            return self.scored(model, trace)
+        run = model.simulate_trace(trace, rest=self.provider.begins(trace))
+        return {name: run[name] for name in self.provider.errors}, 0
 
     def _result(self, seen: Sequence[_Candidate], *, interrupted: bool, seconds: float) -> CascadeFit:
         chosen = min(seen, key=lambda one: _last(one.score if self.selection else one.loss))
@@ -358,6 +376,7 @@ class Joint:
                 *_others([one for one in seen if one is not chosen]),
             ),
             attempts=tuple(one.attempt(chosen=one is chosen) for one in seen),
+            solution=chosen.solution,
         )
 
     def _status(self, chosen: _Candidate, seen: Sequence[_Candidate], *, interrupted: bool) -> Status:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.counted_rows import counted_rows
 from sysid.estimation.least_squares.leverage import leverage_roots
@@ -38,7 +39,8 @@ GATHERED = 1024
 class _Record:
     """One trace: every channel in a first run, and its level at rest; the targets at the samples that count.
 
-    Inputs, and outputs of members that come before any trained one, keep the values of the first run.
+    Inputs, and outputs of members that come before any trained one, keep the values of the first run. The first
+    ``past`` rows are measured and not run; where there are none, the levels stand before the first sample.
     """
 
     values: NDArray[np.float64]
@@ -46,6 +48,7 @@ class _Record:
     rows: NDArray[np.int64]
     target: NDArray[np.float64]
     root_weights: NDArray[np.float64] | None
+    past: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +82,8 @@ class CascadeProvider(AbstractProvider):
             (``robust_scale.py``); infinity for plain squares.
         workers: Records that are worked on at the same time.
         begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
+        measured: From a trace its record, of all channels in the wiring's order, where it begins with measured samples:
+            what came before is then not known.
 
     Raises:
         ChannelError: If a trace lacks an input or a target, or a name is no output of the cascade.
@@ -95,6 +100,7 @@ class CascadeProvider(AbstractProvider):
     robust_scale: float = np.inf
     workers: int = 1
     begins: Callable[[Trace], Dict[str, float]] = lambda _: {}
+    measured: Callable[[Trace], Experiment] | None = None
     n_samples: int = field(init=False)
     _trained: TrainedMembers = field(init=False, repr=False)
     _records: tuple[_Record, ...] = field(init=False, repr=False)
@@ -212,6 +218,8 @@ class CascadeProvider(AbstractProvider):
         cascade = self.cascade
         inputs, target = trace.columns(cascade.inputs), trace.columns(list(self.errors))
         rest = self.begins(trace)
+        if self.measured is not None:
+            return self._begun(self.measured(trace))
         run = cascade.simulate_trace(trace, rest=rest)
         rows = counted_rows(target / np.array(list(self.errors.values())), self.stride, self.moves)
         usable = trace.usable_samples[rows]
@@ -221,6 +229,24 @@ class CascadeProvider(AbstractProvider):
             rows=rows,
             target=target[rows],
             root_weights=None if usable.all() else usable.astype(np.float64),
+        )
+
+    def _begun(self, experiment: Experiment) -> _Record:
+        """A record whose first samples are measured, the oldest held where the lags reach further back."""
+        names = (*self.cascade.inputs, *self.errors)
+        order = [names.index(name) for name in self.cascade.wiring.channels]
+        depth = self._trained.depth
+        before = np.concatenate(experiment.history.padded(depth), axis=1)
+        values = np.concatenate([before, np.concatenate([experiment.inputs, experiment.output], axis=1)])[:, order]
+        rows = counted_rows(experiment.output / np.array(list(self.errors.values())), self.stride, self.moves)
+        usable = np.ones(len(rows), dtype=np.bool_) if experiment.usable is None else experiment.usable[rows]
+        return _Record(
+            values=values,
+            levels=values[0],
+            rows=rows + depth,
+            target=experiment.output[rows],
+            root_weights=None if usable.all() else usable.astype(np.float64),
+            past=depth,
         )
 
     def _each(self, work: Callable[[_Record], _Found]) -> Iterator[_Found]:
@@ -242,7 +268,11 @@ class CascadeProvider(AbstractProvider):
             np.empty((n, int(program.neurons.sum()))) if keep else np.empty((0, 0)),
             np.empty((n, len(program.output_channel)), dtype=np.int8),
         )
-        kernel.run(program, self._trained.depth, record.levels, passed.values, passed.kept, passed.held)
+        past = record.past
+        if past:
+            kernel.go_on(program, past, passed.values, passed.kept[past:], passed.held[past:])
+        else:
+            kernel.run(program, self._trained.depth, record.levels, passed.values, passed.kept, passed.held)
         return passed
 
     def _residual(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -318,7 +348,7 @@ class CascadeProvider(AbstractProvider):
         kept[[output for output in self._outputs if output >= 0]] += BLOCK - 1
         room = rows_for(kept, n)
         at = 0
-        for first in range(0, samples, BLOCK):
+        for first in range(record.past, samples, BLOCK):
             rows = min(BLOCK, samples - first)
             sensitivities(
                 program, record.levels, first, rows, passed.values, passed.kept, passed.held,

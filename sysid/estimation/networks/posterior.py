@@ -119,7 +119,8 @@ class Posterior:
         if not form.predicts and loop is not Loop.CLOSED:
             return np.full(experiment.output.shape, np.nan)
         with np.errstate(all="ignore"):  # what the data leave open may move the output beyond all numbers
-            moves = model.output_moves(self.factor, experiment.inputs, experiment.history)
+            measured = None if loop is Loop.CLOSED else experiment.output
+            moves = model.output_moves(self.factor, experiment.inputs, experiment.history, measured)
             if moves is not None:
                 variance = np.einsum("...j,...j->...", moves, moves)
                 return np.where(np.isfinite(variance), variance, np.inf)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
 from sysid.estimation.networks.member_layout import JointLayout, MemberLayout
+from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress
 from sysid.estimation.result import FitResult, Loop
 from sysid.models import (
@@ -23,14 +26,12 @@ from sysid.models import (
     VectorNARX,
     VectorNARXModel,
     VectorScaling,
+    beginning,
 )
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.traces import Trace
 
 DEFAULT = JointTraining(max_iterations=500, patience=50)
-HELD = (
-    "Each record began at its first sample, as of a system that stood there; no initial state was estimated in the fit."
-)
 
 
 def fit_vector_narx(
@@ -53,8 +54,8 @@ def fit_vector_narx(
         mapping: Which channels go in, which come out.
         network: The structure.
         training: How to train; 500 iterations of one start by default.
-        start: What stands before each record: the outputs at rest, the default, or for every other start their first
-            samples, held.
+        start: What stands before each record; at rest by default. Where nothing is known of what came before it, a run
+            begins where all lags are measured.
         rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
         targets: For each output the error in its unit that counts as one; by default a hundredth of its range, so that
             all outputs count alike.
@@ -78,8 +79,26 @@ def fit_vector_narx(
     errors = targets or {
         name: 0.02 * scale for name, scale in zip(mapping.outputs, template.scaling.output_scale, strict=True)
     }
-    held = start is not None and start.kind is not StartKind.REST
-    provider = training.provider(cascade, traces, errors, begins=lambda trace: _first(trace, mapping) if held else {})
+    begin = start or Start()
+    from_record = begin.kind in {StartKind.MEASURED, StartKind.ESTIMATED}
+    rests, lags = np.array(template.rest_outputs), template.lags
+
+    def record(trace: Trace) -> Experiment:
+        return Experiment.from_trace(trace, mapping, begin, rests).from_measured(lags)
+
+    def scored(model: Cascade, trace: Trace) -> tuple[dict[str, NDArray[np.float64]], int]:
+        one, inputs = model.models[0], trace.columns(mapping.inputs)
+        begun = beginning(one, inputs, trace.columns(mapping.outputs), begin, trace.usable_samples)
+        run = one.simulate(inputs[begun.first :], begun.history)
+        return dict(zip(mapping.outputs, run.T, strict=True)), begun.first
+
+    provider = training.provider(
+        cascade,
+        traces,
+        errors,
+        begins=lambda trace: {} if begin.kind is StartKind.REST else _first(trace, mapping),
+        measured=record if from_record else None,
+    )
     records = [{name: trace[name] for name in (*mapping.inputs, *mapping.outputs)} for trace in traces]
     layout = JointLayout.of(provider.members, records)
     starts: list[tuple[int | None, NDArray[np.float64]]] = []
@@ -88,8 +107,28 @@ def fit_vector_narx(
     starts += [
         (seed, layout.draw(seed)) for seed in range(training.seed, training.seed + training.starts - len(starts))
     ]
-    joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)
-    return _result(joint.fit(starts), (HELD,) if held and start is not None and _unsaid(start) else ())
+    joint = Joint(
+        provider=provider,
+        layout=layout,
+        training=training,
+        selection=selection,
+        on_progress=on_progress,
+        scored=scored if from_record else None,
+    )
+    fit = joint.fit(starts)
+    return replace(_result(fit), posterior=_posterior(fit, layout, traces, selection, begin))
+
+
+def _posterior(
+    fit: CascadeFit, layout: JointLayout, traces: Sequence[Trace], selection: Sequence[Trace], start: Start
+) -> Posterior | None:
+    """Of the network's weights; none of a start that was kept as it was given."""
+    model = fit.model.models[0]
+    if fit.solution is None or not isinstance(model, VectorNARXModel):
+        return None
+    runs, others = ([Experiment.for_model(trace, model, start) for trace in some] for some in (traces, selection))
+    found = laplace(fit.solution.state, model, layout.to_plain, runs, copies=1)
+    return None if found is None else calibrate(found, model, others)
 
 
 def check_vector_initial(structure: AbstractStructure, initial: AbstractStructure, n_inputs: int) -> None:
@@ -108,10 +147,6 @@ def check_vector_initial(structure: AbstractStructure, initial: AbstractStructur
         raise _other_structure(structure.label, initial.label)
 
 
-def _unsaid(start: Start) -> bool:
-    return start.kind is not StartKind.FIRST_SAMPLE
-
-
 def _first(trace: Trace, mapping: Mapping) -> dict[str, float]:
     """The outputs at the first sample that is not masked."""
     usable = trace.usable_samples
@@ -119,7 +154,7 @@ def _first(trace: Trace, mapping: Mapping) -> dict[str, float]:
     return {name: float(trace[name][row]) for name in mapping.outputs}
 
 
-def _result(fit: CascadeFit, notes: tuple[str, ...]) -> FitResult:
+def _result(fit: CascadeFit) -> FitResult:
     """A fit of a cascade of one member as the fit of that member."""
     history = dict(fit.history)
     history["mse"] = history.pop("loss")
@@ -133,7 +168,7 @@ def _result(fit: CascadeFit, notes: tuple[str, ...]) -> FitResult:
         seed=fit.seed,
         evidence=fit.evidence,
         attempts=fit.attempts,
-        notes=(*fit.notes, f"Errors that count as one: {sizes}.", *notes),
+        notes=(*fit.notes, f"Errors that count as one: {sizes}."),
     )
 
 

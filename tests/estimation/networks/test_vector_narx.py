@@ -9,12 +9,16 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ConfigError
-from sysid.estimation import JointTraining, fit_vector_narx
+from sysid.estimation import JointTraining, Loop, fit_vector_narx
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.member_layout import MemberLayout
-from sysid.models import Mapping, VectorNARX
+from sysid.models import Cascade, Mapping, Start, StartKind, VectorNARX, beginning
 from sysid.models.column_recursion import ColumnRecursion
-from sysid.traces import Channel, Trace
+from sysid.testing import finite_difference_jacobian
+from sysid.traces import Channel, Role, Trace, TraceSet
+from sysid.validation.evaluate import evaluate_outputs
+from sysid.validation.intervals import predict_interval
 from tests.models.cascades import block, command, network
 
 MAPPING = Mapping.parse("u -> x+y")
@@ -118,3 +122,65 @@ def test_a_record_on_which_the_run_is_lost_counts_less_in_a_robust_loss():
         for margin in (np.inf, 1.0)
     )
     assert not np.array_equal(plain.theta, robust.theta)
+
+
+FREE = Start(kind=StartKind.ESTIMATED)
+
+
+def off_balance(seed: int, n: int = 60, noise: float = 0.0) -> Trace:
+    """A burst of two linear reservoirs that begins anywhere."""
+    rng = np.random.default_rng(seed)
+    u, z = np.repeat(rng.uniform(-1.0, 1.0, n // 5), 5)[:, None], rng.uniform(-2.0, 2.0, 2)
+    values = np.empty((n, 3))
+    for t in range(n):
+        values[t] = [u[t, 0], *z]
+        z = np.array([[0.9, 0.1], [-0.2, 0.8]]) @ z + np.array([0.1, 0.3]) * u[t]
+    values[:, 1:] += noise * rng.standard_normal((n, 2))
+    return replace(coupled(n), name=f"burst {seed}", values=values)
+
+
+ONE_LAG = VectorNARX(input_delays=[1], output_delays=1, neurons=1)
+
+
+@pytest.mark.parametrize("start", [FREE, Start(kind=StartKind.MEASURED, n_measured=5)], ids=["estimated", "measured"])
+def test_records_may_begin_out_of_equilibrium(start):
+    """Nothing is taken for granted of what came before: held at its first sample it would be another system."""
+    bursts = [off_balance(seed) for seed in (1, 2, 3)]
+    fit = fit_vector_narx(bursts, MAPPING, ONE_LAG, JointTraining(max_iterations=60), start=start)
+    unseen = off_balance(4)
+    begun = beginning(fit.model, unseen.columns(["u"]), unseen.columns(["x", "y"]), start)
+    run = fit.model.simulate(unseen.columns(["u"])[begun.first :], begun.history)
+    assert_allclose(run, unseen.columns(["x", "y"])[begun.first :], atol=4e-4)
+
+
+def test_sensitivities_of_records_that_begin_measured_equal_finite_differences():
+    bursts = [off_balance(1), off_balance(2)]
+    model = block("u -> x+y", output_delays=[[1, 3], [2]])
+    lags = model.lags
+
+    def record(trace: Trace) -> Experiment:
+        return Experiment.from_trace(trace, MAPPING, FREE, np.zeros(2)).from_measured(lags)
+
+    provider = JointTraining().provider(Cascade(models=(model,)), bursts, {"x": 1.0, "y": 2.0}, measured=record)
+    theta = 0.3 * np.random.default_rng(0).standard_normal(len(provider.theta))
+    assert provider.n_samples == 2 * (2 * 60 - 2 * lags.depth)
+    assert_allclose(provider.jacobian(theta), finite_difference_jacobian(provider.residuals, theta), atol=1e-6)
+
+
+def test_the_outputs_have_intervals_that_hold_what_is_measured():
+    training = JointTraining(max_iterations=40)
+    noisy = [off_balance(seed, 200, noise=0.05) for seed in range(3)]
+    fit = fit_vector_narx(noisy, MAPPING, ONE_LAG, training, start=FREE)
+    for loop in Loop:
+        unseen = off_balance(7, 200, noise=0.05)
+        interval = predict_interval(fit, unseen, loop=loop, start=FREE)
+        target = unseen.columns(["x", "y"])[-len(interval.output) :]
+        for one, measured in zip(interval.of_outputs(), target.T, strict=True):
+            assert 0.9 < one.coverage(measured).share <= 1.0
+            assert one.coverage(measured).mean_half_width < 0.2
+    held = evaluate_outputs(fit.model, of(unseen), FREE, posterior=fit.posterior)
+    assert all(found.cases[unseen.name].intervals is not None for found in held.values())
+
+
+def of(trace: Trace) -> TraceSet:
+    return TraceSet(name="unseen", traces=(trace,), roles={trace.name: Role.VALIDATION}, source="")
