@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.kernels.neurons import NEURONS
 from sysid.models import Cascade, Ends, History, Limit, Member, NeuralForm, Recursion
 
 
@@ -29,10 +30,11 @@ def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float
     x = [inputs[-1 - lag, channel] for channel, lags in enumerate(form.lags.inputs) for lag in lags]
     x += [outputs[-lag] for lag in form.lags.output]
     y = form.constant + sum(w * value for w, value in zip(form.linear, x, strict=True))
+    value = NEURONS[form.activation].value
     gates = np.zeros_like(form.hidden_weights) if form.gates is None else form.gates
     for weights, bias, readout, gate in zip(form.hidden_weights, form.hidden_bias, form.readout, gates, strict=True):
         gain = readout + sum(w * value for w, value in zip(gate, x, strict=True))
-        y += gain * np.tanh(bias + sum(w * value for w, value in zip(weights, x, strict=True)))
+        y += gain * float(value(np.array(bias + sum(w * number for w, number in zip(weights, x, strict=True)))))
     return float(min(max(y, form.low), form.high))
 
 
@@ -115,7 +117,7 @@ def _member_step(model: Member, past: dict[str, list[float]]) -> list[float]:
         x += [(past[name][-lag if own else -1 - lag] - columns.offset[column]) / columns.scale[column] for lag in lags]
     n, r, m = columns.neurons, len(x), len(ends.outputs)
     W, b, V, c, w, gates = np.split(columns.theta, np.cumsum([n * r, n, m * n, m, m * r if columns.linear else 0]))
-    h = np.tanh(W.reshape(n, r) @ x + b)
+    h = NEURONS[columns.activation].value(W.reshape(n, r) @ x + b)
     y = V.reshape(m, n) @ h + c
     y = y + w.reshape(m, r) @ x if columns.linear else y
     y = y + h @ (gates.reshape(n, r) @ x) if columns.gated else y
@@ -140,9 +142,7 @@ def run_neural(form: NeuralForm, inputs: NDArray[np.float64], x: NDArray[np.floa
     V = theta[s.readout].reshape(s.states, s.neurons)
     L, Wy = theta[s.output_linear].reshape(s.outputs, s.row), theta[s.output_hidden].reshape(s.output_neurons, s.row)
     v = theta[s.output_readout].reshape(s.outputs, s.output_neurons)
-
-    def activation(a: NDArray[np.float64]) -> NDArray[np.float64]:
-        return a**3 if form.cubic else np.tanh(a)
+    activation = NEURONS[form.activation].value
 
     y = []
     for u in inputs:

@@ -27,7 +27,7 @@ from sysid.estimation import FitResult, Training, estimators
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.warm_start import grown, widened
 from sysid.estimation.result import Loop, Status
-from sysid.models import NARX, Cascade, NARXModel
+from sysid.models import Cascade, NARXModel
 from sysid.traces import Trace
 
 SWEEPS = 3
@@ -240,12 +240,10 @@ def _reading_further_back(model: NARXModel, more: Mapping[str, tuple[int, ...]])
             remedy="leave them out",
         )
     delays |= {name: tuple(sorted({*delays[name], *some})) for name, some in more.items()}
-    network = NARX(
-        input_delays=[delays[name] for name in model.mapping.inputs],
+    network = replace(
+        model.network,
+        input_delays=tuple(delays[name] for name in model.mapping.inputs),
         output_delays=delays[output],
-        neurons=model.network.neurons,
-        feedthrough=model.network.feedthrough,
-        gated=model.network.gated,
     )
     count = Layout.of(network, len(lags.inputs)).n_parameters
     longer = replace(model, network=network, theta=np.zeros(count))

@@ -55,7 +55,7 @@ def _network(given: Cascade, member: Member, instance: str) -> NARXModel:
     if found is not None:
         own = found.network
         inputs = {member.channel(name, instance) for name in member.mapping.inputs}
-        if (own.neurons, own.gated) == (asked.neurons, asked.gated) and inputs <= set(found.mapping.inputs):
+        if _said(own) == _said(asked) and inputs <= set(found.mapping.inputs):
             return found
     raise ConfigError(
         f"the whole to begin from has no such {output}",
@@ -67,4 +67,4 @@ def _network(given: Cascade, member: Member, instance: str) -> NARXModel:
 
 
 def _said(structure: NARX) -> str:
-    return f"{structure.neurons} {'gated ' if structure.gated else ''}neurons"
+    return f"{structure.neurons} {'gated ' if structure.gated else ''}{structure.activation} neurons"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -16,6 +17,7 @@ from sysid.export.stage import Level, Side, Stage
 from sysid.export.state_space_form import StateSpaceForm
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import c_real, render
+from sysid.kernels.neurons import Neuron
 
 SHORT = 16
 """Terms up to which a sum is written out term by term: tables and a loop take longer."""
@@ -31,6 +33,7 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         Text by file name.
     """
     stages = [_stage(surrogate, stage) for stage in surrogate.stages]
+    layers = [stage["neuron"] for stage in stages if stage["kind"] == "lagged" and stage["neurons"]]
     values = {
         "s": surrogate,
         "p": surrogate.identifier,
@@ -38,8 +41,10 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "version": sysid.__version__,
         "meaning": MEANING,
         "stages": stages,
-        "any_neurons": any(stage["neurons"] for stage in stages),
-        "any_layers": any(stage["neurons"] for stage in stages if stage["kind"] == "lagged"),
+        "any_tanh": any(stage["neurons"] and stage["neuron"].name == "tanh" for stage in stages),
+        "neurons": _functions(stages),
+        "any_layers": any(layers),
+        "any_tanh_layers": any(neuron.name == "tanh" for neuron in layers),
         "any_dots": not all(stage["short"] for stage in stages),
         "any_sums": any(stage["adds"] for stage in stages),
         "rest_lines": _rest_lines(surrogate),
@@ -50,6 +55,16 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "places": {port.name: place for place, port in enumerate(surrogate.outputs)},
     }
     return {f"{surrogate.identifier}.{end}": render(f"surrogate.{end}.j2", **values) for end in ("h", "c")}
+
+
+def _functions(stages: Sequence[Dict[str, Any]]) -> list[Neuron]:
+    """Kinds of neurons that are called one by one; a layer of tanh over lagged regressors has a function of its own."""
+    kinds = {
+        stage["neuron"].name: stage["neuron"]
+        for stage in stages
+        if stage["neurons"] and not (stage["kind"] == "lagged" and stage["neuron"].name == "tanh")
+    }
+    return list(kinds.values())
 
 
 def level_text(surrogate: Surrogate, level: Level) -> str:
@@ -126,6 +141,7 @@ def _lagged(stage: Stage) -> dict[str, Any]:
         "kind": "lagged",
         "n": len(terms),
         "neurons": form.neurons,
+        "neuron": form.neuron,
         "short": not form.neurons and len(terms) <= SHORT,
         "adds": form.adds,
         "weights": incremental.hidden_weights.T,
@@ -153,7 +169,8 @@ def _state_space(stage: Stage) -> dict[str, Any]:
         "kind": "space",
         "short": False,
         "n": form.n_state,
-        "neurons": 0 if form.cubic else len(form.state_neurons) + len(form.output_neurons),
+        "neurons": len(form.state_neurons) + len(form.output_neurons),
+        "neuron": form.neuron,
         "adds": form.n_state > 0,
         "change": form.change,
         "drift": form.drift,
@@ -161,7 +178,6 @@ def _state_space(stage: Stage) -> dict[str, Any]:
         "constant": form.constant,
         "state_neurons": form.state_neurons,
         "output_neurons": form.output_neurons,
-        "cubic": form.cubic,
         "rectified": form.rectified,
         "bound": form.bound if np.isfinite(form.bound) else None,
         "scaled": _scaled(stage, [True] * form.n_inputs),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.export.state_space_form import StateSpaceForm
+from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import NeuralForm, StateSpace
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
@@ -18,10 +19,10 @@ from sysid.models.wiring import Member
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LaggedForm:
-    r"""``y = clip(w x + c + V tanh(W x + b))`` in scaled numbers, with the regressors of each column side by side.
+    r"""``y = clip(w x + c + V s(W x + b))`` in scaled numbers, with the regressors of each column side by side.
 
-    With gates each neuron of a single output multiplies a linear function: ``(v + G x) . tanh(W x + b)`` in place of
-    ``V tanh(W x + b)``.
+    With gates each neuron of a single output multiplies a linear function: ``(v + G x) . s(W x + b)`` in place of
+    ``V s(W x + b)``.
 
     Args:
         ends: Names, units and values at rest of what goes in and comes out.
@@ -36,6 +37,7 @@ class LaggedForm:
         scale: Of every column, in its unit.
         low: Lower bound of the outputs in scaled numbers; ``-inf`` for none.
         high: Upper bound of the outputs in scaled numbers; ``inf`` for none.
+        neuron: ``s``.
     """
 
     ends: Ends
@@ -50,6 +52,7 @@ class LaggedForm:
     scale: tuple[float, ...]
     low: float
     high: float
+    neuron: Neuron
 
     @classmethod
     def of(cls, model: Member) -> LaggedForm:
@@ -89,6 +92,7 @@ class LaggedForm:
             scale=columns.scale,
             low=columns.low,
             high=columns.high,
+            neuron=NEURONS[columns.activation],
         )
 
     @property

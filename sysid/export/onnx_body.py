@@ -125,7 +125,8 @@ def _network(nodes: Nodes, form: LaggedForm, incremental: IncrementalForm, z: st
         linear[:, -n:] = np.eye(n)
     if form.neurons:
         bias = nodes.numbers("b", form.hidden_bias[:, np.newaxis])
-        hidden = nodes.add("Tanh", [nodes.add("Gemm", [nodes.numbers("W", weights), z, bias], "hidden_sum")], "hidden")
+        sums = nodes.add("Gemm", [nodes.numbers("W", weights), z, bias], "hidden_sum")
+        hidden = form.neuron.onnx(nodes, sums, "hidden")
         readout = form.readout
         if form.gated:
             opened = nodes.add("Gemm", [nodes.numbers("G", gates), z, nodes.numbers("v", readout.T)], "gates")

@@ -35,11 +35,7 @@ def state_space_step(nodes: Nodes, form: StateSpaceForm, z: str, *, rows: bool) 
         if not len(neurons):
             return total
         hidden = product(f"{name}_W", neurons.weights, z, column(f"{name}_b", neurons.bias), f"{name}_hidden_sum")
-        if form.cubic:
-            square = nodes.add("Mul", [hidden, hidden], f"{name}_square")
-            hidden = nodes.add("Mul", [square, hidden], f"{name}_hidden")
-        else:
-            hidden = nodes.add("Tanh", [hidden], f"{name}_hidden")
+        hidden = form.neuron.onnx(nodes, hidden, f"{name}_hidden")
         return product(f"{name}_V", neurons.readout, hidden, total, f"{name}_network")
 
     output = summed("output", form.readout, form.constant, form.output_neurons)

@@ -176,7 +176,7 @@ def _stage(nodes: Nodes, stage: Stage, inputs: str, state: str, remainder: str |
     output = nodes.add("Gemm", [terms, *linear], "linear_part")
     if form.neurons:
         hidden = [nodes.numbers("W", incremental.hidden_weights[:, order].T), nodes.numbers("b", form.hidden_bias)]
-        neurons = nodes.add("Tanh", [nodes.add("Gemm", [terms, *hidden], "hidden_sum")], "hidden")
+        neurons = form.neuron.onnx(nodes, nodes.add("Gemm", [terms, *hidden], "hidden_sum"), "hidden")
         readout = form.readout
         if form.gated:
             slopes = [nodes.numbers("G", incremental.gates[:, order].T), nodes.numbers("v", form.readout[0])]

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import History, NeuralForm, Scaling, StateSpace, VectorScaling
+from sysid.models.activations import PLAIN
 from sysid.models.ends import Ends
 
 
@@ -46,7 +48,7 @@ class StateSpaceForm:
         constant: ``c``, shape ``(n_outputs,)``.
         state_neurons: Those of the state.
         output_neurons: Those of the output.
-        cubic: ``s`` is the cube; tanh otherwise.
+        neuron: ``s``.
         rectified: ``r`` is the absolute value; the identity otherwise.
         bound: Bound of each state; ``inf`` for none.
         gain: From scaled channels at rest to the state, shape ``(n_states, n_channels)``; the channels are the inputs,
@@ -62,7 +64,7 @@ class StateSpaceForm:
     constant: NDArray[np.float64]
     state_neurons: Neurons
     output_neurons: Neurons
-    cubic: bool
+    neuron: Neuron
     rectified: bool
     bound: float
     gain: NDArray[np.float64]
@@ -88,7 +90,7 @@ class StateSpaceForm:
             constant=lowered.constant,
             state_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((n, 0))),
             output_neurons=Neurons(weights=np.zeros((0, row)), bias=np.zeros(0), readout=np.zeros((p, 0))),
-            cubic=False,
+            neuron=NEURONS[PLAIN],
             rectified=False,
             bound=np.inf,
             gain=np.column_stack(gain) if gain else np.zeros((n, 0)),
@@ -115,7 +117,7 @@ class StateSpaceForm:
             output_neurons=Neurons(
                 weights=Wy[:, :-1], bias=Wy[:, -1], readout=theta[sizes.output_readout].reshape(len(L), q)
             ),
-            cubic=lowered.cubic,
+            neuron=NEURONS[lowered.activation],
             rectified=lowered.rectified,
             bound=lowered.bound,
             gain=E[:, :-1],

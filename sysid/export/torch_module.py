@@ -115,7 +115,7 @@ class LaggedStep(nn.Module):
         self.first, self.size = int(stage.first), int(layout.size)
         self.bounded, self.limited, self.gated = stage.bounded, stage.limited, form.gated
         self.low, self.high = float(form.low), float(form.high)
-        self.limits = Limits(stage)
+        self.neuron, self.limits = form.neuron.torch(), Limits(stage)
 
     def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """One step.
@@ -131,7 +131,7 @@ class LaggedStep(nn.Module):
         state = whole_state.narrow(1, self.first, self.size)
         scaled = (known.index_select(1, self.sources) - self.input_offset) / self.input_scale
         x = torch.cat([scaled, state], dim=1).index_select(1, self.regressor_columns)
-        hidden = torch.tanh(torch.addmm(self.hidden_bias, x, self.hidden_weights))
+        hidden = self.neuron(torch.addmm(self.hidden_bias, x, self.hidden_weights))
         total = torch.addmm(torch.addmm(self.constant, x, self.linear), hidden, self.readout)
         if self.gated:
             total = total + (hidden * (x @ self.gates)).sum(dim=1, keepdim=True)
@@ -193,8 +193,8 @@ class StateSpaceStep(nn.Module):
         self.first, self.size = int(stage.first), form.n_state
         self.bounded, self.limited = stage.bounded, stage.limited
         self.low, self.high, self.bound = float(form.low), float(form.high), float(form.bound)
-        self.cubic, self.rectified = form.cubic, form.rectified
-        self.limits = Limits(stage)
+        self.rectified = form.rectified
+        self.neuron, self.limits = form.neuron.torch(), Limits(stage)
 
     def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """One step; see :class:`LaggedStep`."""
@@ -202,7 +202,7 @@ class StateSpaceStep(nn.Module):
         scaled = (known.index_select(1, self.sources) - self.input_offset) / self.input_scale
         x = torch.cat([state, scaled], dim=1)
         total = torch.addmm(self.constant, x, self.readout)
-        total = total + self.active(torch.addmm(self.output_bias, x, self.output_weights)) @ self.output_readout
+        total = total + self.neuron(torch.addmm(self.output_bias, x, self.output_weights)) @ self.output_readout
         if self.rectified:
             total = torch.abs(total)
         y = torch.clamp(total, self.low, self.high)
@@ -214,12 +214,8 @@ class StateSpaceStep(nn.Module):
         if self.bounded:
             held = ((y <= self.low) | (y >= self.high)).any(dim=1, keepdim=True)
         change = torch.addmm(self.drift, x, self.change)
-        change = change + self.active(torch.addmm(self.state_bias, x, self.state_weights)) @ self.state_readout
+        change = change + self.neuron(torch.addmm(self.state_bias, x, self.state_weights)) @ self.state_readout
         return outputs, torch.clamp(state + change, -self.bound, self.bound), held, reached
-
-    def active(self, total: Tensor) -> Tensor:
-        """What the neurons make of their sums."""
-        return total * total * total if self.cubic else torch.tanh(total)
 
 
 def _scaling(form: LaggedForm | StateSpaceForm) -> dict[str, tuple[float, ...]]:

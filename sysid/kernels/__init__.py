@@ -1,1 +1,27 @@
-"""Compiled recursions: free run and forward sensitivities."""
+"""Compiled recursions: free run and forward sensitivities.
+
+Numba keeps what it compiled beside the source, and compiles it again when that file changes; that something has changed
+which the function calls from another file, such as a kind of neuron, it does not see. So an index that is older than
+the newest file of this room is taken away.
+"""
+
+from pathlib import Path
+
+
+def forget_what_is_older(folder: Path) -> None:
+    """Take away the indices of compiled functions that are older than some file of a folder.
+
+    Args:
+        folder: With the sources; what was compiled of them lies in its ``__pycache__`` folders. One that cannot be
+            written keeps what it has.
+    """
+    newest = max((file.stat().st_mtime for file in folder.rglob("*.py")), default=0.0)
+    for index in folder.rglob("__pycache__/*.nbi"):
+        try:
+            if index.stat().st_mtime < newest:
+                index.unlink()
+        except OSError:  # another process was faster, or the folder is read-only
+            continue
+
+
+forget_what_is_older(Path(__file__).parent)

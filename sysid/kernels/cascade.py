@@ -1,9 +1,10 @@
 r"""A cascade of recursions in one compiled pass over the samples.
 
-Each member is :math:`y_t = \mathrm{clip}(w x_t + c + V\tanh(W x_t + b))` in its own scaled numbers, with one or several
-outputs, or with one output and gates (``sysid/kernels/recursion.py`` has the single one and its derivation). Members
-run in order within a sample: one that reads an upstream output with lag 0 reads the value of the same sample. One may
-also read the past of what is computed after it: models that stand in a circle, as reservoirs that feed each other do.
+Each member is :math:`y_t = \mathrm{clip}(w x_t + c + V\sigma(W x_t + b))` in its own scaled numbers, with one or
+several outputs, or with one output and gates (``sysid/kernels/recursion.py`` has the single one and its derivation).
+Members run in order within a sample: one that reads an upstream output with lag 0 reads the value of the same sample.
+One may also read the past of what is computed after it: models that stand in a circle, as reservoirs that feed each
+other do.
 
 ``values`` holds every channel once, in its unit, and a regressor is one of them and a lag, whatever it means
 (``sysid/kernels/cascade_layout.py``).
@@ -28,6 +29,7 @@ from sysid.kernels.cascade_layout import (
     from_a_line,
     laid_out,
 )
+from sysid.kernels.neurons.table import activate
 from sysid.kernels.registers import LANES, affine, dot, tanh
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
@@ -113,13 +115,15 @@ def _walk(p, layout, values, past, at_sample, kept, held):
     """Run over the rows of ``values`` from ``past`` on, the first of which is sample ``at_sample``."""
     theta, bounds, weights = layout.theta, layout.bounds, layout.weights
     constant, linear_first, readout_first = _u(layout.constant), layout.linear_first, _u(layout.readout_first)
-    networks, network_first, tanh_first = _u(layout.networks), _u(layout.network_first), _u(layout.tanh_first)
+    networks, network_first, neurons_first = _u(layout.networks), _u(layout.network_first), _u(layout.neurons_first)
     order_y, level_first_y = _u(layout.order_y), _u(layout.level_first_y)
     fixed, fixed_limits, fixed_codes = layout.fixed, layout.fixed_limits, layout.fixed_codes
     weights_first, blocks, gate_blocks = _u(layout.weights_first), _u(layout.blocks), _u(layout.gate_blocks)
     neuron_first, member, g = _u(layout.neuron_first), _u(layout.member), layout.readout
     sum_first, numbers, codes = _u(layout.sums.first), layout.sums.numbers, layout.sums.codes
     first_x_of, channel_y = _u(p.regressor_first), _u(p.output_channel)
+    # Where all are of one kind, a level's neurons are run through side by side.
+    kinds, plain = p.kinds, not p.kinds.any()
     to_g_of = readout_first[_u(p.output_first)[:-1]]
     x, h = np.empty(len(p.regressor_channel)), from_a_line(LANES * layout.blocks.sum())
     flat, wide = values.reshape(-1), values.shape[1]
@@ -137,8 +141,12 @@ def _walk(p, layout, values, past, at_sample, kept, held):
                     weights, weights_first[m], n_x, x, first_x, h, neuron_first[m], blocks[m], g, to_g_of[m],
                     gate_blocks[m],
                 )  # fmt: skip
-            if tanh_first[level + ONE] > tanh_first[level]:
-                tanh(h, tanh_first[level], tanh_first[level + ONE] - tanh_first[level])
+            if plain and neurons_first[level + ONE] > neurons_first[level]:
+                tanh(h, neurons_first[level], neurons_first[level + ONE] - neurons_first[level])
+            elif not plain:
+                for q in range(network_first[level], network_first[level + ONE]):
+                    m = networks[q]
+                    activate(kinds[m], h, np.intp(neuron_first[m]), np.intp(LANES * blocks[m]))
             for q in range(level_first_y[level], level_first_y[level + ONE]):
                 o = order_y[q]
                 m, total = member[o], theta[constant[o]]

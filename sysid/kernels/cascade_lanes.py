@@ -13,7 +13,7 @@ from numba import njit
 
 from sysid.kernels.cascade import _bounded, _limited
 from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, gates_at, in_units
-from sysid.kernels.registers import tanh
+from sysid.kernels.neurons.table import activate
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -148,7 +148,7 @@ def run(p, depth, rest, lanes, values, held):
                 x[i] = past[now - p.regressor_lag[first_x + i], p.regressor_channel[first_x + i]]
             own, gates = p.theta_first[m], gates_at(p.theta_first, m, n, n_x, n_y)
             _affine(theta, own, own + n * n_x, n, n_x, x, h)
-            tanh(hidden, 0, n * lanes)
+            activate(p.kinds[m], hidden, 0, n * lanes)
             if gates >= 0:
                 _affine(theta, gates, own + n * (n_x + 1), n, n_x, x, g)
             at = own + n * (n_x + 1 + n_y)

@@ -7,7 +7,7 @@ as :math:`s y + o`, its readouts, gates and linear part are :math:`s` times as l
 sample, and what several members read stands there for all of them as soon as it is known.
 
 Members run level by level. A level begins with networks that do not read each other at the same sample: they run side
-by side, and what they wait for, such as the hyperbolic tangents of their neurons, they wait for once. The sums that can
+by side, and what they wait for, such as the functions of their neurons, they wait for once. The sums that can
 follow them do, one after the other; those that wait for nobody are the first level's. So what lies between two levels
 is always a network, or an output that a channel limits, and never a sum.
 """
@@ -30,6 +30,7 @@ class Program(NamedTuple):
         theta: Parameters of all members, one after the other.
         theta_first: Where each member's begin; one more entry than members.
         neurons: Neurons of each member.
+        kinds: Code of their kind (``sysid/kernels/neurons/table.py``).
         regressor_first: Where each member's regressors begin; one more entry than members.
         regressor_channel: Column of ``values`` that each regressor reads.
         regressor_lag: Its lag in samples.
@@ -47,6 +48,7 @@ class Program(NamedTuple):
     theta: NDArray[np.float64]
     theta_first: NDArray[np.int64]
     neurons: NDArray[np.int64]
+    kinds: NDArray[np.int64]
     regressor_first: NDArray[np.int64]
     regressor_channel: NDArray[np.int64]
     regressor_lag: NDArray[np.int64]
@@ -90,7 +92,7 @@ class Layout(NamedTuple):
         bounds: Of each output in its unit, shape ``(n_outputs, 2)``.
         networks: Members that have neurons, level by level.
         network_first: Where each level begins among them; one more entry than levels.
-        tanh_first: Where each level begins among all their neurons, with their padding; one more entry than levels.
+        neurons_first: Where each level begins among all their neurons, with their padding; one more entry than levels.
         weights: Of neurons and gates in blocks (``sysid/kernels/registers.py``), networks in that order.
         weights_first: Where those of each member begin.
         blocks: Blocks of neurons of each member.
@@ -113,7 +115,7 @@ class Layout(NamedTuple):
     bounds: NDArray[np.float64]
     networks: NDArray[np.int64]
     network_first: NDArray[np.int64]
-    tanh_first: NDArray[np.int64]
+    neurons_first: NDArray[np.int64]
     weights: NDArray[np.float64]
     weights_first: NDArray[np.int64]
     blocks: NDArray[np.int64]
@@ -291,12 +293,12 @@ def _by_output(p, order, level_first):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _networks(blocks, order, level_first):
     """Members that have neurons, level by level, and where each level begins among them and among their neurons."""
-    network_first, tanh_first = np.zeros_like(level_first), np.zeros_like(level_first)
+    network_first, neurons_first = np.zeros_like(level_first), np.zeros_like(level_first)
     for level in range(len(level_first) - 1):
         some = blocks[order[level_first[level] : level_first[level + 1]]]
         network_first[level + 1] = network_first[level] + np.sum(some > 0)
-        tanh_first[level + 1] = tanh_first[level] + LANES * np.sum(some)
-    return order[blocks[order] > 0], network_first, tanh_first
+        neurons_first[level + 1] = neurons_first[level] + LANES * np.sum(some)
+    return order[blocks[order] > 0], network_first, neurons_first
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -350,7 +352,7 @@ def laid_out(p):
     blocks = padded(p.neurons) // LANES
     is_sum = fixed & (np.repeat(blocks, np.diff(p.output_first)) == 0)
     order, level_first = _levels(p, is_sum)
-    networks, network_first, tanh_first = _networks(blocks, order, level_first)
+    networks, network_first, neurons_first = _networks(blocks, order, level_first)
     weights, weights_first, gate_blocks, neuron_first, readout, readout_first = _in_blocks(p, theta, order)
     order_y, level_first_y, member, constant, linear_first = _by_output(p, order, level_first)
     sum_y, first = _part(order_y, level_first_y, is_sum)
@@ -361,7 +363,7 @@ def laid_out(p):
         bounds,
         networks,
         network_first,
-        tanh_first,
+        neurons_first,
         weights,
         weights_first,
         blocks,

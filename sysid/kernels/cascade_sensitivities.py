@@ -1,7 +1,7 @@
 r"""Sensitivities of a cascade's outputs with respect to the parameters of its members, forward and exact.
 
 With the notation of ``sysid/kernels/cascade.py``, let :math:`\theta` be the parameters of all members that are trained.
-For output :math:`j` of a member, with :math:`s_{jk} = g_{jk}(1 - h_k^2)`, where :math:`g_{jk}` is what stands before
+For output :math:`j` of a member, with :math:`s_{jk} = g_{jk}\,\sigma'_k`, where :math:`g_{jk}` is what stands before
 the activation (the readout, or the gate), and regressor :math:`i` being output :math:`\kappa(i)`, in the member's
 scaled numbers, with lag :math:`l_i`,
 
@@ -31,6 +31,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import FREE, HIGH_CHANNEL, LOW_CHANNEL, gates_at
+from sysid.kernels.neurons.table import slopes
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -89,10 +90,10 @@ def _gains(g, theta, readout, gates, n, n_x, x):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _own(row, at, gates, j, n, n_x, n_y, linear, x, h, g):
+def _own(row, at, gates, j, n, n_x, n_y, linear, x, h, s, g):
     """The part of a row that does not go through earlier samples; ``at`` is where the member's parameters stand."""
     for k in range(n):
-        slope = g[k] * (1.0 - h[k] * h[k])
+        slope = g[k] * s[k]
         for i in range(n_x):
             row[at + k * n_x + i] = slope * x[i]
         row[at + n * n_x + k] = slope
@@ -109,13 +110,13 @@ def _own(row, at, gates, j, n, n_x, n_y, linear, x, h, g):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _factors(c, theta, first, gates, j, n, n_x, n_y, linear, h, g):
+def _factors(c, theta, first, gates, j, n, n_x, n_y, linear, h, s, g):
     """Derivative of an output with respect to each regressor."""
     weights = first + n * (n_x + 1 + n_y) + n_y + j * n_x
     for i in range(n_x):
         c[i] = theta[weights + i] if linear else 0.0
     for k in range(n):
-        slope = g[k] * (1.0 - h[k] * h[k])
+        slope = g[k] * s[k]
         for i in range(n_x):
             c[i] += slope * theta[first + k * n_x + i]
         if gates >= 0:
@@ -187,7 +188,8 @@ def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent,
     members, width = len(p.neurons), 0
     for m in range(members):
         width = max(width, p.regressor_first[m + 1] - p.regressor_first[m])
-    x, c, g = np.empty(width), np.empty(width), np.empty(max(1, p.neurons.max()))
+    most = max(1, p.neurons.max())
+    x, c, g, s, sums = np.empty(width), np.empty(width), np.empty(most), np.empty(most), np.empty(most)
     factors, others, reach = np.empty(width), np.empty(width, dtype=np.int64), np.empty(width, dtype=np.int64)
     for t in range(first, first + n_rows):
         at_neuron = 0
@@ -201,6 +203,7 @@ def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent,
                 before, channel = t - p.regressor_lag[first_x + i], p.regressor_channel[first_x + i]
                 value = values[before, channel] if before >= 0 else rest[channel]
                 x[i] = (value - p.regressor_offset[first_x + i]) / p.regressor_scale[first_x + i]
+            slopes(p.kinds[m], p.theta, p.theta_first[m], n, x[:n_x], h, sums, s)
             linear = p.theta_first[m + 1] - p.theta_first[m] > n * (n_x + 1 + n_y) + n_y
             gates = gates_at(p.theta_first, m, n, n_x, n_y)
             for j in range(n_y):
@@ -218,7 +221,7 @@ def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent,
                 _gains(g, p.theta, p.theta_first[m] + n * (n_x + 1) + j * n, gates, n, n_x, x)
                 if own_first[m] >= 0:
                     own_gates = own_first[m] + gates - p.theta_first[m] if gates >= 0 else -1
-                    _own(row, own_first[m], own_gates, j, n, n_x, n_y, linear, x, h, g)
-                _factors(c, p.theta, p.theta_first[m], gates, j, n, n_x, n_y, linear, h, g)
+                    _own(row, own_first[m], own_gates, j, n, n_x, n_y, linear, x, h, s, g)
+                _factors(c, p.theta, p.theta_first[m], gates, j, n, n_x, n_y, linear, h, s, g)
                 passed = _through_the_past(row, c, p, m, t, extent, source, rows, factors, others, reach)
                 rows.moves[at] = own_first[m] >= 0 or passed

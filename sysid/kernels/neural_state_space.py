@@ -7,9 +7,9 @@ step is
     x_{t+1} = \mathrm{clip}\bigl(M z_t + V\,\sigma(W z_t)\bigr), \qquad
     \hat y_t = \mathrm{clip}\bigl(\rho(L z_t + \bar V \sigma(\bar W z_t))\bigr),
 
-with ``k`` neurons in the state equation, ``q`` in the output's and ``o`` outputs; :math:`\sigma` is tanh or the cube,
-:math:`\rho` the identity or the absolute value (what a sensor that counts pulses makes of a speed). The sensitivities
-:math:`S_t = dx_t/d\theta` obey
+with ``k`` neurons in the state equation, ``q`` in the output's and ``o`` outputs; :math:`\sigma` is a kind of
+neuron (``sysid/kernels/neurons``), :math:`\rho` the identity or the absolute value (what a sensor that counts pulses
+makes of a speed). The sensitivities :math:`S_t = dx_t/d\theta` obey
 
 .. math::
     S_{t+1} = F_t S_t + \partial x_{t+1}/\partial\theta, \qquad
@@ -35,13 +35,12 @@ import math
 import numpy as np
 from numba import njit
 
-from sysid.kernels.registers import tanh
+from sysid.kernels.neurons.neuron import FAST
+from sysid.kernels.neurons.table import activate_with_slopes
 
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
 
-
-@njit(cache=True, nogil=True, fastmath=_FAST)
-def _activate(weights_columns, z, cubic, h, slope):
+@njit(cache=True, nogil=True, fastmath=FAST)
+def _activate(weights_columns, z, kind, h, slope):
     """Activations and their derivatives for one ``z``; neurons stand side by side in a vector register."""
     k = len(h)
     for j in range(k):
@@ -51,15 +50,7 @@ def _activate(weights_columns, z, cubic, h, slope):
         column = weights_columns[i]
         for j in range(k):
             h[j] += column[j] * value
-    if cubic:
-        for j in range(k):
-            slope[j] = 3.0 * h[j] * h[j]
-        for j in range(k):
-            h[j] = h[j] * slope[j] / 3.0
-    else:
-        tanh(h, 0, k)
-        for j in range(k):
-            slope[j] = 1.0 - h[j] * h[j]
+    activate_with_slopes(kind, h, slope)
 
 
 @njit(cache=True, nogil=True)
@@ -67,8 +58,8 @@ def _clip(value, bound_low, bound_high):
     return min(max(value, bound_low), bound_high) if not math.isnan(value) else value
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
-def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
+@njit(cache=True, nogil=True, fastmath=FAST)
+def free_run(u, x, theta, k, q, kind, rectified, bound, low, high, y):
     """Run the model, writing ``y`` and leaving in ``x`` the state after the last sample.
 
     Args:
@@ -77,7 +68,7 @@ def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
         theta: Parameters.
         k: Neurons in the state equation.
         q: Neurons in the output equation.
-        cubic: Cubes instead of tanh.
+        kind: Code of the neurons' kind.
         rectified: Whether the output is an absolute value.
         bound: Bound of each state.
         low: Lower bound of the output.
@@ -103,7 +94,7 @@ def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
             z[i] = x[i]
         for i in range(m):
             z[n + i] = u[t, i]
-        _activate(Wy, z, cubic, hy, slope_y)
+        _activate(Wy, z, kind, hy, slope_y)
         for o in range(n_y):
             total = 0.0
             for i in range(r):
@@ -113,7 +104,7 @@ def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
             if rectified:
                 total = abs(total)
             y[t, o] = _clip(total, low, high)
-        _activate(W, z, cubic, h, slope)
+        _activate(W, z, kind, h, slope)
         for i in range(n):
             new = 0.0
             for j in range(r):
@@ -123,7 +114,7 @@ def free_run(u, x, theta, k, q, cubic, rectified, bound, low, high, y):
             x[i] = _clip(new, -bound, bound)
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _output_row(row, S, z, o, sign, L, v, Wy, hy, slope, G):
     """Derivative of output ``o``, which nothing clips: through the state, and through the output's own parameters.
 
@@ -164,7 +155,7 @@ def _output_row(row, S, z, o, sign, L, v, Wy, hy, slope, G):
         row[readout + j] = sign * hy[j]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _state_row(after, S, z, i, M, V, W, h, slope):
     """Derivative of the next state ``i``, which nothing bounds; added to ``after``.
 
@@ -199,8 +190,8 @@ def _state_row(after, S, z, i, M, V, W, h, slope):
         after[at_V + i * k + o] += h[o]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
-def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J):
+@njit(cache=True, nogil=True, fastmath=FAST)
+def sensitivities(u, x, S, theta, k, q, kind, rectified, bound, low, high, y, J):
     """Outputs of some samples and their derivatives; a record is walked in blocks that hand ``x`` and ``S`` on.
 
     Args:
@@ -211,7 +202,7 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
         theta: As in :func:`free_run`.
         k: As in :func:`free_run`.
         q: As in :func:`free_run`.
-        cubic: As in :func:`free_run`.
+        kind: As in :func:`free_run`.
         rectified: As in :func:`free_run`.
         bound: As in :func:`free_run`.
         low: As in :func:`free_run`.
@@ -244,7 +235,7 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
         for i in range(m):
             z[n + i] = u[t, i]
         # the outputs
-        _activate(Wy, z, cubic, hy, slope_y)
+        _activate(Wy, z, kind, hy, slope_y)
         for o in range(n_y):
             total = 0.0
             for i in range(r):
@@ -261,7 +252,7 @@ def sensitivities(u, x, S, theta, k, q, cubic, rectified, bound, low, high, y, J
             else:
                 _output_row(row, S, z, o, sign, L, v, plain_Wy, hy, slope_y, G)
         # the state
-        _activate(W, z, cubic, h, slope)
+        _activate(W, z, kind, h, slope)
         for i in range(n):
             new = 0.0
             for j in range(r):

@@ -4,14 +4,16 @@ With the regressors :math:`x_t` (lagged inputs, then lagged outputs) one step is
 
 .. math::
     \hat y_t = \mathrm{clip}\bigl(w^T x_t + c + \textstyle\sum_k g_{t,k} h_{t,k}\bigr),
-    \qquad h_{t,k} = \tanh(W_k x_t + b_k), \qquad g_{t,k} = v_k + V_k x_t.
+    \qquad h_{t,k} = \sigma(W_k x_t + b_k), \qquad g_{t,k} = v_k + V_k x_t.
 
-Without gates :math:`V = 0`: a layer of tanh neurons and its readout. With them each neuron switches a linear function
+Without gates :math:`V = 0`: a layer of neurons of one kind (``sysid/kernels/neurons``; tanh, unless something else is
+said) and its readout. With them each neuron switches a linear function
 of the regressors on and off, which is what a valve does to a flow: the rate of a filling volume is a product, which a
 plain layer has to put together out of many neurons.
 
 In a free run the lagged outputs in :math:`x_t` are the recursion's own. Differentiating with respect to
-the parameters :math:`\theta` gives, with :math:`s_{t,k} = g_{t,k} (1 - h_{t,k}^2)`,
+the parameters :math:`\theta` gives, with :math:`s_{t,k} = g_{t,k}\,\sigma'(W_k x_t + b_k)`, which is
+:math:`g_{t,k} (1 - h_{t,k}^2)` of tanh,
 
 .. math::
     \frac{d \hat y_t}{d\theta} = \frac{\partial \hat y_t}{\partial\theta}
@@ -43,13 +45,11 @@ import math
 import numpy as np
 from numba import njit
 
-from sysid.kernels.registers import tanh
-
-# Sums may be reordered, which is what lets the compiler vectorise them; NaN and infinity keep their meaning.
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
+from sysid.kernels.neurons.neuron import FAST
+from sysid.kernels.neurons.table import activate, activate_with_slopes, slopes
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _affine(columns, constant, x, out):
     """One affine function of the regressors per neuron; neurons stand side by side in a vector register."""
     n = len(constant)
@@ -69,8 +69,8 @@ def _gates(theta, n_neurons, n_x):
     return np.ascontiguousarray(flat.reshape(n_neurons if len(flat) > 0 else 0, n_x).T)
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
-def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, low, high):
+@njit(cache=True, nogil=True, fastmath=FAST)
+def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, kind, low, high):
     """Run the recursion on its own output, writing ``y[depth:]`` in place.
 
     Args:
@@ -83,6 +83,7 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
         output_lag: Shape ``(n_output_regressors,)``.
         theta: Parameters; with or without the linear part and gates.
         n_neurons: Number of neurons.
+        kind: Code of their kind.
         low: Lower bound of the output.
         high: Upper bound of the output.
     """
@@ -110,7 +111,7 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
             for i in range(n_x):
                 total += w[i] * x[i]
         _affine(W_columns, b, x, h)
-        tanh(h, 0, n_neurons)
+        activate(kind, h, 0, n_neurons)
         if gated:
             _affine(V_columns, v, x, g)
         for k in range(n_neurons):
@@ -118,7 +119,7 @@ def free_run(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, 
         y[t] = min(max(total, low), high) if not math.isnan(total) else total
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def activations(
     u,
     y,
@@ -130,6 +131,7 @@ def activations(
     output_lag,
     theta,
     n_neurons,
+    kind,
     low,
     high,
     horizon,
@@ -150,6 +152,7 @@ def activations(
         output_lag: As in :func:`free_run`.
         theta: As in :func:`free_run`.
         n_neurons: As in :func:`free_run`.
+        kind: As in :func:`free_run`.
         low: As in :func:`free_run`.
         high: As in :func:`free_run`.
         horizon: Samples after which the run begins anew from measured output: 1 for one step ahead, ``n_steps`` or more
@@ -172,7 +175,7 @@ def activations(
     gated = V_columns.shape[1] > 0
     x = np.empty(n_x)
     g = v.copy()
-    slopes = np.empty(n_neurons)
+    slope, behind = np.empty(n_neurons), np.empty(n_neurons)
     for t in range(n_steps):
         window = depth + (t // horizon) * horizon
         for i in range(n_in):
@@ -188,7 +191,7 @@ def activations(
                 total += w[i] * x[i]
         row = h[t]
         _affine(W_columns, b, x, row)
-        tanh(row, 0, n_neurons)
+        activate_with_slopes(kind, row, slope)
         if gated:
             _affine(V_columns, v, x, g)
         # A loop that sums and writes is guarded by a check for overlapping memory, and takes another order of summation
@@ -196,12 +199,12 @@ def activations(
         for k in range(n_neurons):
             total += g[k] * row[k]
         for k in range(n_neurons):
-            slopes[k] = g[k] * (1.0 - row[k] * row[k])
+            behind[k] = g[k] * slope[k]
         for i in range(n_out):
             column = W_columns[n_in + i]
             derivative = 0.0
             for k in range(n_neurons):
-                derivative += slopes[k] * column[k]
+                derivative += behind[k] * column[k]
             if gated:
                 column = V_columns[n_in + i]
                 for k in range(n_neurons):
@@ -213,7 +216,7 @@ def activations(
         y[depth + t] = bounded
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def sensitivities(
     u,
     y,
@@ -226,6 +229,7 @@ def sensitivities(
     output_lag,
     theta,
     n_neurons,
+    kind,
     horizon,
     h,
     c,
@@ -249,6 +253,7 @@ def sensitivities(
         output_lag: As in :func:`free_run`.
         theta: As in :func:`free_run`.
         n_neurons: As in :func:`free_run`.
+        kind: As in :func:`free_run`.
         horizon: As in :func:`activations`; with 1 the rows do not depend on each other.
         h: As from :func:`activations`.
         c: As from :func:`activations`.
@@ -267,6 +272,7 @@ def sensitivities(
     gated = V_columns.shape[1] > 0
     x = np.empty(n_x)
     g = v.copy()
+    sums, slope = np.empty(n_neurons), np.empty(n_neurons)
     for r in range(n_rows):
         t = first + r
         window = (t // horizon) * horizon
@@ -281,13 +287,13 @@ def sensitivities(
             x[n_in + i] = y[depth + past] if past >= window else measured[depth + past]
         if gated:
             _affine(V_columns, v, x, g)
+        slopes(kind, theta, 0, n_neurons, x, h[t], sums, slope)
         for k in range(n_neurons):
-            z = h[t, k]
-            slope = g[k] * (1.0 - z * z)
+            z, behind = h[t, k], g[k] * slope[k]
             at = k * n_x
             for i in range(n_x):
-                row[at + i] = slope * x[i]
-            row[bias_at + k] = slope
+                row[at + i] = behind * x[i]
+            row[bias_at + k] = behind
             row[bias_at + n_neurons + k] = z
             if gated:
                 for i in range(n_x):
@@ -305,7 +311,9 @@ def sensitivities(
 
 
 @njit(cache=True, nogil=True)
-def predict(u, measured, y, steps, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, low, high):
+def predict(
+    u, measured, y, steps, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, kind, low, high
+):
     """Prediction ``steps`` ahead of every sample, writing ``y[depth:]``.
 
     Each sample is the end of a free run of ``steps`` steps that starts from measured output.
@@ -322,6 +330,7 @@ def predict(u, measured, y, steps, depth, n_steps, input_channel, input_lag, out
         output_lag: As in :func:`free_run`.
         theta: As in :func:`free_run`.
         n_neurons: As in :func:`free_run`.
+        kind: As in :func:`free_run`.
         low: As in :func:`free_run`.
         high: As in :func:`free_run`.
     """
@@ -330,5 +339,5 @@ def predict(u, measured, y, steps, depth, n_steps, input_channel, input_lag, out
         run = min(steps, t + 1)
         first = t + 1 - run
         window[:depth] = measured[first : first + depth]
-        free_run(u[first:], window, depth, run, input_channel, input_lag, output_lag, theta, n_neurons, low, high)
+        free_run(u[first:], window, depth, run, input_channel, input_lag, output_lag, theta, n_neurons, kind, low, high)
         y[depth + t] = window[depth + run - 1]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import Program
+from sysid.kernels.neurons import code_of
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
 
@@ -71,6 +72,7 @@ def program_of(
         theta=np.concatenate([member.theta for member in members]),
         theta_first=_firsts([len(member.theta) for member in members]),
         neurons=np.array([member.neurons for member in members], dtype=np.int64),
+        kinds=np.array([code_of(member.activation) for member in members], dtype=np.int64),
         regressor_first=_firsts([len(some) for some in regressors]),
         regressor_channel=_of_each(columns, regressors),
         regressor_lag=np.concatenate([member.lags.input_lag for member in members]),

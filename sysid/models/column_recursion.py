@@ -35,6 +35,7 @@ class ColumnRecursion:
         scale: Of every column, in its unit.
         low: Lower bound of the outputs in scaled numbers.
         high: Upper bound of the outputs in scaled numbers.
+        activation: The kind of its neurons.
     """
 
     lags: Lags
@@ -46,6 +47,7 @@ class ColumnRecursion:
     scale: tuple[float, ...]
     low: float
     high: float
+    activation: str
 
     @staticmethod
     def of(model: _Lowered) -> ColumnRecursion | None:

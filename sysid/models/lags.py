@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
+from sysid.models.activations import PLAIN
 
 LagSpec = int | str | Iterable[int]
 MOST = 10_000
@@ -144,12 +145,14 @@ class Lagged:
         neurons: How many, 0 for a linear map.
         linear: Whether a linear part stands beside them.
         gated: Whether each neuron is a gate.
+        activation: The kind of the neurons.
     """
 
     lags: Lags
     neurons: int = 0
     linear: bool = True
     gated: bool = False
+    activation: str = PLAIN
 
     def contains(self, other: Lagged) -> bool:
         """Whether another map is this one with some weights of zero.
@@ -173,8 +176,10 @@ class Lagged:
             and other.neurons <= self.neurons
             and other.linear <= self.linear
             and other.gated <= self.gated
+            and (other.activation == self.activation or not other.neurons)
         )
 
     def __str__(self) -> str:
         inputs, output = list(map(list, self.lags.inputs)), list(self.lags.output)
-        return f"input lags {inputs}, output lags {output}, {self.neurons}{' gated' * self.gated} neurons"
+        kind = f" {self.activation}" if self.activation != PLAIN else ""
+        return f"input lags {inputs}, output lags {output}, {self.neurons}{' gated' * self.gated}{kind} neurons"

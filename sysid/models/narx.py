@@ -1,4 +1,4 @@
-"""NARX: one tanh layer, and a linear part beside it, over past inputs and past outputs."""
+"""NARX: one layer of neurons, and a linear part beside it, over past inputs and past outputs."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
+from sysid.models.activations import PLAIN, Activation, check_activation
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.lags import MOST, Lagged, Lags, LagSpec, parse_lags, whole
 from sysid.models.mapping import Mapping
@@ -32,10 +33,13 @@ class NARX(AbstractStructure):
             for a record without input (NAR).
             Lag 0 is the direct input x(n). One such entry per input, in a list of lists, sets them apart.
         output_delays: Lags of the output, in the same forms, from 1 on.
-        neurons: Number of tanh neurons.
+        neurons: Number of neurons.
         feedthrough: A linear part from all regressors to the output beside the neurons.
-        gated: Each neuron is a gate: what it adds is not a constant but a linear function of the regressors times its
-            tanh. For flows through valves, whose rate is a product; about twice the parameters for the same neurons.
+        gated: Each neuron is a gate: what it adds is not a constant but a linear function of the regressors times what
+            it puts out. For flows through valves, whose rate is a product; about twice the parameters for the same
+            neurons.
+        activation: The kind of the neurons: ``tanh``, which saturates, or another of
+            :data:`sysid.kernels.neurons.NEURONS`.
 
     Raises:
         ConfigError: If a set of lags or the number of neurons cannot be used.
@@ -54,6 +58,7 @@ class NARX(AbstractStructure):
     neurons: Annotated[int, IntRange(low=1, high=20)]
     feedthrough: bool = True
     gated: bool = False
+    activation: Activation = PLAIN
 
     kind = "NARX"
 
@@ -65,12 +70,15 @@ class NARX(AbstractStructure):
         neurons: int,
         feedthrough: bool = True,
         gated: bool = False,
+        activation: str = PLAIN,
     ) -> None:
         object.__setattr__(self, "input_delays", _per_input(input_delays))
         object.__setattr__(self, "output_delays", parse_lags(output_delays, first=1, where="output_delays"))
         object.__setattr__(self, "neurons", neurons)
         object.__setattr__(self, "feedthrough", feedthrough)
         object.__setattr__(self, "gated", gated)
+        object.__setattr__(self, "activation", activation)
+        check_activation(activation)
         if not whole(neurons) or (neurons == 0 and not feedthrough):
             raise ConfigError(
                 "not a number of neurons",
@@ -91,11 +99,12 @@ class NARX(AbstractStructure):
     @property
     def label(self) -> str:
         """Delays and neurons as ``NARX 4/4/20``; other lag sets are written out by their ends and number."""
+        kind = " gated" * self.gated + f" {self.activation}" * (self.activation != PLAIN)
         if not self.input_delays:
-            return f"NAR {_short(self.output_delays)}/{self.neurons}{' gated' if self.gated else ''}"
+            return f"NAR {_short(self.output_delays)}/{self.neurons}{kind}"
         distinct = dict.fromkeys(self.input_delays)
         inputs = ",".join(_short(lags) for lags in distinct)
-        return f"NARX {inputs}/{_short(self.output_delays)}/{self.neurons}{' gated' if self.gated else ''}"
+        return f"NARX {inputs}/{_short(self.output_delays)}/{self.neurons}{kind}"
 
     def lags(self, n_inputs: int) -> Lags:
         """The regressors for a number of inputs.
@@ -122,17 +131,17 @@ class NARX(AbstractStructure):
 
     def lagged(self, n_inputs: int) -> Lagged:
         """Neurons over its regressors, with or without a linear part and gates."""
-        return Lagged(lags=self.lags(n_inputs), neurons=self.neurons, linear=self.feedthrough, gated=self.gated)
+        return Lagged(
+            lags=self.lags(n_inputs),
+            neurons=self.neurons,
+            linear=self.feedthrough,
+            gated=self.gated,
+            activation=self.activation,
+        )
 
     def resized(self, neurons: int) -> NARX:
         """The same delays with another number of neurons; 0 leave the linear part."""
-        return NARX(
-            input_delays=self.input_delays,
-            output_delays=self.output_delays,
-            neurons=neurons,
-            feedthrough=self.feedthrough,
-            gated=self.gated and neurons > 0,
-        )
+        return replace(self, neurons=neurons, gated=self.gated and neurons > 0)
 
     def check_inputs(self, n_inputs: int) -> None:
         """Refuse as many sets of input delays as are neither one nor one per input."""
@@ -146,7 +155,9 @@ class NARX(AbstractStructure):
             "output_delays": list(self.output_delays),
             "neurons": self.neurons,
             "feedthrough": self.feedthrough,
-            **({"gated": True} if self.gated else {}),  # absent without, so that older files keep their digest
+            # Absent where they are the plain ones, so that older files keep their digest.
+            **({"gated": True} if self.gated else {}),
+            **({"activation": self.activation} if self.activation != PLAIN else {}),
         }
 
 
@@ -223,6 +234,7 @@ class NARXModel(AbstractModel):
             scaling=self.scaling,
             low=-self.clamp,
             high=self.clamp,
+            activation=self.network.activation,
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.kernels import neural_state_space as kernel
+from sysid.kernels.neurons import code_of
+from sysid.models.activations import PLAIN
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
 from sysid.models.scaling import Scaling, VectorScaling
@@ -128,7 +130,7 @@ class NeuralForm(AbstractForm):
         sizes: States, inputs, neurons.
         theta: Flat parameters.
         scaling: Between units and scaled numbers; one of several outputs makes arrays of outputs have columns.
-        cubic: Cubes instead of tanh.
+        activation: The kind of its neurons.
         rectified: The outputs are absolute values.
         bound: Bound of each state.
         low: Lower bound of the outputs in scaled numbers.
@@ -138,7 +140,7 @@ class NeuralForm(AbstractForm):
     sizes: Sizes
     theta: NDArray[np.float64]
     scaling: Scaling | VectorScaling
-    cubic: bool = False
+    activation: str = PLAIN
     rectified: bool = False
     bound: float = STATE_BOUND
     low: float = -np.inf
@@ -312,7 +314,8 @@ class NeuralForm(AbstractForm):
             Parameters, sizes, flags and bounds.
         """
         s = self.sizes
-        return (theta, s.neurons, s.output_neurons, self.cubic, self.rectified, self.bound, self.low, self.high)
+        kind = code_of(self.activation)
+        return (theta, s.neurons, s.output_neurons, kind, self.rectified, self.bound, self.low, self.high)
 
     def scaled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Inputs in the model's numbers.

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
+from sysid.models.activations import PLAIN, Activation, check_activation
 from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
 from sysid.models.history import History
 from sysid.models.lags import whole
@@ -20,7 +21,6 @@ from sysid.models.narx import CLAMP
 from sysid.models.neural_form import NeuralForm, Sizes
 from sysid.models.scaling import Scaling, VectorScaling
 
-ACTIVATIONS = ("tanh", "cubic")
 OUTPUTS = ("plain", "absolute")
 MOST_UNITS = 1_000
 """States or neurons: their product is a matrix."""
@@ -34,8 +34,8 @@ class NeuralStateSpace(AbstractStructure):
         states: Number of hidden states.
         neurons: Neurons in ``f``; 0 for a linear state equation.
         output_neurons: Neurons in ``g``; 0 for a linear output.
-        activation: ``tanh``, which saturates, or ``cubic``, the cube of each neuron's sum, which goes on growing beyond
-            the training range as springs do that stiffen.
+        activation: The kind of the neurons: ``tanh``, which saturates, ``cubic``, which goes on growing beyond the
+            training range as springs do that stiffen, or another of :data:`sysid.kernels.neurons.NEURONS`.
         output: ``plain``, or ``absolute`` for a sensor that cannot tell a sign.
 
     Raises:
@@ -49,7 +49,7 @@ class NeuralStateSpace(AbstractStructure):
     states: int
     neurons: int
     output_neurons: int = 0
-    activation: str = "tanh"
+    activation: Activation = PLAIN
     output: str = "plain"
 
     kind = "NSS"
@@ -65,21 +65,21 @@ class NeuralStateSpace(AbstractStructure):
                     got=shortened(value),
                     remedy="write for example {kind: NSS, states: 2, neurons: 10}",
                 )
-        for name, choices in (("activation", ACTIVATIONS), ("output", OUTPUTS)):
-            if getattr(self, name) not in choices:
-                raise ConfigError(
-                    f"unknown {name}",
-                    where=name,
-                    expected=" or ".join(choices),
-                    got=shortened(getattr(self, name)),
-                    remedy=f"write for example {name}: {choices[0]}",
-                )
+        check_activation(self.activation)
+        if self.output not in OUTPUTS:
+            raise ConfigError(
+                "unknown output",
+                where="output",
+                expected=" or ".join(OUTPUTS),
+                got=shortened(self.output),
+                remedy=f"write for example output: {OUTPUTS[0]}",
+            )
 
     @property
     def label(self) -> str:
         """States and neurons as ``NSS 2/10``, with the output's neurons and what is not the default."""
         numbers = [self.states, self.neurons, *([self.output_neurons] if self.output_neurons else [])]
-        words = [self.activation] * (self.activation != "tanh") + [self.output] * (self.output != "plain")
+        words = [self.activation] * (self.activation != PLAIN) + [self.output] * (self.output != "plain")
         return " ".join([self.kind, "/".join(str(number) for number in numbers), *words])
 
     def for_outputs(self, n_outputs: int) -> NeuralStateSpace:
@@ -168,7 +168,7 @@ class _NeuralModel(AbstractModel):
             sizes=self.network.sizes(len(self.mapping.inputs), len(self.mapping.outputs)),
             theta=self.theta,
             scaling=self.scaling,
-            cubic=self.network.activation == "cubic",
+            activation=self.network.activation,
             rectified=self.network.output == "absolute",
             low=-self.clamp,
             high=self.clamp,

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.kernels import recursion as kernel
+from sysid.kernels.neurons import code_of
+from sysid.models.activations import PLAIN
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import read_now
 from sysid.models.form import AbstractForm
@@ -23,7 +25,7 @@ def parameter_count(lags: Lags, neurons: int, *, linear: bool, gated: bool = Fal
 
     Args:
         lags: The regressors.
-        neurons: Number of tanh neurons.
+        neurons: Number of neurons.
         linear: Whether there is a linear part beside them.
         gated: Whether each neuron has a gate; with a linear part only.
 
@@ -36,19 +38,20 @@ def parameter_count(lags: Lags, neurons: int, *, linear: bool, gated: bool = Fal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recursion(AbstractForm):
-    r"""A tanh layer and a linear part over lagged regressors, scaling included.
+    r"""A layer of neurons and a linear part over lagged regressors, scaling included.
 
-    In scaled numbers :math:`\hat y_t = \mathrm{clip}(w^T x_t + c + \sum_k (v_k + V_k x_t) \tanh(W_k x_t + b_k))`, with
-    :math:`V = 0` where there are no gates; the kernel's docstring has the derivation. Exporters read this form, so that
-    what runs elsewhere is what was fitted.
+    In scaled numbers :math:`\hat y_t = \mathrm{clip}(w^T x_t + c + \sum_k (v_k + V_k x_t)\,\sigma(W_k x_t + b_k))`,
+    with :math:`V = 0` where there are no gates; the kernel's docstring has the derivation. Exporters read this form, so
+    that what runs elsewhere is what was fitted.
 
     Args:
         lags: The regressors.
-        neurons: Number of tanh neurons; 0 for a linear model.
+        neurons: Number of neurons; 0 for a linear model.
         theta: Flat parameters ``[W | b | v | c | w | V]``, with or without ``V``, or ``w`` and ``V``.
         scaling: Between units and scaled numbers.
         low: Lower bound of the output in scaled numbers; ``-inf`` for none.
         high: Upper bound of the output in scaled numbers; ``inf`` for none.
+        activation: The kind of its neurons, :math:`\sigma`.
     """
 
     lags: Lags
@@ -57,6 +60,7 @@ class Recursion(AbstractForm):
     scaling: Scaling
     low: float = -np.inf
     high: float = np.inf
+    activation: str = PLAIN
 
     def __post_init__(self) -> None:
         theta = np.array(self.theta, dtype=np.float64)
@@ -128,6 +132,7 @@ class Recursion(AbstractForm):
             scale=(*self.scaling.input_scale, self.scaling.output_scale),
             low=self.low,
             high=self.high,
+            activation=self.activation,
         )
 
     def extended(
@@ -240,7 +245,7 @@ class Recursion(AbstractForm):
     def _arguments(self, n_steps: int) -> tuple[object, ...]:
         lags = self.lags
         tables = (lags.input_channel, lags.input_lag, lags.output_lag)
-        return (lags.depth, n_steps, *tables, self.theta, self.neurons, self.low, self.high)
+        return (lags.depth, n_steps, *tables, self.theta, self.neurons, code_of(self.activation), self.low, self.high)
 
 
 STEPS, APART = 12, 1e-5

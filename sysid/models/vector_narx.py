@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
+from sysid.models.activations import PLAIN, Activation
 from sysid.models.base import AbstractStructure, SeveralOutputs
 from sysid.models.history import History
 from sysid.models.lags import Lags, LagSpec
@@ -32,8 +33,9 @@ class VectorNARX(AbstractStructure):
     Args:
         input_delays: Lags of the inputs, as in :class:`~sysid.models.NARX`.
         output_delays: Lags of the outputs in the same forms, from 1 on; one set for all, or a list of one per output.
-        neurons: Number of tanh neurons.
+        neurons: Number of neurons.
         feedthrough: A linear part from all regressors to the outputs beside the neurons.
+        activation: The kind of the neurons, as in :class:`~sysid.models.NARX`.
 
     Raises:
         ConfigError: If a set of lags or the number of neurons cannot be used.
@@ -49,6 +51,7 @@ class VectorNARX(AbstractStructure):
     output_delays: tuple[tuple[int, ...], ...]
     neurons: int
     feedthrough: bool = True
+    activation: Activation = PLAIN
 
     kind = "VectorNARX"
     several_outputs = True
@@ -60,18 +63,26 @@ class VectorNARX(AbstractStructure):
         output_delays: LagSpec | Iterable[LagSpec],
         neurons: int,
         feedthrough: bool = True,
+        activation: str = PLAIN,
     ) -> None:
         several = not isinstance(output_delays, (int, str)) and not all(isinstance(e, int) for e in output_delays)
         sets = list(output_delays) if several and not isinstance(output_delays, int) else [output_delays]
         # Each set goes through the structure of one output, which checks it and the neurons.
         parts = [
-            NARX(input_delays=input_delays, output_delays=one, neurons=neurons, feedthrough=feedthrough)  # type: ignore[arg-type]  # checked there
+            NARX(
+                input_delays=input_delays,
+                output_delays=one,  # type: ignore[arg-type]  # checked there
+                neurons=neurons,
+                feedthrough=feedthrough,
+                activation=activation,
+            )
             for one in sets
         ]
         object.__setattr__(self, "input_delays", parts[0].input_delays)
         object.__setattr__(self, "output_delays", tuple(part.output_delays for part in parts))
         object.__setattr__(self, "neurons", neurons)
         object.__setattr__(self, "feedthrough", feedthrough)
+        object.__setattr__(self, "activation", activation)
 
     @property
     def label(self) -> str:
@@ -80,7 +91,8 @@ class VectorNARX(AbstractStructure):
             NARX(input_delays=self.input_delays, output_delays=one, neurons=self.neurons).label.split(" ")[1]
             for one in self.output_delays
         )
-        return f"{self.kind} {', '.join(labels)}"
+        word = f" {self.activation}" * (self.activation != PLAIN)
+        return f"{self.kind} {', '.join(labels)}{word}"
 
     def resized(self, neurons: int) -> VectorNARX:
         """The same structure with another number of neurons."""
@@ -135,6 +147,7 @@ class VectorNARX(AbstractStructure):
             "output_delays": [list(lags) for lags in self.output_delays],
             "neurons": self.neurons,
             "feedthrough": self.feedthrough,
+            **({"activation": self.activation} if self.activation != PLAIN else {}),
         }
 
 
@@ -142,7 +155,7 @@ class VectorNARX(AbstractStructure):
 class VectorNARXModel(SeveralOutputs):
     r"""A fitted network with several outputs.
 
-    In scaled numbers :math:`\hat y_t = \mathrm{clip}(w x_t + c + V \tanh(W x_t + b))` with one row of :math:`w` and
+    In scaled numbers :math:`\hat y_t = \mathrm{clip}(w x_t + c + V\,\sigma(W x_t + b))` with one row of :math:`w` and
     :math:`V` for each output, and the past of all outputs in :math:`x_t`.
 
     Args:
@@ -212,6 +225,7 @@ class VectorNARXModel(SeveralOutputs):
             scaling=self.scaling,
             low=-self.clamp,
             high=self.clamp,
+            activation=self.network.activation,
         )
 
     def with_theta(self, theta: NDArray[np.float64]) -> VectorNARXModel:

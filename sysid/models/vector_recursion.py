@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from sysid.errors import TraceError
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import Program
+from sysid.kernels.neurons import NEURONS
+from sysid.models.activations import PLAIN
 from sysid.models.cascade_program import program_of
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends, read_now
@@ -25,17 +27,18 @@ _NOTHING = np.empty((0, 0))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VectorRecursion(AbstractForm):
-    r""":math:`\hat y_t = \mathrm{clip}(w x_t + c + V \tanh(W x_t + b))` over lagged inputs and outputs.
+    r""":math:`\hat y_t = \mathrm{clip}(w x_t + c + V\,\sigma(W x_t + b))` over lagged inputs and outputs.
 
     Args:
         lags: Lags of every input and then of every output, as ``inputs``; ``output`` is empty.
         n_outputs: How many of these columns are outputs.
-        neurons: Number of tanh neurons.
+        neurons: Number of neurons.
         theta: Flat parameters ``[W | b | V | c | w]``.
         linear: Whether there is a linear part ``w``.
         scaling: Between units and scaled numbers.
         low: Lower bound of the outputs in scaled numbers; ``-inf`` for none.
         high: Upper bound of the outputs in scaled numbers; ``inf`` for none.
+        activation: The kind of its neurons, :math:`\sigma`.
     """
 
     lags: Lags
@@ -46,6 +49,7 @@ class VectorRecursion(AbstractForm):
     scaling: VectorScaling
     low: float = -np.inf
     high: float = np.inf
+    activation: str = PLAIN
 
     @property
     def n_inputs(self) -> int:
@@ -85,6 +89,7 @@ class VectorRecursion(AbstractForm):
             scale=(*scaling.input_scale, *scaling.output_scale),
             low=self.low,
             high=self.high,
+            activation=self.activation,
         )
 
     @cached_property
@@ -165,7 +170,8 @@ class VectorRecursion(AbstractForm):
         """Scaled outputs of rows of regressors."""
         k, r, p = self.neurons, x.shape[1], self.n_outputs
         W, b, V, c, w = np.split(self.theta, np.cumsum([k * r, k, p * k, p]))
-        y = np.tanh(x @ W.reshape(k, r).T + b) @ V.reshape(p, k).T + c
+        h = NEURONS[self.activation].value(x @ W.reshape(k, r).T + b)
+        y = h @ V.reshape(p, k).T + c
         return np.clip(y + x @ w.reshape(p, r).T if self.linear else y, self.low, self.high)
 
     def _walk(self, room: NDArray[np.float64], past: int) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
+from sysid.kernels.neurons import NEURONS
 from sysid.models import ARX, NARX, AbstractModel, ARXModel, Mapping, NARXModel, Scaling, parameter_count
 
 MAPPINGS = {1: "BP -> BC", 2: "BP+AR -> BC"}
@@ -76,7 +78,12 @@ MODELS: dict[str, Callable[[], AbstractModel]] = {
     "NARX against its bounds": lambda: build_narx(
         NARX(input_delays=2, output_delays=2, neurons=8), clamp=0.1, gain=3.0, seed=5
     ),
-    "NARX, gates": lambda: build_narx(NARX(input_delays="0:1", output_delays=1, neurons=6, gated=True)),
+    **{
+        f"NARX, gates of {kind}": partial(
+            build_narx, NARX(input_delays="0:1", output_delays=1, neurons=6, gated=True, activation=kind)
+        )
+        for kind in NEURONS
+    },
     "NARX, gates, sparse lags": lambda: build_narx(
         NARX(input_delays=[[0], [1, 2, 5]], output_delays=[2, 3], neurons=4, gated=True)
     ),

@@ -25,7 +25,7 @@ def program(name: str) -> Program:
 def test_members_that_do_not_read_each_other_at_the_same_sample_are_of_one_level():
     layout = laid_out(program("the emergency reservoir too"))  # STP -> BP, BP -> ER, BP+ER -> AR, BP+AR+ER -> BC
     assert_array_equal(layout.level_first_y, [0, 2, 3, 4])  # ER reads the pipe of two samples ago
-    assert_array_equal(layout.tanh_first, [0, 8 + 16, 32, 40])
+    assert_array_equal(layout.neurons_first, [0, 8 + 16, 32, 40])
 
     circle = laid_out(program("a circle through the past"))  # the pipe reads what is behind it a sample later
     assert_array_equal(circle.level_first_y, [0, 1, 2, 3])

@@ -7,13 +7,13 @@ from numpy.testing import assert_allclose
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.provider import BLOCK
+from sysid.kernels.neurons import NEURONS
 from sysid.models import History, NeuralForm, NeuralStateSpace, Scaling, VectorNeuralStateSpace, VectorScaling
 from sysid.testing import finite_difference_jacobian, run_neural
 
 STRUCTURES = [
-    pytest.param(NeuralStateSpace(states=2, neurons=5), id="tanh"),
+    *(pytest.param(NeuralStateSpace(states=2, neurons=5, activation=kind), id=kind) for kind in NEURONS),
     pytest.param(NeuralStateSpace(states=3, neurons=4, output_neurons=2), id="neurons in the output"),
-    pytest.param(NeuralStateSpace(states=2, neurons=3, activation="cubic"), id="cubic"),
     pytest.param(NeuralStateSpace(states=2, neurons=3, output_neurons=2, output="absolute"), id="absolute output"),
     pytest.param(NeuralStateSpace(states=1, neurons=0), id="linear"),
     pytest.param(VectorNeuralStateSpace(states=3, neurons=4), id="three outputs"),
@@ -31,7 +31,7 @@ def a_form(network: NeuralStateSpace, *, seed: int = 0, size: float = 0.3, **bou
         sizes=sizes,
         theta=size * np.random.default_rng(seed).standard_normal(sizes.count),
         scaling=VectorScaling.of([Scaling.identity(2)] * n_outputs) if n_outputs > 1 else Scaling.identity(2),
-        cubic=network.activation == "cubic",
+        activation=network.activation,
         rectified=network.output == "absolute",
         **bounds,
     )

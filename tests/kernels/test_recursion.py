@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.provider import BLOCK, RecursionProvider
+from sysid.kernels.neurons import NEURONS
 from sysid.models import NARX, History, Recursion, Scaling, parameter_count
 from sysid.testing import finite_difference_jacobian, simulate
 
@@ -22,6 +23,7 @@ def a_provider(
         scaling=Scaling.identity(2),
         low=-3.0,
         high=3.0,
+        activation=network.activation,
     )
     experiments = [
         Experiment(
@@ -52,7 +54,14 @@ STRUCTURES = [
     pytest.param(NARX(input_delays=[1, 7], output_delays=[2, 5], neurons=4), id="sparse lags"),
     pytest.param(NARX(input_delays=2, output_delays=2, neurons=3, feedthrough=False), id="without feed-through"),
     pytest.param(NARX(input_delays=2, output_delays=3, neurons=0), id="linear"),
-    pytest.param(NARX(input_delays="0:1", output_delays=[1, 3], neurons=3, gated=True), id="gates"),
+    *(
+        pytest.param(
+            NARX(input_delays="0:1", output_delays=[1, 3], neurons=3, gated=gated, activation=kind),
+            id=f"{kind}{' gates' * gated}",
+        )
+        for kind in NEURONS
+        for gated in (False, True)
+    ),
 ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sysid.kernels.neurons import NEURONS
 from sysid.models import (
     ARX,
     NARX,
@@ -23,12 +24,22 @@ RESTS = {"BP": 90.0, "AR": 90.0, "ER": 90.0, "BC": 0.0, "x": 0.0, "y": 0.0}
 
 
 def network(
-    text: str, *, seed: int = 0, neurons: int = 3, inputs=(0, 1, 3), outputs=(1, 2), spread: float = 0.3, gated=False
+    text: str,
+    *,
+    seed: int = 0,
+    neurons: int = 3,
+    inputs=(0, 1, 3),
+    outputs=(1, 2),
+    spread: float = 0.3,
+    gated=False,
+    activation="tanh",
 ) -> NARXModel:
     """One network of a cascade."""
     mapping, structure = (
         Mapping.parse(text),
-        NARX(input_delays=list(inputs), output_delays=list(outputs), neurons=neurons, gated=gated),
+        NARX(
+            input_delays=list(inputs), output_delays=list(outputs), neurons=neurons, gated=gated, activation=activation
+        ),
     )
     n = len(mapping.inputs)
     count = parameter_count(structure.lags(n), neurons, linear=True, gated=gated)
@@ -80,11 +91,23 @@ def at_most(text: str, *, above: float) -> ARXModel:
 
 
 def block(
-    text: str, *, seed: int = 0, neurons: int = 4, output_delays=(1, 2), feedthrough: bool = True
+    text: str,
+    *,
+    seed: int = 0,
+    neurons: int = 4,
+    output_delays=(1, 2),
+    feedthrough: bool = True,
+    activation="tanh",
 ) -> VectorNARXModel:
     """One network for several reservoirs."""
     mapping = Mapping.parse(text)
-    structure = VectorNARX(input_delays=[0, 2], output_delays=output_delays, neurons=neurons, feedthrough=feedthrough)
+    structure = VectorNARX(
+        input_delays=[0, 2],
+        output_delays=output_delays,
+        neurons=neurons,
+        feedthrough=feedthrough,
+        activation=activation,
+    )
     n, m = len(mapping.inputs), len(mapping.outputs)
     return VectorNARXModel(
         network=structure,
@@ -146,6 +169,16 @@ CASCADES = {
             network("BP+AR -> BC", seed=3, gated=True, spread=0.2),
         )
     ),
+    **{
+        f"{kind} beside tanh": Cascade(
+            models=(
+                network("STP -> BP", seed=1, activation=kind), network("STP -> x", seed=6, neurons=9),
+                block("BP+x -> AR+ER", seed=2, activation=kind),
+                network("BP+AR -> BC", seed=3, gated=True, spread=0.2, activation=kind),
+            )
+        )
+        for kind in NEURONS
+    },
     "no neurons": Cascade(models=(network("STP -> BP", neurons=0, spread=0.15), linear("STP+BP -> BC"))),
 }  # fmt: skip
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError, TraceError
+from sysid.kernels.neurons import NEURONS
 from sysid.models import (
     History,
     Mapping,
@@ -38,8 +39,10 @@ def signals(n: int = 200) -> np.ndarray:
 
 
 STRUCTURES = [
-    pytest.param(NeuralStateSpace(states=2, neurons=5), id="tanh"),
-    pytest.param(NeuralStateSpace(states=2, neurons=3, output_neurons=2, activation="cubic"), id="cubic"),
+    *(
+        pytest.param(NeuralStateSpace(states=2, neurons=3, output_neurons=2, activation=kind), id=kind)
+        for kind in NEURONS
+    ),
     pytest.param(NeuralStateSpace(states=3, neurons=2, output="absolute"), id="absolute"),
 ]
 

@@ -34,6 +34,7 @@ from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.estimation.networks.provider import BLOCK
+from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import NARXModel
 
 SMOOTHEST, SHARPEST = 0.7, 100.0
@@ -55,11 +56,13 @@ class StepSamples(AbstractProvider):
         layout: Where the parameters stand; with a linear part.
         regressors: In the basis, shape ``(n_samples, n_regressors)``.
         target: Scaled output, shape ``(n_samples,)``.
+        neuron: The kind of the neurons.
     """
 
     layout: Layout
     regressors: NDArray[np.float64]
     target: NDArray[np.float64]
+    neuron: Neuron
     n_samples: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -104,6 +107,7 @@ class StepSamples(AbstractProvider):
             layout=layout,
             regressors=np.ascontiguousarray(regressors[chosen]),
             target=np.concatenate(targets)[chosen],
+            neuron=NEURONS[template.network.activation],
         )
 
     def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -158,16 +162,17 @@ class StepSamples(AbstractProvider):
         layout, x = self.layout, self.regressors[rows]
         k, r = layout.neurons, x.shape[1]
         affine = theta[layout.affine]
-        h = np.tanh(x @ theta[: k * r].reshape(k, r).T + theta[k * r : k * (r + 1)])
+        sums = x @ theta[: k * r].reshape(k, r).T + theta[k * r : k * (r + 1)]
+        h = self.neuron.value(sums)
         g = np.broadcast_to(theta[layout.readout], h.shape)
         if layout.gated:
             g = g + x @ theta[layout.gates].reshape(k, r).T
-        return _Pass(x, h, g, np.sum(g * h, axis=1) + affine[0] + x @ affine[1:] - self.target[rows])
+        return _Pass(x, sums, h, g, np.sum(g * h, axis=1) + affine[0] + x @ affine[1:] - self.target[rows])
 
     def _jacobian(self, passed: _Pass, n_parameters: int) -> NDArray[np.float64]:
         layout, x, h = self.layout, passed.x, passed.h
         k, r = layout.neurons, x.shape[1]
-        slopes = (1.0 - h * h) * passed.g
+        slopes = self.neuron.slope(passed.sums) * passed.g
         J = np.empty((len(x), n_parameters))
         J[:, : k * r] = (slopes[:, :, None] * x[:, None, :]).reshape(len(x), -1)
         J[:, k * r : k * (r + 1)] = slopes
@@ -181,9 +186,10 @@ class StepSamples(AbstractProvider):
 
 @dataclass(frozen=True, eq=False)
 class _Pass:
-    """Some samples: regressors, activations, what stands before each activation, residuals."""
+    """Some samples: regressors, their sums, activations, what stands before each activation, residuals."""
 
     x: NDArray[np.float64]
+    sums: NDArray[np.float64]
     h: NDArray[np.float64]
     g: NDArray[np.float64]
     residual: NDArray[np.float64]

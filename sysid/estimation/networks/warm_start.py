@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.networks.initialise import Layout
-from sysid.models import NARX, AbstractStructure, Lags, NARXModel, Recursion, Scaling
+from sysid.models import AbstractStructure, Lags, NARXModel, Recursion, Scaling
 
 
 def contains(larger: Lags, smaller: Lags) -> bool:
@@ -90,12 +90,14 @@ def grown(source: Recursion, template: Recursion, fresh: NDArray[np.float64]) ->
         or source.neurons > template.neurons
         or (not linear and bool(np.any(source.linear)))
         or (template.gates is None and source.gates is not None)
+        or (source.neurons > 0 and source.activation != template.activation)
     ):
         raise ConfigError(
             "the initial fit is not contained in the network that is to start from it",
             where="initial",
-            expected=f"lags among {template.lags.inputs} and {template.lags.output}, up to {template.neurons} neurons",
-            got=f"lags {source.lags.inputs} and {source.lags.output}, {source.neurons} neurons",
+            expected=f"lags among {template.lags.inputs} and {template.lags.output}, up to {template.neurons} neurons "
+            f"({template.activation})",
+            got=f"lags {source.lags.inputs} and {source.lags.output}, {source.neurons} neurons ({source.activation})",
             remedy="start from a smaller network over the same lags or some of them, or leave initial out",
         )
     small = _in_scaling(source, template.scaling)
@@ -153,13 +155,7 @@ def widened(model: NARXModel, reads: Dict[str, tuple[int, ...]], sources: Dict[s
         input_scale=(*model.scaling.input_scale, *(source.scaling.output_scale for source in new)),
     )
     before = replace(model.recursion, lags=replace(lags, inputs=(*lags.inputs, *(() for _ in new))), scaling=scaling)
-    network = NARX(
-        input_delays=(*lags.inputs, *reads.values()),
-        output_delays=lags.output,
-        neurons=model.network.neurons,
-        feedthrough=model.network.feedthrough,
-        gated=model.network.gated,
-    )
+    network = replace(model.network, input_delays=(*lags.inputs, *reads.values()))
     wider = replace(
         model,
         network=network,

@@ -14,12 +14,13 @@ from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.pretraining import SHARPEST, SMOOTHEST, StepSamples, space_filling
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.kernels.neurons import NEURONS
 from sysid.models import NARX, History, Mapping, NARXModel, Scaling
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace
 
 NETWORK = NARX(input_delays=[0, 2], output_delays=[1, 2], neurons=4)
-GATED = NARX(input_delays=[0, 2], output_delays=[1, 2], neurons=4, gated=True)
+GATED = replace(NETWORK, gated=True)
 LAYOUT = Layout.of(NETWORK, 1)
 
 
@@ -48,8 +49,10 @@ def all_samples(basis: RegressorBasis, *records: Experiment, network: NARX = NET
     return StepSamples.of(model(network), records, Layout.of(network, 1), basis, samples=10_000, seed=0)
 
 
-@pytest.mark.parametrize("network", [NETWORK, GATED], ids=["tanh neurons", "gates"])
-def test_on_all_samples_it_is_the_open_loop(network: NARX):
+@pytest.mark.parametrize("kind", NEURONS)
+@pytest.mark.parametrize("gated", [False, True], ids=["plain", "gates"])
+def test_on_all_samples_it_is_the_open_loop(gated: bool, kind: str):
+    network = replace(NETWORK, gated=gated, activation=kind)
     layout = Layout.of(network, 1)
     records = (experiment(), experiment(50, 1))
     basis = RegressorBasis.incremental(LAYOUT.lags, np.random.default_rng(0).standard_normal((50, 4)))
@@ -106,7 +109,8 @@ def test_few_samples_are_all_taken():
 def test_a_start_has_neurons_of_every_sharpness_that_switch_where_samples_are():
     network = NARX(input_delays=[0, 2], output_delays=[1, 2], neurons=200)
     layout = Layout(lags=network.lags(1), neurons=200, linear=True)
-    one = StepSamples(layout=layout, regressors=np.random.default_rng(0).uniform(-1, 1, (50, 4)), target=np.zeros(50))
+    x = np.random.default_rng(0).uniform(-1, 1, (50, 4))
+    one = StepSamples(layout=layout, regressors=x, target=np.zeros(50), neuron=NEURONS["tanh"])
     theta = one.draw(np.random.default_rng(1), layout.centre())
     weights, biases = theta[:800].reshape(200, 4), theta[800:1000]
     lengths = np.linalg.norm(weights, axis=1)

@@ -97,8 +97,12 @@ def test_a_network_begins_with_the_error_of_the_linear_model_it_is_given() -> No
 
 @pytest.mark.parametrize(
     "network",
-    [NARX(input_delays=1, output_delays=2, neurons=4), NARX(input_delays=2, output_delays=2, neurons=1)],
-    ids=["fewer lags", "fewer neurons"],
+    [
+        NARX(input_delays=1, output_delays=2, neurons=4),
+        NARX(input_delays=2, output_delays=2, neurons=1),
+        NARX(input_delays=2, output_delays=2, neurons=4, activation="cubic"),
+    ],
+    ids=["fewer lags", "fewer neurons", "neurons of another kind"],
 )
 def test_what_does_not_contain_the_initial_fit_is_refused(network: NARX) -> None:
     trace, training = record(), Training(loop="open", max_iterations=1)

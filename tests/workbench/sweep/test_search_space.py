@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.kernels.neurons import NEURONS
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.search_space import parse_space
 from sysid.yaml_files import check
@@ -57,6 +58,10 @@ SPACES = {
             {"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": {"among": [2, 4]}},
         ],
         ["ARX [1; 1 1; 1 1]", "ARX [2; 1 1; 1 1]", "NARX 1/1/2", "NARX 1/1/4"],
+    ),
+    "kinds of neurons, all of them": (
+        [{"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": 2, "activation": "range"}],
+        ["NARX 1/1/2", *(f"NARX 1/1/2 {kind}" for kind in NEURONS if kind != "tanh")],
     ),
     "one point twice": (
         [{"kind": "NARX", "input_delays": {"among": [2, "1:2"]}, "output_delays": 1, "neurons": 1}],
