@@ -38,6 +38,7 @@ class Wanted:
         start: Seconds, in the file's time: what is before is cut off.
         stop: Seconds, in the file's time: what is after is cut off.
         fixed: Whether the sample time is somebody else's, a model's, and cannot be changed.
+        timing: The survey of the file's stamps, where the sample time was taken from it.
     """
 
     name: str
@@ -47,6 +48,14 @@ class Wanted:
     start: float | None = None
     stop: float | None = None
     fixed: bool = False
+    timing: Timing | None = None
+
+    def survey(self, stamps: NDArray[np.float64], *, longest_step: float | None) -> Timing:
+        """The survey of stamps; the one that there is where they are all of the file's, in order as they were."""
+        known = self.timing
+        if known is not None and known.in_order and known.samples == len(stamps) and longest_step is None:
+            return known
+        return survey(stamps, longest_step=longest_step)
 
 
 def assemble(
@@ -291,7 +300,7 @@ def _cut(record: Record, wanted: Wanted) -> Record:
 def _onto_grid(record: Record, wanted: Wanted, grid: GridOptions, repairs: RepairOptions) -> tuple[Gridded, Record]:
     stamps, sample_time = record.stamps, wanted.sample_time
     start = float(stamps[0])
-    timing = survey(stamps, longest_step=grid.longest_step)
+    timing = wanted.survey(stamps, longest_step=grid.longest_step)
     if len(timing.gaps) and repairs.gaps is None:
         raise _gap_error(record, timing)
     _check_span(record, wanted)

@@ -14,7 +14,7 @@ from sysid.ingest.assemble import Wanted, assemble, stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions
 from sysid.ingest.readers import READERS, choose_reader, read_with
 from sysid.ingest.table import RawTable
-from sysid.ingest.timing import even_step, round_step, survey
+from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
 
@@ -82,11 +82,9 @@ def read_trace(
         own = _as_written(table)
         if own is not None:
             return own
-    wanted = Wanted(
-        name=name or path.stem,
-        channels=tuple(channels) if channels is not None else _all_channels(table, files),
-        sample_time=sample_time if sample_time is not None else _step(table, files, grid),
-    )
+    chosen = tuple(channels) if channels is not None else _all_channels(table, files)
+    step, timing = (sample_time, None) if sample_time is not None else _step(table, files, grid)
+    wanted = Wanted(name=name or path.stem, channels=chosen, sample_time=step, timing=timing)
     held = [table]
     del table  # given away: what assembles it lets go of columns that it no longer needs, and they may be large
     return assemble(held.pop(), wanted, files=files, grid=grid, repairs=repairs)
@@ -143,13 +141,14 @@ def _all_channels(table: RawTable, files: FileOptions) -> tuple[Channel, ...]:
     return tuple(channels)
 
 
-def _step(table: RawTable, files: FileOptions, grid: GridOptions) -> float:
+def _step(table: RawTable, files: FileOptions, grid: GridOptions) -> tuple[float, Timing | None]:
+    """The sample time that the stamps have, and their survey where there was one."""
     if table.step is not None and table.time is None and files.time.column is None:
-        return table.step
+        return table.step, None
     stamps = stamps_in_seconds(table, files)
     stamps = stamps[np.isfinite(stamps)]
     timing = survey(stamps) if len(stamps) else None
     if timing is None or not timing.step > 0.0:
-        return 1.0  # no steps at all: the checks on the record say what is wrong with it
+        return 1.0, None  # no steps at all: the checks on the record say what is wrong with it
     even = even_step(stamps, timing, tolerance=grid.tolerance) if timing.in_order else None
-    return round_step(timing.step) if even is None else even
+    return round_step(timing.step) if even is None else even, timing

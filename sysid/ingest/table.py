@@ -253,9 +253,9 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
     named = [column for column in columns if _is_called_time(column.name)]
     # A capital T may be a temperature: only where nothing else is called time, and it rises.
     plain = [column for column in named if re.split(r"[/.]", column.name.strip())[-1] != "T"]
-    alone = [column for column in named if _may_be_clock(column)]
-    if plain or alone:
-        return (plain or alone)[0].name
+    found = next(iter(plain), None) or next((column for column in named if _may_be_clock(column)), None)
+    if found is not None:
+        return found.name
     timed = [column.name for column in columns if column.unit is not None and time_unit(column.unit) in _TIME_UNITS]
     return timed[0] if timed else None
 
@@ -263,8 +263,8 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
 def _may_be_clock(column: RawColumn) -> bool:
     if column.unit is not None and time_unit(column.unit) not in _TIME_UNITS:
         return False
-    steps = np.diff(column.values)
-    return not len(steps) or bool(np.mean(steps > 0.0) > 0.9)
+    rises = column.values[1:] > column.values[:-1]
+    return not len(rises) or bool(rises.mean() > 0.9)
 
 
 def _is_called_time(name: str) -> bool:

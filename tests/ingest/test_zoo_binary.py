@@ -184,6 +184,8 @@ ZOO: dict[str, tuple[str, Maker, Columns, Cases]] = {
     "Parquet": ("a.parquet", arrow("parquet"), ("u", "y"), ONE),
     "Feather": ("a.feather", arrow("feather"), ("u", "y"), ONE),
     "Arrow stream": ("a.arrow", arrow("stream"), ("u", "y"), ONE),
+    "Feather by content": ("a.dat", arrow("feather"), ("u", "y"), ONE),
+    "Arrow stream by content": ("a.dat", arrow("stream"), ("u", "y"), ONE),
     "LVM: no column of time": ("a.lvm", lvm("No"), ("u", "y"), ONE),
     "LVM: one column of time": ("a.lvm", lvm("One"), ("u", "y"), ONE),
     "LVM: a column of time each": ("a.lvm", lvm("Multi"), ("u", "y"), ONE),

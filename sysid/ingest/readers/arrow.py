@@ -144,5 +144,6 @@ FEATHER = Reader(
     name="feather",
     suffixes=(".feather", ".arrow", ".ipc", ".arrows"),
     read=_reads("Feather", _ipc),
-    is_mine=lambda head: head.startswith((b"ARROW1", b"FEA1")),
+    # A stream has no name of its own, only the mark that each of its messages begins with.
+    is_mine=lambda head: head.startswith((b"ARROW1", b"FEA1", b"\xff\xff\xff\xff")),
 )
