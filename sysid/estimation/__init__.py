@@ -9,7 +9,7 @@ from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_
 from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
 from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
-from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.networks.joint import CascadeFit, JointTraining
 from sysid.estimation.networks.joint_training import fit_cascade, with_upstream_outputs
 from sysid.estimation.networks.narx import fit_narx

@@ -25,7 +25,7 @@ from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polyn
 from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
 from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
-from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.linear_posteriors import LinearPosterior, arx_posterior, transfer_function_posterior
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.narx import fit_narx

@@ -15,7 +15,8 @@ from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import scattered, sections_of, stabilised
 from sysid.estimation.linear.records import SpectralRecord
 from sysid.estimation.linear.sanathanan_koerner import sk_poles
-from sysid.estimation.linear.transfer_function_search import AbstractProblem, Terms, TransferFunctionTraining
+from sysid.estimation.linear.transfer_function_search import AbstractProblem
+from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.result import FitResult
 from sysid.models import Mapping, Scaling, TransferFunction
@@ -180,7 +181,13 @@ class _Problem(AbstractProblem):
             constant=False,
         )
 
-    def starts(self, provider: SeparableProvider, *, few: bool) -> list[PoleStart]:
+    def starts(
+        self,
+        provider: SeparableProvider,
+        *,
+        few: bool,
+        alone: bool = True,  # noqa: ARG002 - none of them takes long
+    ) -> list[PoleStart]:
         """Sanathanan-Koerner iterations from scattered poles, and some of these as they are; see the base class."""
         training, domain = self.training, self.orders.domain
         records = [record for record in provider.records if isinstance(record, SpectralRecord)]

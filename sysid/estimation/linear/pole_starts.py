@@ -179,6 +179,7 @@ def pole_starts(
     *,
     n_scattered: int,
     seed: int,
+    instruments: bool = True,
 ) -> list[PoleStart]:
     """Starts worth trying, the most informed first.
 
@@ -188,6 +189,7 @@ def pole_starts(
         n_zeros: For each input.
         n_scattered: Random starts added.
         seed: Of those.
+        instruments: Whether refined instrumental variables are among them.
 
     Returns:
         The starts.
@@ -195,7 +197,7 @@ def pole_starts(
     domain, sample_time = records[0].domain, records[0].sample_time
     n_rows = sum(len(record.target) for record in records)
     starts = arx_starts(records, n_poles, n_zeros)
-    if max(n_poles) <= MOST_REFINED:
+    if instruments and max(n_poles) <= MOST_REFINED:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             try:

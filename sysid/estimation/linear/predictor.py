@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -67,7 +68,7 @@ class Split:
         B, C = linalg.solve(T, system.B), system.C @ T
         return cls(stable=(A[:n, :n], B[:n], C[:, :n]), unstable=(A[n:, n:], B[n:], C[:, n:]), D=system.D)
 
-    @property
+    @cached_property
     def poles(self) -> NDArray[np.complex128]:
         """Those of the part that grows."""
         return np.asarray(linalg.eigvals(self.unstable[0]), dtype=np.complex128)
@@ -101,17 +102,17 @@ class MirroredPredictor:
             return None
         return cls(parts=tuple(Split.of(system, bound) for system in systems), n_rows=n_rows)
 
-    @property
+    @cached_property
     def growing(self) -> NDArray[np.complex128]:
         """All unstable poles."""
         return np.concatenate([part.poles for part in self.parts])
 
-    @property
+    @cached_property
     def _mirrored(self) -> NDArray[np.float64]:
         """``N*``."""
         return np.real(np.poly(1.0 / np.conj(self.growing)))
 
-    @property
+    @cached_property
     def constant_gain(self) -> float:
         """What a constant becomes."""
         return float(np.real(np.poly(self.growing)).sum() / self._mirrored.sum())

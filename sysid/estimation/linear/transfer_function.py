@@ -17,7 +17,8 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.determined import STILL, Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.records import TimeRecord
-from sysid.estimation.linear.transfer_function_search import AbstractProblem, Terms, TransferFunctionTraining
+from sysid.estimation.linear.transfer_function_search import AbstractProblem
+from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
 from sysid.estimation.result import FitResult
@@ -150,7 +151,7 @@ class _Problem(AbstractProblem):
             constant=self.orders.intercept,
         )
 
-    def starts(self, provider: SeparableProvider, *, few: bool) -> list[PoleStart]:
+    def starts(self, provider: SeparableProvider, *, few: bool, alone: bool = True) -> list[PoleStart]:
         """From ARX models and instrumental variables, and scattered ones; see the base class."""
         records = [record for record in provider.records if isinstance(record, TimeRecord)]
         if few:
@@ -162,6 +163,7 @@ class _Problem(AbstractProblem):
             self.orders.zeros,
             n_scattered=self.training.scattered_starts,
             seed=self.training.seed,
+            instruments=alone,
         )
 
     def delay_range(self) -> tuple[int, int]:

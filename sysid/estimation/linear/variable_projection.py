@@ -237,7 +237,10 @@ class SeparableProvider(AbstractProvider):
         key = theta.tobytes()
         if key not in self._last:
             with np.errstate(all="ignore"):  # a trial step may leave the numbers that can be computed with
-                solution = self._solve(theta)
+                try:
+                    solution = self._solve(theta)
+                except linalg.LinAlgError:  # or poles that cannot be told apart from those that grow
+                    return None
             if solution is None:
                 return None
             self._last.clear()

@@ -6,14 +6,14 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from sysid.errors import TraceError
 from sysid.estimation import FitResult, fit_arx, fit_transfer_function
-from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.models import ARX, Domain, Mapping, Start, StartKind, TransferFunction, TransferFunctionModel
 from sysid.traces import Role, Trace
 from sysid.validation.evaluate import evaluate_case
@@ -158,7 +158,7 @@ def test_a_dead_time_longer_than_the_records_is_refused() -> None:
         fit_arx([trace], ONE, ARX(na=1, nb=(1,), nk=(40,)), start=ESTIMATED)
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     poles=st.just(2) | st.just(3),
@@ -215,17 +215,22 @@ def test_a_record_that_is_shorter_than_the_lags_of_a_start_counts_beside_a_long_
     np.testing.assert_allclose(found.numerator(0), [0.2], atol=1e-6)
 
 
-def test_more_poles_than_the_plant_has_never_fit_worse() -> None:
-    """Beyond the orders whose structures are fitted as starts; with poles anywhere, what is significant has a say."""
-    rng = np.random.default_rng(1)
-    u, y = steps(120, 1), np.zeros(120)
-    for k in range(3, 120):
-        y[k] = 1.9 * y[k - 1] - 1.23 * y[k - 2] + 0.28 * y[k - 3] + 0.1 * np.tanh(2.0 * u[k - 1])
-    trace = trace_of(u[:, None], y + 0.02 * rng.standard_normal(120))
-    options = TransferFunctionTraining(stable=True, scattered_starts=0)
-    losses = []
-    for poles, zeros in ((4, 2), (5, 2), (6, 3)):
-        orders = TransferFunction(poles=(poles,), zeros=(zeros,), delays=(1,))
+def drifting(seed: int, n: int = 80) -> Trace:
+    """A record that no transfer function explains: its slow drift draws the poles to the edge, and beyond."""
+    rng, u = np.random.default_rng(seed), steps(n, seed)
+    noise = np.cumsum(rng.standard_normal(n)) if seed % 2 else rng.standard_normal(n)
+    b, f = ([0.0, 0.3], [1.0, -0.8]) if seed % 3 else ([0.0, 0.1], [1.0, -1.0])
+    return trace_of(u[:, None], lfilter(b, f, u) + 0.05 * noise)
+
+
+@settings(max_examples=2, deadline=None)
+@given(seed=st.integers(0, 10**6), stable=st.none() | st.just(True))
+@example(seed=3, stable=None)
+def test_more_poles_than_the_plant_has_never_fit_worse(seed: int, stable: bool | None) -> None:
+    """Also where poles may be anywhere, on records that draw them there."""
+    options = TransferFunctionTraining(stable=stable, scattered_starts=0, max_iterations=40)
+    trace, losses = drifting(seed), []
+    for poles in (3, 5):
+        orders = TransferFunction(poles=(poles,), zeros=(1,), delays=(1,))
         losses.append(fit_transfer_function([trace], ONE, orders, options, start=ESTIMATED).history["mse"][-1])
-    assert losses[1] <= losses[0] * (1.0 + 1e-3)
-    assert losses[2] <= losses[1] * (1.0 + 1e-3)
+    assert all(larger <= smaller * (1.0 + 1e-6) for smaller, larger in itertools.pairwise(losses)), losses

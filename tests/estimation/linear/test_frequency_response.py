@@ -8,7 +8,7 @@ from scipy import signal
 
 from sysid.errors import TraceError
 from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
-from sysid.estimation.linear.transfer_function_search import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.models import Domain, Mapping, TransferFunction
 
 T = 0.1

@@ -1,0 +1,60 @@
+"""What the fit of a transfer function has to say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid.estimation.linear.transfer_function_runs import Candidate
+from sysid.models import TransferFunctionModel
+from sysid.models.orthonormal_basis import Domain
+
+AT_EDGE = (
+    "The slowest pole stands at the end of its range, a time constant of five records: the plant may integrate, and "
+    "these records cannot tell."
+)
+
+
+def of_starts(candidates: Sequence[Candidate], best: Candidate, unit: float) -> tuple[str, ...]:
+    """How the starts compare.
+
+    Args:
+        candidates: After their short runs.
+        best: The one that went on.
+        unit: From losses to the output's unit squared.
+
+    Returns:
+        One note.
+    """
+    finite = [c for c in candidates if np.isfinite(c.loss)]
+    mse = [2.0 * c.loss / c.provider.n_samples * unit for c in finite]
+    return (
+        f"Best of {len(candidates)} starts: {best.start.name}. After the short runs their mean squared errors lie "
+        f"between {min(mse):.4g} and {max(mse):.4g}, median {float(np.median(mse)):.4g}.",
+    )
+
+
+def of_stability(model: TransferFunctionModel) -> str:
+    """Whether the model is stable, as a sentence.
+
+    Args:
+        model: The model.
+
+    Returns:
+        The sentence.
+    """
+    if model.stable:
+        return "The transfer function is stable."
+    poles = np.concatenate([model.poles(j) for j in range(len(model.sections))])
+    discrete = model.orders.domain is Domain.DISCRETE
+    away = np.abs(poles) - 1.0 if discrete else poles.real
+    at_edge = int(np.count_nonzero(np.abs(away) <= 1e-9 * (1.0 if discrete else float(np.abs(poles).max()) or 1.0)))
+    if float(away.max()) <= 1e-9 * (1.0 if discrete else float(np.abs(poles).max()) or 1.0):
+        word = {1: "An integrator", 2: "A double integrator"}.get(at_edge, f"{at_edge} poles at the edge")
+        return f"The transfer function is not stable: {word.lower()}; an error of its input adds up for ever."
+    largest = poles[int(np.argmax(away))]
+    return (
+        f"The transfer function is not stable: the pole {complex(largest):.6g} lies outside; its free run grows "
+        "without bound, and it is of use in a loop only."
+    )
