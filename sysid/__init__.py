@@ -25,15 +25,18 @@ WORDS = (
 )
 """What is imported when it is first used: ``sysid --help`` loads none of it."""
 
+SEARCH = "auto"
+"""The word that stands on a pipeline: it is above the others."""
+
 
 def __getattr__(name: str) -> Any:
     """A word of the short way, imported now."""
-    if name not in WORDS:
+    if name not in (*WORDS, SEARCH):
         raise AttributeError(f"module 'sysid' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module("sysid.api"), name)
+    return getattr(import_module("sysid.workbench.auto.python" if name == SEARCH else "sysid.api"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *WORDS})
+    return sorted({*globals(), *WORDS, SEARCH})

@@ -16,6 +16,18 @@ from sysid.models import AbstractStructure, Mapping, Start
 from sysid.traces import Role, TraceSet
 
 
+def is_file_of_traces(source: str | Path) -> bool:
+    """Whether a source is a file with traces, by its suffix, and not a data set.
+
+    Args:
+        source: A name or a path.
+
+    Returns:
+        Whether it is.
+    """
+    return Path(source).suffix.lower() in {suffix for reader in READERS for suffix in reader.suffixes}
+
+
 def load(source: str | Path) -> TraceSet:
     """Load a data set by name or path, or a single file with traces.
 
@@ -36,7 +48,7 @@ def load(source: str | Path) -> TraceSet:
         (('record',), 0.5, 200)
     """
     path = Path(source)
-    if path.suffix.lower() not in {suffix for reader in READERS for suffix in reader.suffixes}:
+    if not is_file_of_traces(path):
         return load_dataset(source)
     trace = read_trace(path)
     return TraceSet(name=path.stem, traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))

@@ -245,6 +245,39 @@ def advise(
     advise_command(source, mapping=mapping)
 
 
+@app.command(epilog='Example: sysid auto rig.csv --mapping "pump -> level" --minutes 5')
+def auto(  # noqa: PLR0917 - one parameter an option, by name on the command line
+    source: Annotated[str, typer.Argument(help="The name of a data set, or a file with traces.")],
+    mapping: Annotated[
+        str | None, typer.Option(help="Inputs and outputs, as u1+u2 -> y; not needed for two channels.")
+    ] = None,
+    minutes: Annotated[float | None, typer.Option(help="Time for the search; 10 by default.")] = None,
+    iterations: Annotated[
+        int | None, typer.Option(min=1, help="In place of minutes: the same result on every machine.")
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(help="How free runs begin: estimated (by default), rest, first-sample or measured=N."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Processes that train, one thread each.")] = 2,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Do everything again, whatever is stored.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/auto-<data> by default.")] = None,
+    no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
+) -> None:
+    """Find a model without being told which: linear ones first, then networks, as long as they gain.
+
+    Exports the best and reports what accuracy costs. A search that was killed goes on where it was.
+    """
+    from sysid.workbench.commands.auto import auto_command
+
+    given = {
+        **{"mapping": mapping, "minutes": minutes, "iterations": iterations, "start": start, "seed": seed},
+        **{"workers": workers},
+    }
+    raise typer.Exit(auto_command(source, given=given, fresh=fresh, out=out, tracking=not no_tracking))
+
+
 @app.command(epilog="Example: sysid excite multisine --samples 4000 --sample-time 0.01 --range 0:10 --out u.csv")
 def excite(
     kind: Annotated[str, typer.Argument(help="prbs, multisine, noise, chirp, staircase or aprbs.")],

@@ -33,6 +33,7 @@ class RunRequest:
     Args:
         path: The pipeline's file.
         typed: The pipeline as it was typed, for the command that makes the run again.
+        options: What was typed behind it that belongs to that command.
         fresh: Do everything again.
         out: The run folder; ``None`` for ``runs/<name>``.
         tracking: Whether the run is tracked in MLflow.
@@ -41,6 +42,7 @@ class RunRequest:
 
     path: Path
     typed: str
+    options: tuple[str, ...] = ()
     fresh: bool = False
     out: Path | None = None
     tracking: bool = True
@@ -88,6 +90,7 @@ KINDS: dict[str, Kind] = {
         config="sysid.workbench.assembly.config:AssemblyConfig",
         program="sysid.workbench.assembly.runner:program",
     ),
+    "auto": Kind(config="sysid.workbench.auto.config:AutoConfig", program="sysid.workbench.auto.run:program"),
     "sweep": Kind(config="sysid.workbench.sweep.config:SweepConfig", program="sysid.workbench.sweep.run:program"),
 }
 """The kinds by name."""

@@ -6,6 +6,7 @@ A run of whatever kind begins here: :func:`perform`.
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,13 +24,14 @@ if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
 
 
-def typed_command(verb: str, pipeline: str, out: Path | None) -> str:
+def typed_command(verb: str, pipeline: str, out: Path | None, options: Sequence[str] = ()) -> str:
     """The command that makes a run again.
 
     Args:
-        verb: ``run`` or ``sweep``.
+        verb: ``run``, ``sweep`` or ``auto``.
         pipeline: As it was typed.
         out: The run folder, where one was named.
+        options: What else was typed.
 
     Returns:
         The command.
@@ -38,7 +40,7 @@ def typed_command(verb: str, pipeline: str, out: Path | None) -> str:
         >>> typed_command("run", "tank", Path("my runs/a"))
         "sysid run tank --out 'my runs/a'"
     """
-    return shlex.join(["sysid", verb, pipeline, *(["--out", str(out)] if out else [])])
+    return shlex.join(["sysid", verb, pipeline, *options, *(["--out", str(out)] if out else [])])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,7 +129,7 @@ def perform(program: Program[Any], request: RunRequest) -> int:
     """
     folder = request.out or Path("runs") / program.name
     listeners = Listeners.of(tracking=request.tracking and program.tracked)
-    command = typed_command(program.verb, request.typed, request.out)
+    command = typed_command(program.verb, request.typed, request.out, request.options)
     try:
         results = carry_out(program, folder, command=command, fresh=request.fresh, watchers=listeners.watchers)
     finally:
@@ -149,5 +151,5 @@ def foresee(program: Program[Any], request: RunRequest) -> tuple[PlannedStep, ..
         UserError: If the pipeline, its data or its options cannot be used: what a run would say too.
     """
     folder = request.out or Path("runs") / program.name
-    command = typed_command(program.verb, request.typed, request.out)
+    command = typed_command(program.verb, request.typed, request.out, request.options)
     return foretell(program, folder, command=command, fresh=request.fresh)

@@ -36,7 +36,9 @@ class _Record:
         """Residuals, or rows of the Jacobian, ``(n_samples, n_outputs, ...)``, with an axis for both and weights."""
         if self.root_weights is not None:
             roots = self.root_weights[rows]
-            values = values * (roots if values.ndim == 2 else roots[:, :, None])
+            roots = roots if values.ndim == 2 else roots[:, :, None]
+            # What does not count is nought even where a run has diverged by then.
+            values = np.where(roots > 0.0, values, 0.0) * roots
         return values.reshape(len(values) * values.shape[1], *values.shape[2:])
 
 

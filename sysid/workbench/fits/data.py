@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
+from sysid.models import Mapping
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.annotation import annotated_set, find_annotator, weighted
 from sysid.workbench.fits.config import PipelineConfig
@@ -36,6 +37,32 @@ class Data:
         return self.traces.with_role(Role.ESTIMATION)
 
 
+def data_of(traces: TraceSet, mapping: Mapping) -> Data:
+    """A data set as a pipeline works on it, if it can.
+
+    Args:
+        traces: The data set.
+        mapping: Inputs and outputs.
+
+    Returns:
+        The data.
+
+    Raises:
+        ConfigError: If no trace is for estimation.
+        ChannelError: If a channel of the mapping is missing.
+    """
+    traces.traces[0].columns((*mapping.inputs, *mapping.outputs))
+    if not traces.with_role(Role.ESTIMATION):
+        raise ConfigError(
+            "no trace is for estimation",
+            where=f"data set {traces.name}",
+            expected="a case with role: estimation",
+            got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
+            remedy="give a case that role in the data set's dataset.yaml",
+        )
+    return Data(traces=traces, selection=traces.with_role(Role.SELECTION))
+
+
 def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str], None]) -> Data:
     """Load the traces of a pipeline and check that they can do what it asks.
 
@@ -51,18 +78,9 @@ def load_data(config: PipelineConfig, *, beside: Path, progress: Callable[[str],
         ConfigError: If no trace is for estimation, or a trace that chooses is also scored.
         ChannelError: If a channel of the mapping is missing.
     """
-    traces = _annotated(_load(config.data, beside, progress), config)
     names = (*config.mapping.inputs, *config.mapping.outputs)
-    traces.traces[0].columns(names)
-    if not traces.with_role(Role.ESTIMATION):
-        raise ConfigError(
-            "no trace is for estimation",
-            where=f"data set {traces.name}",
-            expected="a case with role: estimation",
-            got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
-            remedy="give a case that role in the data set's dataset.yaml",
-        )
-    selection = traces.with_role(Role.SELECTION)
+    known = data_of(_annotated(_load(config.data, beside, progress), config), config.mapping)
+    traces, selection = known.traces, known.selection
     if config.selection is not None:
         chosen = _annotated(_load(config.selection, beside, progress), config)
         selection = (*selection, *_selection_traces(chosen, traces, names))
@@ -87,12 +105,14 @@ def unmade_data(names: Iterable[str | None], *, beside: Path) -> Estimate | None
     Raises:
         ConfigError: If there is no such data set.
     """
+    from sysid.api.fitting import is_file_of_traces
     from sysid.ingest.dataset import unmade
 
     found = []
     for name in dict.fromkeys(name for name in names if name is not None):
         place, search = _place(name, beside)
-        found.append(unmade(place, search=search))
+        if not is_file_of_traces(place):
+            found.append(unmade(place, search=search))
     lacking = [one for one in found if one is not None]
     if not lacking:
         return None
@@ -127,16 +147,19 @@ def load_named(name: str, beside: Path, *, progress: Callable[[str, int, int], N
     """Load a data set as a pipeline names it.
 
     Args:
-        name: Its name, or its folder beside the pipeline's file.
+        name: Its name, its folder beside the pipeline's file, or a file with traces, whose one trace is for estimation.
         beside: Folder of the pipeline's file.
         progress: Called as ``progress(case, index, count)`` before each case.
 
     Returns:
         Its traces.
     """
+    from sysid.api.fitting import is_file_of_traces, load
     from sysid.ingest import load_dataset
 
     place, search = _place(name, beside)
+    if is_file_of_traces(place):
+        return load(place)
     return load_dataset(place, search=search, progress=progress)
 
 

@@ -57,11 +57,11 @@ class GivenFit:
 
     Args:
         key: Digest of everything that it depends on.
-        make: Gives it, when it is not stored yet.
+        make: Gives it, when it is not stored yet; told how to say how that goes.
     """
 
     key: str
-    make: Callable[[], FitResult]
+    make: Callable[[Work], FitResult]
 
 
 def program(request: RunRequest) -> Program[Results]:
@@ -215,11 +215,13 @@ class FitSteps:
         pipeline: What to do.
         given: Fits that are made already, by name.
         chosen: The fit that comes first, where it was chosen elsewhere.
+        page: Whether a page is made of the results, and the traces are looked at for it.
     """
 
     pipeline: Pipeline
     given: Mapping[str, GivenFit] = field(default_factory=dict)
     chosen: steps.Choice | None = None
+    page: bool = True
 
     @property
     def config(self) -> PipelineConfig:
@@ -280,11 +282,11 @@ class FitSteps:
                     mapping=str(self.config.mapping), told=ready.output != self.config.mapping.outputs[0],
                 )  # fmt: skip
                 run.then(partial(run.tell, told))
-        advice = run.do(self._look(run, loaded))
+        advice = run.do(self._look(run, loaded)).value if self.page else ()
         found = () if orders is None else orders.value
-        results = self._results(
-            run, loaded.value, fitted, choice=choice, exports=exports, advice=advice.value, orders=found
-        )
+        results = self._results(run, loaded.value, fitted, choice=choice, exports=exports, advice=advice, orders=found)
+        if not self.page:
+            return results
         page = run.report(results)
         for ready in best.ready:
             written = events.ReportReady(page=page.value, results=run.store.results, of=ready)
@@ -350,7 +352,7 @@ class FitSteps:
 
         def make(work: Work) -> FitResult:
             if given is not None:
-                return given.make()
+                return given.make(work)
             begin = initial.value if initial else None
             watch = work.watch(getattr(fit.training_options(config.seed), "max_time_s", math.inf))
             return steps.fit_traces(fit, config, loaded.value, begin, watch)

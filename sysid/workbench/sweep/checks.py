@@ -16,6 +16,7 @@ from sysid.estimation.networks.choosing import VETTED
 from sysid.reporting.sweep_record import Trial
 from sysid.traces import Role
 from sysid.workbench.fits.run import GivenFit
+from sysid.workbench.runner.steps import Work
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.store import TrialStore
@@ -68,7 +69,7 @@ class Checks:
         terms = {"job": job.key, "stability": stability.terms}
         count = len(self._stored(trial))
 
-        def make(number: int) -> FitResult:
+        def make(number: int, _: Work) -> FitResult:
             fit = self._whole(trial, self._checked(trial), number)
             return replace(fit, train_time_s=float(trial.seconds) / count)
 

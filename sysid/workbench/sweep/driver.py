@@ -66,6 +66,7 @@ class Driver:
         step: What is being done, for the screen.
         tell: Told how it goes.
         last: The last job of each point that was tried, by its number.
+        fold: Which of the bench's folds its jobs are of.
     """
 
     config: SweepConfig
@@ -78,14 +79,16 @@ class Driver:
     _shared: str = field(init=False)
     _progress: _Progress = field(init=False)
     last: dict[int, Job] = field(default_factory=dict)
+    fold: int = 0
     _smaller: dict[int, Point] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        bench = self.bench.fold(self.fold)
         terms = {
             "format": FORMAT,
-            "pipeline": {name: self.bench.pipeline.get(name) for name in ("mapping", "start", "rest")},
-            "traces": self.bench.traces.digest,
-            "selection": [trace.digest for trace in self.bench.selection],
+            "pipeline": {name: bench.pipeline.get(name) for name in ("mapping", "start", "rest")},
+            "traces": bench.traces.digest,
+            "selection": [trace.digest for trace in bench.selection],
         }
         object.__setattr__(self, "_shared", digest(terms))
         object.__setattr__(self, "_progress", _Progress(driver=self))
@@ -94,6 +97,17 @@ class Driver:
     def done_now(self) -> int:
         """Jobs that this session has done itself."""
         return self._progress.n_fresh
+
+    def is_stored(self, point: Point) -> bool:
+        """Whether a point's training, of a sweep without rungs, is done and on disk.
+
+        Args:
+            point: The point.
+
+        Returns:
+            Whether it is.
+        """
+        return self.store.read(self._job(point, self.rungs()[-1], None, {}).key) is not None
 
     def rungs(self) -> list[Rung]:
         """The rungs, the end of the training last."""
@@ -170,7 +184,7 @@ class Driver:
                 number=point.number,
                 structure=point.structure.to_dict(),
                 training=self._training(point),
-                iterations=rung.iterations if estimator_of(point.structure).resumes else None,
+                iterations=_reached(point, rung) if estimator_of(point.structure).resumes else None,
                 record=rung.record,
                 after=after,
                 resume=resume,
@@ -222,7 +236,7 @@ class Driver:
             "after": job.after,
             "resume": job.resume,
         }
-        return replace(job, key=digest(strict(terms)))
+        return replace(job, key=digest(strict(terms)), fold=self.fold)
 
     def _do(self, jobs: Iterable[Job]) -> dict[str, Trial]:
         """Do every job that is not stored, those that others wait for first, then the longest."""
@@ -266,6 +280,11 @@ class Driver:
         trial = as_trial(outcome)
         self._progress.done(job, trial, fresh=fresh)
         return trial
+
+
+def _reached(point: Point, rung: Rung) -> int:
+    """How far a point's training is by a rung: not beyond its own end."""
+    return min(rung.iterations, int(point.training.get("max_iterations", rung.iterations)))
 
 
 def _code(structure: Mapping[str, Any], n_outputs: int) -> str:

@@ -42,6 +42,7 @@ class Bench:
         selection: The traces that choose.
         sequences: Traces over which a free run has to stay stable, where a data set of them is declared.
         folder: The run folder, where the workers can write there: a trial that is cut off then goes on where it was.
+        folds: Other ways to part what is fitted from what chooses, where trials are told which one they are of.
     """
 
     pipeline: Mapping[str, Any]
@@ -49,6 +50,21 @@ class Bench:
     selection: tuple[Trace, ...]
     sequences: tuple[Trace, ...] = ()
     folder: Path | None = None
+    folds: tuple[tuple[TraceSet, tuple[Trace, ...]], ...] = ()
+
+    def fold(self, number: int) -> Bench:
+        """The bench with the traces of a fold.
+
+        Args:
+            number: Which one; where there are no folds, all is one.
+
+        Returns:
+            The bench.
+        """
+        if not self.folds:
+            return self
+        traces, selection = self.folds[number]
+        return replace(self, traces=traces, selection=selection, folds=())
 
     @property
     def start(self) -> Start:
@@ -75,6 +91,7 @@ class Job:
         after: Key of the job whose result it needs.
         resume: Whether it goes on with that fit as if it had not been put aside, or only begins at its parameters.
         cost: Work, in units of its own, for the order of jobs and the time left.
+        fold: Which of the bench's folds it is trained and scored on.
     """
 
     key: str
@@ -86,6 +103,7 @@ class Job:
     after: str | None = None
     resume: bool = False
     cost: float = 1.0
+    fold: int = 0
 
 
 def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -100,6 +118,7 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
         JSON values: status, figures, the fit and where it can go on. An error of the fit is a result too.
     """
     began, cpu = time.perf_counter(), time.process_time()
+    bench = bench.fold(job.fold)
     outcome: dict[str, Any] = {"key": job.key, "number": job.number, "structure": dict(job.structure)}
     try:
         with threadpool_limits(1):

@@ -1,0 +1,140 @@
+"""What a search may spend, what it has spent, and what still fits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sysid.estimation import Training
+from sysid.estimation.estimators import estimator_of
+from sysid.estimation.networks.multistart import planned_iterations
+from sysid.reporting.sweep_record import Trial
+from sysid.workbench.sweep.search_space import Point
+
+REFIT = 0.2
+"""Share of the time that is kept for the last fit."""
+TRIAL = 0.15
+"""Share of the time that one trial may take."""
+
+
+def price(point: Point, folds: int = 1) -> int:
+    """Iterations of a trial, all starts together, if none converges early; 1 for what is no network.
+
+    Args:
+        point: What is tried.
+        folds: Times that it is trained.
+
+    Returns:
+        Their number.
+    """
+    row = estimator_of(point.structure)
+    if row.training is not Training:
+        return folds
+    training = Training(**dict(point.training)).with_starts(row.starts)
+    return folds * round(planned_iterations(training))
+
+
+@dataclass(kw_only=True, eq=False)
+class Budget:
+    """Time or iterations.
+
+    Args:
+        wall_s: Seconds; ``None`` where iterations are counted.
+        iterations: Iterations; ``None`` where time is.
+        clock: Seconds that the search has taken, over all its sessions.
+        is_stored: Whether a trial is on disk and costs nothing.
+        side_by_side: Trials that run at the same time.
+        folds: Times that a point is trained.
+        spent: Iterations so far.
+    """
+
+    wall_s: float | None
+    iterations: int | None
+    clock: Callable[[], float]
+    is_stored: Callable[[Point], bool]
+    side_by_side: int = 1
+    folds: int = 1
+    spent: int = 0
+    _rates: dict[str, float] = field(default_factory=dict)
+    _open: list[Point] = field(default_factory=list)
+
+    def take(self, points: Sequence[Point]) -> list[Point]:
+        """Those of some points that fit, in their order; they are paid for.
+
+        Args:
+            points: What is wanted, the most wanted first.
+
+        Returns:
+            What may be tried.
+        """
+        taken: list[Point] = []
+        seconds = 0.0
+        for point in points:
+            cost = 0.0 if self.wall_s is None or self.is_stored(point) else self._seconds(point) / self.side_by_side
+            if not self._fits(price(point, self.folds), seconds + cost, paid=cost == 0.0):
+                continue
+            seconds += cost
+            self.spent += price(point, self.folds)
+            taken.append(point)
+        self._open = taken
+        return taken
+
+    def tell(self, trials: Sequence[Trial]) -> None:
+        """Learn from the last trials how long others will take.
+
+        Args:
+            trials: In the order in which they were taken.
+        """
+        for point, trial in zip(self._open, trials, strict=True):
+            kind = point.structure.kind
+            rate = trial.seconds / (price(point, self.folds) * _size(point))
+            if math.isfinite(rate):
+                self._rates[kind] = max(rate, 0.5 * self._rates.get(kind, 0.0))
+
+    def fraction(self) -> float:
+        """Share that is spent, 0 to 1."""
+        if self.wall_s is not None:
+            return min(1.0, self.clock() / self.wall_s)
+        return min(1.0, self.spent / (self.iterations or 1))
+
+    def left(self) -> str:
+        """What is left, in words."""
+        if self.wall_s is not None:
+            seconds = max(0.0, self.wall_s - self.clock())
+            return f"{seconds / 60:.0f} min left" if seconds >= 90 else f"{seconds:.0f} s left"
+        return f"{max(0, (self.iterations or 0) - self.spent):,} iterations left"
+
+    def limits(self, share: float) -> dict[str, Any]:
+        """Options of a training that may take a share of the time; none where iterations are counted.
+
+        Args:
+            share: Of all the time.
+
+        Returns:
+            The options.
+        """
+        return {} if self.wall_s is None else {"max_time_s": round(share * self.wall_s, 3)}
+
+    def _fits(self, iterations: int, seconds: float, *, paid: bool) -> bool:
+        if self.iterations is not None:
+            return self.spent + iterations <= self.iterations
+        return paid or self.wall_s is None or self.clock() + seconds <= (1.0 - REFIT) * self.wall_s
+
+    def _seconds(self, point: Point) -> float:
+        """How long a trial will take; of a kind that was not tried yet, at least something."""
+        if self.wall_s is None:
+            return 0.0
+        rate = self._rates.get(point.structure.kind, 0.0)
+        limit = TRIAL * self.wall_s if point.training else self.wall_s
+        return min(limit, max(1e-3, rate * price(point, self.folds) * _size(point)))
+
+
+def _size(point: Point) -> float:
+    """About how many parameters, from the fields that count something: enough to compare two of a kind."""
+    numbers = [v for v in point.structure.to_dict().values() if isinstance(v, int) and not isinstance(v, bool)]
+    product = 1.0
+    for number in numbers:
+        product *= max(1, number)
+    return product

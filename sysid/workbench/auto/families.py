@@ -1,0 +1,147 @@
+"""Kinds of structures as a search tries them: one row a kind, what comes first and what stands next to a good one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+from sysid.estimation.estimators import estimator_of
+from sysid.models import ARX, NARX, AbstractStructure, LinearStateSpace, NeuralStateSpace, TransferFunction
+from sysid.workbench.auto.look import Looked
+
+LINEAR_ORDERS = range(1, 7)
+REGULARISATIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
+"""Fixed weights of the size of the parameters; the evidence finds its own where none is given."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Try:
+    """One thing to try.
+
+    Args:
+        structure: What is fitted.
+        training: Options of its training; empty for its defaults.
+    """
+
+    structure: AbstractStructure
+    training: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """A kind of structure in the search.
+
+    Args:
+        kind: As results name it.
+        linear: Whether it is tried in the first round.
+        first: What of it is tried unasked.
+        around: What stands next to one of it, the most promising first; nothing for what is tried in full at once.
+    """
+
+    kind: str
+    linear: bool
+    first: Callable[[Looked], Sequence[Try]]
+    around: Callable[[Try, Looked], Sequence[Try]] = lambda _, __: ()
+
+
+def _arx(looked: Looked) -> list[Try]:
+    return [Try(structure=one) for one in looked.orders]
+
+
+def _state_spaces(_: Looked) -> list[Try]:
+    return [Try(structure=LinearStateSpace(states=n, noise=False)) for n in LINEAR_ORDERS]
+
+
+def _transfer_functions(looked: Looked) -> list[Try]:
+    m = looked.n_inputs
+    orders = [n for n in LINEAR_ORDERS[:2] if m]
+    return [
+        Try(structure=TransferFunction(poles=(n,) * m, zeros=(n - 1,) * m, delays=(looked.delay,) * m)) for n in orders
+    ]
+
+
+def _neural(_: Looked) -> list[Try]:
+    sizes = ((2, 8, None), (2, 8, 0.03), (2, 4, 1e-3), (3, 8, 0.03))
+    return [
+        Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
+        for n, k, r in sizes
+    ]
+
+
+def _around_neural(one: Try, looked: Looked) -> list[Try]:
+    network = cast("NeuralStateSpace", one.structure)
+    wider = {"neurons": round(1.6 * network.neurons) + 1}
+    narrower = {"neurons": max(1, round(0.6 * network.neurons))}
+    moves: list[dict[str, Any]] = [{"states": network.states + 1}, wider]
+    if looked.never_negative:
+        moves.insert(0, {"output": "absolute" if network.output == "plain" else "plain"})
+    moves += [{"states": network.states - 1}] if network.states > 1 else []
+    moves += [{"activation": "cubic" if network.activation == "tanh" else "tanh"}, narrower]
+    return _moved(one, moves)
+
+
+def _narx(looked: Looked) -> list[Try]:
+    delays = f"{looked.delay}:{looked.delay + looked.lags - 1}" if looked.n_inputs else []
+    return [Try(structure=NARX(input_delays=delays, output_delays=looked.lags, neurons=k)) for k in (4, 10)]
+
+
+def _around_narx(one: Try, _: Looked) -> list[Try]:
+    network = cast("NARX", one.structure)
+    lags = len(network.output_delays)
+    moves: list[dict[str, Any]] = [
+        {"neurons": round(1.6 * network.neurons) + 1},
+        {"gated": not network.gated},
+        *([_lags(network, n) for n in (lags + 1, lags - 1) if n >= 1]),
+        {"neurons": max(1, round(0.6 * network.neurons))},
+    ]
+    return _moved(one, moves)
+
+
+def _lags(network: NARX, n: int) -> dict[str, Any]:
+    first = [delays[0] for delays in network.input_delays]
+    return {"input_delays": [list(range(k, k + n)) for k in first], "output_delays": list(range(1, n + 1))}
+
+
+def _moved(one: Try, moves: Sequence[Mapping[str, Any]]) -> list[Try]:
+    """The structure with some of its fields changed; then other regularisations of the structure itself."""
+    fields = one.structure.to_dict()
+    kind = type(one.structure)
+    moved = [
+        Try(structure=kind(**{k: v for k, v in {**fields, **move}.items() if k != "kind"}), training=one.training)
+        for move in moves
+    ]
+    weights = [replace(one, training={**one.training, "regularisation": r}) for r in _regularisations(one)]
+    return [moved[0], *weights[:1], *moved[1:3], *weights[1:], *moved[3:]]
+
+
+def _regularisations(one: Try) -> list[float]:
+    now = one.training.get("regularisation")
+    if now is None:
+        return [0.1, 1e-3]
+    place = REGULARISATIONS.index(now)
+    return [REGULARISATIONS[i] for i in (place + 1, place - 1) if 0 <= i < len(REGULARISATIONS)]
+
+
+def suggested(looked: Looked, *, linear: bool) -> list[Try]:
+    """What a look at the data suggests, before anything else.
+
+    Args:
+        looked: What was found.
+        linear: Linear structures, or the others.
+
+    Returns:
+        What to try.
+    """
+    found = [one for one in looked.suggested if estimator_of(one).linear is linear]
+    return [Try(structure=one) for one in found]
+
+
+FAMILIES = (
+    Family(kind=ARX.kind, linear=True, first=_arx),
+    Family(kind=TransferFunction.kind, linear=True, first=_transfer_functions),
+    Family(kind=LinearStateSpace.kind, linear=True, first=_state_spaces),
+    Family(kind=NeuralStateSpace.kind, linear=False, first=_neural, around=_around_neural),
+    Family(kind=NARX.kind, linear=False, first=_narx, around=_around_narx),
+)
+"""All of them, in the order in which they are tried."""

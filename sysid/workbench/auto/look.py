@@ -1,0 +1,104 @@
+"""What is in a record that a search goes by: orders, dead times, what is suggested, what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sysid.advice import Verdict
+from sysid.api.looking import Advice, SystemAdvice, advise
+from sysid.api.orders import search_orders
+from sysid.errors import UserError
+from sysid.models import ARX, AbstractStructure, Mapping, Start
+from sysid.reporting.advice_section import lines
+from sysid.traces import Role, Trace, TraceSet
+from sysid.workbench.auto.parts import ends_held_out
+from sysid.workbench.fits.data import Data
+
+ARX_TRIED = 3
+"""Of the shortlist of an order search."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Looked:
+    """What a search knows before its first trial.
+
+    Args:
+        n_inputs: Inputs of the mapping.
+        n_outputs: Outputs of the mapping.
+        orders: ARX structures that are worth a try, best first; the first says how many past samples matter.
+        never_negative: Whether no output ever is, so that its sensor may not tell a sign.
+        suggested: What ``sysid advise`` suggests.
+        cautions: What it asks to be looked at, in words.
+    """
+
+    n_inputs: int
+    n_outputs: int
+    orders: tuple[ARX, ...] = ()
+    never_negative: bool = False
+    suggested: tuple[AbstractStructure, ...] = ()
+    cautions: tuple[str, ...] = ()
+
+    @property
+    def lags(self) -> int:
+        """Past samples that a network of lags looks at first, from 2 to 6."""
+        return min(max(self.orders[0].na, 2), 6) if self.orders else 2
+
+    @property
+    def delay(self) -> int:
+        """The least dead time, in samples; 1 where it is not known."""
+        return min(self.orders[0].nk, default=1) if self.orders else 1
+
+
+def look(data: Data, mapping: Mapping, start: Start) -> Looked:
+    """Look at what is fitted and what chooses; at nothing else.
+
+    Args:
+        data: The traces of the pipeline.
+        mapping: Inputs and outputs.
+        start: How each free run begins.
+
+    Returns:
+        What was found.
+    """
+    known = _set(data, data.estimation, data.selection)
+    found = advise(known, mapping)
+    advice = list(found.outputs.values()) if isinstance(found, SystemAdvice) else [found]
+    return Looked(
+        n_inputs=len(mapping.inputs),
+        n_outputs=len(mapping.outputs),
+        orders=_orders(data, mapping, start),
+        never_negative=all(float(one[name].min()) >= 0.0 for one in data.estimation for name in mapping.outputs),
+        suggested=tuple(one.structure for one in advice[0].suggestions) if len(advice) == 1 else (),
+        cautions=tuple(_cautions(advice)),
+    )
+
+
+def _set(data: Data, estimation: Sequence[Trace], selection: Sequence[Trace]) -> TraceSet:
+    roles = dict.fromkeys([one.name for one in estimation], Role.ESTIMATION)
+    roles |= dict.fromkeys([one.name for one in selection], Role.SELECTION)
+    return TraceSet(name=data.traces.name, traces=(*estimation, *selection), roles=roles)
+
+
+def _orders(data: Data, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
+    """The best ARX structures in free run over what chooses; of several outputs, those of the first."""
+    fitted, chooses = (data.estimation, data.selection) if data.selection else ends_held_out(data.estimation)
+    try:
+        found = search_orders(_set(data, fitted, chooses), mapping.each[0], start=start, workers=1)
+    except UserError:
+        return ()  # too short for any: what is tried then says so itself
+    structures = [one.fit.model.structure for one in found.finalists if np.isfinite(one.mean_fit)]
+    return tuple(replace(one) for one in structures if isinstance(one, ARX))[:ARX_TRIED]
+
+
+def _cautions(advice: Sequence[Advice]) -> list[str]:
+    found = []
+    for one in advice:
+        output = f"{one.mapping.output}: " if len(advice) > 1 else ""
+        found += [f"{output}{says} {do}".strip() for _, verdict, says, do in lines(one.record) if verdict == LOOK]
+    return list(dict.fromkeys(found))
+
+
+LOOK = Verdict.LOOK.value

@@ -1,0 +1,186 @@
+"""What is fitted and what chooses: declared selection traces, or parts of the estimation traces held out in turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sysid.errors import ConfigError
+from sysid.models import Start, StartKind
+from sysid.models.beginning import LONGEST_WINDOW, SHARE_OF_RECORD
+from sysid.traces import Role, Trace, TraceSet
+from sysid.workbench.fits.data import Data
+
+FOLDS = 4
+"""Parts that choose in turn; from so many estimation traces on, whole ones are held out."""
+BLOCKS, LEAST = 4, 12
+"""Blocks of a trace that a part holds out, and samples of each at least."""
+SHORT = 10_000
+"""Samples up to which every part chooses in turn; of more, one of them."""
+FEWEST = 20
+"""Usable samples of a part without which nothing can be chosen."""
+SEARCHED = 40_000
+"""Samples that are fitted while structures are tried; of a longer record the chosen structure alone sees all."""
+END = 0.25
+"""Share of each trace that an order search chooses on."""
+SEARCH = {"max_iterations": 200}
+"""How a network is trained while structures are tried."""
+LAST = {"starts": 6}
+"""How the chosen one is trained in the end, where that is another fit, beside what it was tried with."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fold:
+    """One way to part the estimation traces.
+
+    Args:
+        fitted: What trials are fitted to; no other trace is among them, so that a search cannot see a test case.
+        chooses: What they are chosen on.
+    """
+
+    fitted: TraceSet
+    chooses: tuple[Trace, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Parts:
+    """The estimation traces as the search uses them.
+
+    Args:
+        folds: Ways to part them: what a trial is worth is the geometric mean over all.
+        told: How they were parted, one sentence each.
+        partial: Whether the chosen structure has to be fitted once more, to all there is.
+    """
+
+    folds: tuple[Fold, ...]
+    told: tuple[str, ...]
+    partial: bool
+
+    @property
+    def training(self) -> dict[str, Any]:
+        """How a network is trained while structures are tried.
+
+        Declared selection traces choose between its starts too. Parts that are held out do not, nor do they stop it
+        early, as the last fit, to all of the record, has none: what is tried is what is done then.
+        """
+        if not self.partial:
+            return {**SEARCH, "starts": 4}
+        return {**SEARCH, "starts": 1 if len(self.folds) > 1 else 2, "choose_by": "evidence"}
+
+
+def part(data: Data, start: Start) -> Parts:
+    """Part the estimation traces into what is fitted and what chooses.
+
+    Args:
+        data: The traces of the pipeline.
+        start: How each free run begins.
+
+    Returns:
+        The parts.
+
+    Raises:
+        ConfigError: If too little is left to choose by.
+    """
+    traces = data.estimation
+    if data.selection:
+        names = ", ".join(trace.name for trace in data.selection)
+        pairs, partial, told = [(list(traces), list(data.selection))], False, f"The selection traces chose: {names}."
+    else:
+        pairs, told = _held_out(traces, start)
+        partial = True
+    least = min(sum(int(trace.usable_samples.sum()) for trace in chooses) for _, chooses in pairs)
+    if least < FEWEST:
+        raise ConfigError(
+            "the record is too short for a search",
+            where=f"data set {data.traces.name}",
+            expected=f"{FEWEST} usable samples to choose by, or more",
+            got=f"{least}",
+            remedy="record for longer, or fit a structure of few parameters with sysid orders or sysid run",
+        )
+    sentences, total = [told], max(sum(map(len, fitted)) for fitted, _ in pairs)
+    if total > SEARCHED:
+        share, partial = SEARCHED / total, True
+        pairs = [([_piece(one, 0, math.ceil(share * len(one))) for one in fitted], rest) for fitted, rest in pairs]
+        sentences.append(f"Trials saw the first {share:.0%} of what is fitted, and what was chosen all of it.")
+    return Parts(folds=tuple(_fold(data, *pair) for pair in pairs), told=tuple(sentences), partial=partial)
+
+
+def ends_held_out(traces: Sequence[Trace]) -> tuple[tuple[Trace, ...], tuple[Trace, ...]]:
+    """The traces without their ends, and these ends.
+
+    Args:
+        traces: Estimation traces.
+
+    Returns:
+        What is fitted, and what chooses.
+    """
+    cuts = [(trace, round((1.0 - END) * len(trace))) for trace in traces]
+    fitted = tuple(_piece(trace, 0, cut) for trace, cut in cuts if cut)
+    return fitted, tuple(_piece(trace, cut, len(trace)) for trace, cut in cuts if cut < len(trace))
+
+
+Pairs = list[tuple[list[Trace], list[Trace]]]
+
+
+def _held_out(traces: Sequence[Trace], start: Start) -> tuple[Pairs, str]:
+    """What is fitted and what chooses, fold by fold, and the rule."""
+    if len(traces) >= FOLDS:
+        groups = [list(traces[k::FOLDS]) for k in range(FOLDS)]
+        pairs = [([one for one in traces if one not in group], group) for group in groups]
+        what = f"every {FOLDS}th estimation trace"
+    else:
+        blocks = {_blocks(trace, start) for trace in traces}
+        pairs = [_masked(traces, k, start) for k in range(FOLDS)]
+        what = f"every {FOLDS}th of {max(blocks)} blocks of {'the' if len(traces) == 1 else 'each'} estimation trace"
+    rule = f"No selection traces are declared, so that {what} chose"
+    if sum(map(len, traces)) <= SHORT:
+        return pairs, f"{rule}, all of them in turn, and was not fitted meanwhile."
+    return pairs[-1:], f"{rule} and was not fitted meanwhile."
+
+
+def _masked(traces: Sequence[Trace], fold: int, start: Start) -> tuple[list[Trace], list[Trace]]:
+    """Traces whose every fourth block does not count, and the same of which nothing else does.
+
+    Both run over the whole record from the same beginning, so that no block has an initial state of its own to guess.
+    """
+    fitted, chooses = [], []
+    for trace in traces:
+        n, first = len(trace), _first(len(trace), start)
+        block = np.maximum(np.arange(n) - first, 0) * _blocks(trace, start) // max(n - first, 1)
+        held, begins = block % FOLDS == fold, np.arange(n) < first
+        fitted.append(replace(trace, usable=trace.usable_samples & (~held | begins)))
+        chooses.append(
+            replace(trace, name=f"{trace.name}, held out {fold + 1}", usable=trace.usable_samples & (held | begins))
+        )
+    return fitted, chooses
+
+
+def _blocks(trace: Trace, start: Start) -> int:
+    return FOLDS * max(1, min(BLOCKS, (len(trace) - _first(len(trace), start)) // (FOLDS * LEAST)))
+
+
+def _first(n: int, start: Start) -> int:
+    """Samples from which a run takes its initial state; they are in both parts, and scored in neither."""
+    if start.kind is StartKind.ESTIMATED:
+        return start.n_measured or min(LONGEST_WINDOW, n // SHARE_OF_RECORD)
+    return min(start.n_measured, n - 1)
+
+
+def _fold(data: Data, fitted: Sequence[Trace], chooses: Sequence[Trace]) -> Fold:
+    roles = {trace.name: Role.ESTIMATION for trace in fitted}
+    return Fold(fitted=TraceSet(name=data.traces.name, traces=tuple(fitted), roles=roles), chooses=tuple(chooses))
+
+
+def _piece(trace: Trace, first: int, last: int) -> Trace:
+    return replace(
+        trace,
+        name=trace.name if first == 0 else f"{trace.name}, from sample {first}",
+        values=trace.values[first:last],
+        usable=None if trace.usable is None else trace.usable[first:last],
+        weights=None if trace.weights is None else trace.weights[first:last],
+        start_time=trace.start_time + first * trace.sample_time,
+    )

@@ -1,0 +1,309 @@
+"""A search for a model as steps: its trials, which keep themselves, then what was chosen as a pipeline of fits."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from sysid.estimation import FitResult
+from sysid.reporting.results import Results
+from sysid.reporting.sweep_record import SweepRecord, write_sweep
+from sysid.workbench.auto.budget import REFIT
+from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.parts import LAST
+from sysid.workbench.auto.refit import refitted
+from sysid.workbench.auto.search import FOUND, TITLE, Found, Hire, Search, stand_in
+from sysid.workbench.auto.table import table_of_front
+from sysid.workbench.fits import steps
+from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
+from sysid.workbench.fits.data import Data
+from sysid.workbench.fits.outputs import FitModel, models_of
+from sysid.workbench.fits.run import FitSteps, GivenFit
+from sysid.workbench.fits.table import table_of_fits
+from sysid.workbench.runner import events
+from sysid.workbench.runner.program import Closing, Program, carry_out
+from sysid.workbench.runner.run import Run
+from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
+from sysid.workbench.runner.store import digest, strict, write_bytes
+from sysid.workbench.sweep.store import TRIALS
+from sysid.workbench.sweep.trial import Bench
+from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess, LocalWorkers, NoWorkers
+from sysid.yaml_files import check, read_yaml
+
+if TYPE_CHECKING:
+    from sysid.workbench.kinds import RunRequest
+
+
+def hire(bench: Bench, workers: int) -> AbstractWorkers:
+    """Who trains.
+
+    Args:
+        bench: What they share.
+        workers: How many.
+
+    Returns:
+        Processes of this machine; for one, this process itself.
+    """
+    return LocalWorkers(bench, workers) if workers > 1 else InThisProcess(bench)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Auto:
+    """A search and where it was read from.
+
+    Args:
+        config: The checked fields.
+        text: The YAML as written.
+        path: Its file, or the one that it would have.
+        load: Gives the traces where they are at hand; by default they are loaded as the YAML says.
+        page: Whether a page is made of the results.
+    """
+
+    config: AutoConfig
+    text: str
+    path: Path
+    load: Callable[[], Data] | None = None
+    page: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Searched:
+    """What came of a search.
+
+    Args:
+        record: Every trial.
+        results: The contents of ``results.json``: what was chosen, and the best linear model beside it.
+        told: What a reader has to know: what chose, and what is wrong with the record.
+    """
+
+    record: SweepRecord
+    results: Results
+    told: tuple[str, ...]
+
+
+def auto_of(config: AutoConfig, *, load: Callable[[], Data] | None = None, page: bool = True) -> Auto:
+    """A search that is in no file.
+
+    Args:
+        config: Its fields.
+        load: Gives the traces.
+        page: Whether a page is made of the results.
+
+    Returns:
+        The search, with the YAML that makes it again.
+    """
+    fields = {"kind": config.kind, **config.model_dump(mode="json", exclude_defaults=True)}
+    text = yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=116)
+    return Auto(config=config, text=text, path=Path.cwd() / f"{config.name}.yaml", load=load, page=page)
+
+
+def program(request: RunRequest) -> Program[Searched]:
+    """What ``sysid run`` does of a pipeline of kind ``auto``.
+
+    Args:
+        request: What was asked.
+
+    Returns:
+        The program.
+
+    Raises:
+        ConfigError: If the pipeline cannot be used.
+    """
+    config = check(AutoConfig, read_yaml(request.path), where=request.path)
+    text = request.path.read_text(encoding="utf-8-sig")
+    return program_of(Auto(config=config, text=text, path=request.path.resolve()))
+
+
+def program_of(auto: Auto, *, find_workers: Hire = hire, verb: str = "run") -> Program[Searched]:
+    """A search as a program.
+
+    Args:
+        auto: What to do.
+        find_workers: Finds who trains.
+        verb: The command that runs it.
+
+    Returns:
+        The program.
+    """
+    work = _AutoSteps(auto=auto, find_workers=find_workers)
+    return Program(
+        name=auto.config.name,
+        keep=lambda folder: write_bytes(folder / "pipeline.yaml", auto.text.encode()),
+        steps=work.run,
+        outline=work.outline,
+        closing=closing,
+        verb=verb,
+    )
+
+
+def run_auto(
+    auto: Auto,
+    folder: Path,
+    *,
+    command: str,
+    fresh: bool = False,
+    watchers: Sequence[events.Watcher] = (),
+    find_workers: Hire = hire,
+) -> Searched:
+    """Search; what an earlier session has finished is not done again, however that session ended.
+
+    Args:
+        auto: What to do.
+        folder: The run folder.
+        command: The command that makes the run again, for the report.
+        fresh: Do everything again.
+        watchers: Told everything that happens, in order.
+        find_workers: Finds who trains.
+
+    Returns:
+        Every trial, and what was chosen.
+
+    Raises:
+        BusyError: If another run is at work in the folder.
+        UserError: If data or options cannot be used as they are, or nothing that was tried can.
+        ParityError: If an exported file differs from its model.
+    """
+    done = program_of(auto, find_workers=find_workers)
+    return carry_out(done, folder, command=command, fresh=fresh, watchers=watchers)
+
+
+def closing(searched: Searched, folder: Path) -> Closing:
+    """What is said at the end: the front, the fits by case, why this one, and what to look at.
+
+    Args:
+        searched: What came of the search.
+        folder: The run folder.
+
+    Returns:
+        The lines and files.
+    """
+    notes = [f"note: {one}" for one in searched.told if one not in searched.record.chosen_by]
+    return Closing(
+        lines=[
+            table_of_front(searched.record),
+            table_of_fits(searched.results),
+            f"Why this one: {searched.record.chosen_by}",
+            *notes,
+        ],
+        files={
+            "Report": folder / "report" / "index.html",
+            "Bundle": folder / "bundle",
+            "Trials": folder / "sweep.json",
+            "Results": folder / "results.json",
+        },
+        compare=True,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _AutoSteps:
+    """The steps of a search: its trials, which keep themselves, and those of a pipeline of fits for what was found."""
+
+    auto: Auto
+    find_workers: Hire
+
+    @property
+    def config(self) -> AutoConfig:
+        """The checked fields."""
+        return self.auto.config
+
+    def outline(self) -> list[Outlined]:
+        """All steps, as far as they are known before a trial is."""
+        data, *rest = FitSteps(pipeline=self._first).outline()
+        # Of which structure the chosen one is, nobody knows.
+        named = [
+            replace(one, title=one.title.partition(",")[0]) if one.name.startswith("fit-") else one for one in rest
+        ]
+        return [data, Outlined(name=TRIALS, title=TITLE, estimate=self._estimate), *named]
+
+    def run(self, run: Run) -> Searched:
+        """Every step, in order."""
+        loaded = run.do(self._loading())
+        found = run.do(self._searching(run, loaded)).value
+        fits = [self._fit(name, found) for name in found.shown]
+        pipeline, given = self._pipeline(fits), dict[str, GivenFit]()
+        for fit in fits:
+            for model, made in zip(models_of(fit, pipeline.config), found.fits[fit.name], strict=True):
+                given[model.fit.name] = _again(model, made, loaded.value) if found.parts.partial else made
+        choice = steps.Choice(name=FOUND, chosen_by=found.record.chosen_by)
+        results = FitSteps(pipeline=pipeline, given=given, chosen=choice, page=self.auto.page).run(run, loaded)
+        ready = events.SweepReady(
+            record=found.record, folder=run.store.path, command=run.command, data=self.config.data,
+            seed=self.config.seed,
+        )  # fmt: skip
+        run.then(lambda: run.tell(ready))
+        return Searched(record=found.record, results=results, told=found.told)
+
+    @property
+    def _estimate(self) -> Estimate:
+        wall = self.config.wall_s
+        return NOT_KNOWN if wall is None else Estimate(seconds=wall, basis="at most; it stops when nothing is gained")
+
+    @property
+    def _first(self) -> Pipeline:
+        """A pipeline that stands for what comes of the search."""
+        return self._pipeline([FitConfig(name=FOUND, structure=stand_in(self.config))])
+
+    def _pipeline(self, fits: list[FitConfig]) -> Pipeline:
+        config = self.config.sweep(stand_in(self.config)).pipeline(fits)
+        return Pipeline(config=config, text=self.auto.text, path=self.auto.path)
+
+    def _loading(self) -> Step[Data]:
+        step, load = FitSteps(pipeline=self._first).loading(), self.auto.load
+        return step if load is None else replace(step, make=lambda _: load(), at_hand=lambda: True)
+
+    def _searching(self, run: Run, loaded: Done[Data]) -> Step[Found]:
+        return Step(
+            name=TRIALS,
+            title=TITLE,
+            make=lambda work: self._searched(run, work, loaded.value),
+            peek=lambda: self._stored(run, loaded.value),
+            outcome=lambda found: f"{found.shown[FOUND].label} of {len(found.record.trials)} tried",
+            was_found=lambda found: found.done_now == 0,
+            how_long=lambda: self._estimate,
+        )
+
+    def _stored(self, run: Run, data: Data) -> Found:
+        """What came of the trials, if all of them are there."""
+        search = Search.of(self.config, data, run)
+        return search.go(NoWorkers(), search.store.stopped_clock())
+
+    def _searched(self, run: Run, work: Work, data: Data) -> Found:
+        if run.fresh:
+            shutil.rmtree(run.store.path / TRIALS, ignore_errors=True)
+        work.say("looking at the traces")
+        search = Search.of(self.config, data, run)
+        workers = self.find_workers(search.bench, self.config.workers)
+        try:
+            with search.store.clock() as clock:
+                found = search.go(workers, clock)
+        finally:
+            workers.close()
+        write_sweep(run.store.path, found.record)
+        return found
+
+    def _fit(self, name: str, found: Found) -> FitConfig:
+        """A trial as a fit of a pipeline; one that is fitted once more has more starts, and a share of the time."""
+        options = dict[str, Any](found.training[name])
+        if found.parts.partial and "starts" in options:
+            options |= LAST
+        if "max_time_s" in options and self.config.wall_s is not None:
+            options["max_time_s"] = round(REFIT * self.config.wall_s, 3)
+        structure: Mapping[str, Any] = found.shown[name].structure
+        return FitConfig.model_validate({"name": name, "structure": dict(structure), "training": options or None})
+
+
+def _again(model: FitModel, made: GivenFit, data: Data) -> GivenFit:
+    """A model that was chosen on parts of the record, fitted once more to all of it."""
+    key = digest(strict({"chosen": made.key, "again": steps.fit_key(model.fit, model.config, data, None)}))
+    return GivenFit(key=key, make=partial(_make_again, model.fit, model.config, data, made))
+
+
+def _make_again(fit: FitConfig, config: PipelineConfig, data: Data, made: GivenFit, work: Work) -> FitResult:
+    return refitted(work, fit, config, data, chosen=made.make(work))

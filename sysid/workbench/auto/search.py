@@ -1,0 +1,236 @@
+"""The trials of a search, from the look at the data to the choice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from sysid.errors import ConfigError
+from sysid.models import ARX, AbstractStructure
+from sysid.reporting.sweep_record import SweepRecord, Trial
+from sysid.workbench.auto.budget import TRIAL, Budget
+from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
+from sysid.workbench.auto.look import Looked, look
+from sysid.workbench.auto.parts import Parts, part
+from sysid.workbench.auto.plan import Plan
+from sysid.workbench.auto.trials import Trials
+from sysid.workbench.auto.words import Choice, choose, sentence
+from sysid.workbench.fits.config import FitConfig
+from sysid.workbench.fits.data import Data
+from sysid.workbench.fits.run import GivenFit
+from sysid.workbench.runner import events
+from sysid.workbench.runner.run import Run
+from sysid.workbench.sweep.checks import Checks
+from sysid.workbench.sweep.driver import Driver
+from sysid.workbench.sweep.store import TRIALS, Clock, TrialStore
+from sysid.workbench.sweep.trial import Bench
+from sysid.workbench.sweep.workers import AbstractWorkers
+
+FOUND, LINEAR = "best found", "best linear"
+"""Names of the fits that a search hands to the pipeline."""
+TITLE = "Searching for a model"
+
+
+def stand_in(config: AutoConfig) -> AbstractStructure:
+    """Stands for what is tried where only what all trials share matters.
+
+    Args:
+        config: The search.
+
+    Returns:
+        A structure for its inputs.
+    """
+    m = len(config.mapping.inputs)
+    return ARX(na=1, nb=(1,) * m, nk=(1,) * m)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Found:
+    """What the trials came to.
+
+    Args:
+        record: All of them.
+        shown: By the name of the fit: what was chosen, and the best linear model where that is another.
+        fits: Their fits, as they were made, one a model.
+        training: Their options.
+        parts: What was fitted and what chose.
+        told: What a reader has to know.
+        done_now: Trials that this session has done itself.
+    """
+
+    record: SweepRecord
+    shown: Mapping[str, Trial]
+    fits: Mapping[str, list[GivenFit]]
+    training: Mapping[str, Mapping[str, Any]]
+    parts: Parts
+    told: tuple[str, ...]
+    done_now: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Search:
+    """A search over the traces of one pipeline.
+
+    Args:
+        config: What is searched, and how much may be spent.
+        data: The traces.
+        run: Is told how it goes, and has the folder.
+        parts: What is fitted and what chooses.
+        bench: What all trials share.
+        looked: What is in the record.
+    """
+
+    config: AutoConfig
+    data: Data
+    run: Run
+    parts: Parts
+    bench: Bench
+    looked: Looked
+
+    @classmethod
+    def of(cls, config: AutoConfig, data: Data, run: Run) -> Search:
+        """Look at the traces, and part them.
+
+        Args:
+            config: What is searched.
+            data: The traces.
+            run: Has the folder.
+
+        Returns:
+            The search, before its first trial.
+
+        Raises:
+            ConfigError: If the record is too short.
+        """
+        parts = part(data, config.start)
+        structure = stand_in(config)
+        pipeline = config.sweep(structure).pipeline([FitConfig(name=FOUND, structure=structure)])
+        first = parts.folds[0]
+        bench = Bench(
+            folder=run.store.path,
+            pipeline=pipeline.model_dump(mode="json"),
+            traces=first.fitted,
+            selection=first.chooses,
+            sequences=data.sequences,
+            folds=tuple((fold.fitted, fold.chooses) for fold in parts.folds),
+        )
+        looked = look(data, config.mapping, config.start)
+        return cls(config=config, data=data, run=run, parts=parts, bench=bench, looked=looked)
+
+    @property
+    def store(self) -> TrialStore:
+        """Where trials lie."""
+        return TrialStore(path=self.run.store.path / TRIALS)
+
+    def go(self, workers: AbstractWorkers, clock: Clock) -> Found:
+        """Try what there is to try, and choose.
+
+        Args:
+            workers: Who trains.
+            clock: The time that it takes, over all sessions.
+
+        Returns:
+            What was found.
+
+        Raises:
+            ConfigError: If nothing that was tried can be used.
+        """
+        driver = Driver(
+            config=self.config.sweep(stand_in(self.config)),
+            bench=self.bench,
+            store=self.store,
+            workers=workers,
+            clock=clock,
+            step=TITLE,
+            tell=lambda event: self.run.tell(_progress(event, plan)),
+        )
+        trials = Trials.of(driver)
+        budget = Budget(
+            wall_s=self.config.wall_s,
+            iterations=self.config.iterations,
+            clock=lambda: clock.total,
+            is_stored=trials.is_stored,
+            side_by_side=self.config.workers,
+            folds=len(self.parts.folds),
+        )
+        training = {**self.parts.training, **budget.limits(TRIAL / len(self.parts.folds))}
+        plan = Plan(looked=self.looked, budget=budget, error=error, training=training)
+        while points := plan.ask():
+            plan.tell(trials.run(points))
+        if not math.isfinite(plan.least()):
+            raise ConfigError(
+                "nothing that was tried can be used",
+                where=f"data set {self.data.traces.name}",
+                expected="a fit that is stable and improves on where it started",
+                got=", ".join(sorted({trial.status for trial in plan.trials})) or "no trial within the budget",
+                remedy="allow more minutes, and look at the record with sysid advise",
+            )
+        return self._chosen(plan, trials, clock.total)
+
+    def _chosen(self, plan: Plan, trials: Trials, wall_s: float) -> Found:
+        first = trials.drivers[0]
+        checks = Checks(driver=first, bench=self.bench.fold(0))
+        choice = choose(plan.trials, error, checks.first_stable)
+        shown = {FOUND: choice.chosen}
+        if choice.linear is not None and choice.linear.number != choice.chosen.number:
+            shown[LINEAR] = choice.linear
+        return Found(
+            record=self._record(plan, choice, wall_s),
+            shown=shown,
+            fits={name: checks.given(trial) for name, trial in shown.items()},
+            training={name: first.last[trial.number].training for name, trial in shown.items()},
+            parts=self.parts,
+            told=(*self.parts.told, *(f"Look at the data: {one}" for one in self.looked.cautions)),
+            done_now=trials.done_now,
+        )
+
+    def _record(self, plan: Plan, choice: Choice, wall_s: float) -> SweepRecord:
+        outputs = self.config.mapping.outputs
+        # Errors of several outputs count over their variances: in standard deviations.
+        unit = self.bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
+        said = sentence(choice, plan.trials, unit=unit, ended=plan.ended, error=error)
+        return SweepRecord(
+            name=self.config.name,
+            mapping=str(self.config.mapping),
+            unit=unit,
+            method="auto",
+            loop="closed",
+            points=len(plan.trials),
+            objectives=list(OBJECTIVES),
+            choose_by="free_run_mse",
+            choose_on="selection",
+            chosen_by=" ".join([said, *self.parts.told]),
+            workers=self.config.workers,
+            wall_s=wall_s,
+            winner=choice.chosen.number,
+            trials=list(plan.trials),
+        )
+
+
+def error(trial: Trial) -> float:
+    """What chooses.
+
+    Args:
+        trial: A trial.
+
+    Returns:
+        The mean square of its free run over what chooses; infinite for what cannot be used.
+    """
+    value = float(trial.selection_free_run_mse)
+    return value if trial.in_full and math.isfinite(value) else math.inf
+
+
+def _progress(event: events.Event, plan: Plan) -> events.Event:
+    """How far the search is, in place of how far a round is."""
+    if not isinstance(event, events.StepProgress):
+        return event
+    least = plan.least()
+    best = f", least error so far {math.sqrt(least):.3g}" if math.isfinite(least) else ""
+    detail = f"{len(plan.trials)} tried, {plan.budget.left()}{best}"
+    return replace(event, fraction=plan.budget.fraction(), detail=detail)
+
+
+Hire = Callable[[Bench, int], AbstractWorkers]
+"""Finds workers for a number of processes."""

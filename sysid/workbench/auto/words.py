@@ -1,0 +1,86 @@
+"""Which trial is chosen, and why, in one sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from sysid.estimation.estimators import ESTIMATORS
+from sysid.reporting.numbers import quantity
+from sysid.reporting.sweep_record import Trial
+from sysid.workbench.auto.plan import ALIKE
+
+Error = Callable[[Trial], float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """What was chosen.
+
+    Args:
+        chosen: The trial.
+        least: The one of the least error.
+        linear: The best linear one; ``None`` where none can be used.
+        refused: Trials of less error that were passed over, as their free run is not stable.
+    """
+
+    chosen: Trial
+    least: Trial
+    linear: Trial | None
+    refused: int
+
+
+def choose(
+    trials: Sequence[Trial], error: Error, first_stable: Callable[[Sequence[Trial]], tuple[Trial, int]]
+) -> Choice:
+    """The smallest of those whose error is as good as the least.
+
+    Args:
+        trials: All of them; at least one can be used.
+        error: What chooses, as a mean square.
+        first_stable: The first of some whose free run is stable, and how many were passed over.
+
+    Returns:
+        The choice.
+    """
+    usable = sorted((t for t in trials if math.isfinite(error(t))), key=lambda t: (error(t), t.number))
+    chosen, refused = first_stable(usable)
+    limit = error(chosen) * (1.0 + ALIKE) ** 2
+    alike = [t for t in usable if error(t) <= limit and t not in usable[:refused]]
+    smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
+    linear = [t for t in usable if ESTIMATORS[t.structure["kind"]].linear]
+    return Choice(chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused)
+
+
+def sentence(choice: Choice, trials: Sequence[Trial], *, unit: str, ended: str, error: Error) -> str:
+    """Why this one.
+
+    Args:
+        choice: What was chosen.
+        trials: All that was tried.
+        unit: Of the output.
+        ended: Why the search ended.
+        error: What chooses.
+
+    Returns:
+        One sentence, and another where some were passed over.
+    """
+    root = math.sqrt(error(choice.chosen))
+    why = f"{choice.chosen.label} has the least free-run error on what chose, {quantity(root, unit)} (root mean square)"
+    if choice.least.number != choice.chosen.number:
+        why = (
+            f"{choice.chosen.label} is the smallest within {ALIKE:.0%} of the least free-run error on what chose: "
+            f"{quantity(root, unit)} (root mean square) beside {quantity(math.sqrt(error(choice.least)), unit)} of "
+            f"{choice.least.label}"
+        )
+    parts = [f"{why}, of {len(trials)} tried"]
+    if choice.linear is not None and choice.linear.number != choice.chosen.number:
+        share = 1.0 - root / math.sqrt(error(choice.linear))
+        parts.append(f"{share:.0%} less than the best linear model, {choice.linear.label}")
+    elif choice.linear is not None:
+        parts.append("and no network does better")
+    said = f"{'; '.join(parts)}; {ended}."
+    if choice.refused:
+        said += f" {choice.refused} of less error were passed over: their free run is not stable."
+    return said

@@ -1,0 +1,60 @@
+"""What a search may spend."""
+
+from __future__ import annotations
+
+import pytest
+
+from sysid.models import ARX, NeuralStateSpace
+from sysid.workbench.auto.budget import REFIT, Budget, price
+from sysid.workbench.sweep.search_space import Point
+from tests.workbench.auto.test_plan import trial
+
+
+def point(number: int, neurons: int, starts: int = 1) -> Point:
+    training = {"max_iterations": 100, "starts": starts}
+    return Point(number=number, structure=NeuralStateSpace(states=2, neurons=neurons), training=training, values={})
+
+
+LINEAR = Point(number=1, structure=ARX(na=1, nb=(1,), nk=(1,)), training={}, values={})
+
+
+def budget(seconds: float | None = None, *, clock: list[float] | None = None, **given: object) -> Budget:
+    now = clock or [0.0]
+    fields = {"wall_s": seconds, "iterations": None, "is_stored": lambda _: False, **given}
+    return Budget(clock=lambda: now[0], **fields)  # type: ignore[arg-type]
+
+
+def test_a_price_counts_every_start_and_every_fold() -> None:
+    assert price(LINEAR) == 1
+    assert price(point(1, 5)) == 100
+    assert price(point(1, 5), 4) == 400
+    assert 100 < price(point(1, 5, starts=6)) < 600
+
+
+def test_a_trial_that_would_take_too_long_is_not_begun() -> None:
+    clock = [0.0]
+    found = budget(100.0, clock=clock)
+    (first,) = found.take([point(1, 4)])
+    found.tell([trial(first, 1.0).model_copy(update={"seconds": 12.0})])
+    clock[0] = 70.0  # 10 s are left, and what is kept for the last fit
+    assert [one.number for one in found.take([point(2, 4), LINEAR])] == [1]
+
+
+def test_time_is_kept_for_the_last_fit() -> None:
+    assert budget(100.0, clock=[100.0 * (1.0 - REFIT) + 1.0]).take([LINEAR]) == []
+
+
+def test_what_is_stored_costs_no_time() -> None:
+    found = budget(100.0, clock=[1000.0], is_stored=lambda one: one.number == 1)
+    assert [one.number for one in found.take([point(1, 5), point(2, 5)])] == [1]
+
+
+def test_iterations_know_no_time() -> None:
+    found = budget(None, iterations=250, clock=[1e9])
+    assert len(found.take([point(n, 5) for n in range(1, 5)])) == 2
+    assert found.fraction() == pytest.approx(0.8)
+    assert found.limits(0.1) == {}
+
+
+def test_a_share_of_the_time_limits_a_training() -> None:
+    assert budget(60.0).limits(0.5) == {"max_time_s": 30.0}

@@ -1,0 +1,94 @@
+"""What is fitted and what chooses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sysid.errors import ConfigError
+from sysid.models import Start, StartKind
+from sysid.traces import Role
+from sysid.workbench.auto.parts import FOLDS, SEARCHED, SHORT, ends_held_out, part
+from tests.workbench.auto.conftest import data, record
+
+STARTS = (
+    Start(kind=StartKind.ESTIMATED),
+    Start(kind=StartKind.ESTIMATED, n_measured=7),
+    Start(kind=StartKind.MEASURED, n_measured=12),
+    Start(kind=StartKind.REST),
+)
+
+
+@given(n=st.integers(min_value=150, max_value=400), start=st.sampled_from(STARTS), traces=st.sampled_from([1, 2, 3]))
+def test_every_sample_after_the_beginning_chooses_once_and_is_not_fitted_then(
+    n: int, start: Start, traces: int
+) -> None:
+    names = "abc"[:traces]
+    found = part(data(*(record(name, n) for name in names)), start)
+    assert (len(found.folds), found.partial) == (FOLDS, True)
+    for place in range(traces):
+        masks = [(f.fitted.traces[place].usable_samples, f.chooses[place].usable_samples) for f in found.folds]
+        both = np.flatnonzero(masks[0][0] & masks[0][1])
+        assert np.array_equal(both, np.arange(len(both)))  # the beginning, of which the state is taken
+        assert len(both) >= start.n_measured
+        later = slice(len(both), None)
+        assert all(np.array_equal(fitted[later], ~chooses[later]) for fitted, chooses in masks)
+        assert np.array_equal(sum(chooses[later].astype(int) for _, chooses in masks), np.ones(n - len(both)))
+
+
+def test_masked_samples_stay_masked() -> None:
+    usable = np.ones(300, dtype=bool)
+    usable[100:140] = False
+    found = part(data(replace(record("a", 300), usable=usable)), STARTS[0])
+    for fold in found.folds:
+        assert not fold.fitted.traces[0].usable_samples[100:140].any()
+        assert not fold.chooses[0].usable_samples[100:140].any()
+
+
+def test_declared_selection_traces_choose_and_nothing_is_held_out() -> None:
+    estimation, chooses = record("a", 100), record("b", 100, seed=1)
+    found = part(data(estimation, others={Role.SELECTION: chooses}), STARTS[0])
+    (fold,) = found.folds
+    assert fold.fitted.traces == (estimation,)
+    assert fold.chooses == (chooses,)
+    assert not found.partial
+
+
+def test_of_many_traces_whole_ones_are_held_out() -> None:
+    names = "abcdef"
+    found = part(data(*(record(name, 60) for name in names)), STARTS[0])
+    for fold in found.folds:
+        kept, held = set(fold.fitted.names), {trace.name for trace in fold.chooses}
+        assert (kept | held, kept & held) == (set(names), set())
+    assert sorted(trace.name for fold in found.folds for trace in fold.chooses) == list(names)
+
+
+def test_no_trace_that_only_scores_is_among_the_parts() -> None:
+    test = record("test", 100, seed=1)
+    found = part(data(record("a", 200), others={Role.TEST: test}), STARTS[0])
+    assert all(trace.name != "test" for fold in found.folds for trace in (*fold.fitted, *fold.chooses))
+
+
+def test_a_long_record_is_searched_by_a_part_and_fitted_whole() -> None:
+    long = part(data(record("a", SHORT + 1)), STARTS[0])
+    assert (len(long.folds), long.partial) == (1, True)
+    declared = {Role.SELECTION: record("b", 100, seed=1)}
+    longer = part(data(record("a", 2 * SEARCHED), others=declared), STARTS[0])
+    assert len(longer.folds[0].fitted.traces[0]) == SEARCHED
+    assert longer.partial
+
+
+def test_too_short_a_record_says_what_to_do() -> None:
+    with pytest.raises(ConfigError, match="too short for a search") as caught:
+        part(data(record("a", 30)), STARTS[0])
+    assert "declare" in str(caught.value) or "longer" in str(caught.value)
+
+
+def test_an_order_search_chooses_on_the_ends() -> None:
+    fitted, chooses = ends_held_out([record("a", 100)])
+    assert (len(fitted[0]), len(chooses[0])) == (75, 25)
+    assert chooses[0].start_time == pytest.approx(7.5)

@@ -1,0 +1,106 @@
+"""Which structures are tried, in which order, and when a search ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from sysid.estimation.estimators import ESTIMATORS
+from sysid.models import ARX, NeuralStateSpace
+from sysid.reporting.sweep_record import Trial
+from sysid.workbench.auto.budget import Budget, price
+from sysid.workbench.auto.look import Looked
+from sysid.workbench.auto.plan import PATIENCE, Plan
+from sysid.workbench.auto.search import error
+from sysid.workbench.sweep.search_space import Point
+
+LOOKED = Looked(n_inputs=1, n_outputs=1, orders=(ARX(na=2, nb=(2,), nk=(1,)),))
+Worth = Callable[[Point], float]
+
+
+def trial(point: Point, mse: float) -> Trial:
+    return Trial(
+        number=point.number,
+        key=str(point.number),
+        label=point.structure.label,
+        structure=point.structure.to_dict(),
+        status="CONVERGED",
+        usable=math.isfinite(mse),
+        seconds=0.1,
+        parameters=10,
+        operations=10,
+        selection_free_run_mse=mse,
+    )
+
+
+def searched(worth: Worth, *, iterations: int = 10**9, looked: Looked = LOOKED) -> tuple[Plan, list[list[Point]]]:
+    """A search in which a point is worth what is said of it, without a fit."""
+    budget = Budget(wall_s=None, iterations=iterations, clock=lambda: 0.0, is_stored=lambda _: False)
+    plan, rounds = Plan(looked=looked, budget=budget, error=error, training={"max_iterations": 50}), []
+    while points := plan.ask():
+        rounds.append(points)
+        plan.tell([trial(point, worth(point)) for point in points])
+    return plan, rounds
+
+
+def linear(point: Point) -> bool:
+    return ESTIMATORS[point.structure.kind].linear
+
+
+def by_size(point: Point) -> float:
+    """The more states and neurons up to 3/20, the better."""
+    one = point.structure
+    return 1.0 if not isinstance(one, NeuralStateSpace) else 1.0 / (min(one.states, 3) * min(one.neurons, 20))
+
+
+def test_linear_structures_come_first_and_alone() -> None:
+    _, rounds = searched(lambda _: 1.0)
+    assert all(map(linear, rounds[0]))
+    assert {point.structure.kind for point in rounds[0]} >= {"ARX", "SS", "TransferFunction"}
+    assert not any(map(linear, (point for later in rounds[1:] for point in later)))
+
+
+def test_a_search_that_gains_nothing_ends_soon() -> None:
+    plan, rounds = searched(lambda _: 1.0)
+    assert len(rounds) == 2 + PATIENCE
+    assert "gained less" in plan.ended
+
+
+def test_a_search_goes_where_it_gains() -> None:
+    plan, _ = searched(by_size)
+    best = min(plan.trials, key=error)
+    assert (best.structure["states"], best.structure["neurons"]) >= (3, 20)
+
+
+def test_nothing_is_tried_twice_and_nothing_that_cannot_be() -> None:
+    _, rounds = searched(by_size)
+    tried = [(point.structure.to_dict(), dict(point.training)) for one in rounds for point in one]
+    assert all(tried.count(one) == 1 for one in tried)
+
+
+def test_what_cannot_be_used_leads_nowhere() -> None:
+    plan, rounds = searched(lambda point: 1.0 if linear(point) else math.inf)
+    assert len(rounds) == 2
+    assert plan.least() == 1.0
+
+
+@pytest.mark.parametrize("iterations", [5, 20, 400, 1000])
+def test_iterations_are_not_overspent(iterations: int) -> None:
+    plan, rounds = searched(by_size, iterations=iterations)
+    assert sum(price(point) for one in rounds for point in one) <= iterations
+    assert plan.ended == "the budget is spent"
+
+
+def test_the_same_results_give_the_same_search() -> None:
+    def said() -> list[str]:
+        return [str((p.number, p.structure, p.training)) for one in searched(by_size, iterations=3000)[1] for p in one]
+
+    assert said() == said()
+
+
+@pytest.mark.parametrize("looked", [Looked(n_inputs=0, n_outputs=1), Looked(n_inputs=3, n_outputs=2), LOOKED])
+def test_there_is_something_to_try_for_any_mapping(looked: Looked) -> None:
+    _, rounds = searched(lambda _: 1.0, looked=looked)
+    assert {linear(point) for one in rounds for point in one} == {True, False}

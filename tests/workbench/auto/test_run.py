@@ -1,0 +1,214 @@
+"""A search from its YAML, the command line and Python, to report and bundle."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sysid
+from sysid.errors import ConfigError
+from sysid.ingest import write_csv
+from sysid.reporting.results import read_results
+from sysid.traces import Role
+from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto
+from sysid.workbench.auto.search import FOUND, LINEAR
+from sysid.workbench.cli import run_cli
+from sysid.workbench.fits.data import Data
+from sysid.workbench.runner.events import Event, StepProgress
+from sysid.workbench.sweep.trial import Bench
+from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
+from tests.workbench.auto.conftest import data, record, traces
+
+pytestmark = pytest.mark.usefixtures("undrawn", "small")
+
+FEW = 248
+"""Iterations of two linear structures and two networks, four times each."""
+FIELDS: dict[str, Any] = {"kind": "auto", "name": "tries", "data": "rig", "mapping": "u -> y", "workers": 1}
+FIELDS |= {"export": None, "stability": {"count": 15}}
+
+
+def searched(folder: Path, known: Data, *, told: list[Event] | None = None, find: Any = hire, **given: Any) -> Searched:
+    config = AutoConfig(**{**FIELDS, "iterations": FEW, **given})
+    watchers = [] if told is None else [told.append]
+    return run_auto(
+        auto_of(config, load=lambda: known), folder, command="sysid run tries", watchers=watchers, find_workers=find
+    )
+
+
+def tried(found: Searched) -> list[tuple[int, str, float]]:
+    return [(one.number, one.label, one.selection_free_run_mse) for one in found.record.trials]
+
+
+@pytest.fixture(scope="module")
+def known() -> Data:
+    """A record with a curved system, and another to score on."""
+    return data(record("a", 150), others={Role.TEST: record("test", 80, seed=1)})
+
+
+TOLD: list[Event] = []
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory, known: Data, small: None) -> tuple[Path, Searched]:
+    """A search with few iterations."""
+    folder = tmp_path_factory.mktemp("auto")
+    return folder, searched(folder, known, told=TOLD)
+
+
+def test_a_network_is_found_and_stands_beside_the_best_linear_model(first: tuple[Path, Searched]) -> None:
+    folder, found = first
+    stored = read_results(folder)
+    best, linear = stored.fits
+    assert (best.name, linear.name) == (FOUND, LINEAR)
+    assert best.label == found.record.winning.label if found.record.winning else False
+    assert best.cases["test"].free_run.mse < 0.5 * linear.cases["test"].free_run.mse
+    assert stored.best_name == FOUND
+    assert stored.best is not None
+    assert stored.best.chosen_by == found.record.chosen_by
+    assert {one.label.split()[0] for one in found.record.trials} == {"ARX", "SS", "NSS"}
+
+
+def test_the_chosen_one_is_fitted_once_more_to_all_of_the_record(first: tuple[Path, Searched]) -> None:
+    best = first[1].results.fits[0]
+    assert any("once more" in note for note in best.notes)
+
+
+def test_the_screen_hears_how_much_is_left(first: tuple[Path, Searched]) -> None:
+    shares = [one.fraction for one in TOLD if isinstance(one, StepProgress) and "iterations left" in one.detail]
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.9
+
+
+def test_no_trial_sees_a_case_that_only_scores(first: tuple[Path, Searched], known: Data, tmp_path: Path) -> None:
+    assert all("test" not in one.cases for one in first[1].record.trials)
+    test = known.traces["test"]
+    other = replace(test, values=np.asarray(test.values) + 5.0)
+    again = searched(tmp_path, data(known.traces["a"], others={Role.TEST: other}))
+    assert tried(again) == tried(first[1])
+    assert again.record.chosen_by == first[1].record.chosen_by
+
+
+def test_a_second_run_does_nothing_again(first: tuple[Path, Searched], known: Data) -> None:
+    folder, found = first
+    written = {file: file.stat().st_mtime_ns for file in (folder / "trials").glob("*/*.json")}
+    again = searched(folder, known, find=lambda *_: Refusing())
+    assert tried(again) == tried(found)
+    assert again.record.chosen_by == found.record.chosen_by
+    assert {file: file.stat().st_mtime_ns for file in (folder / "trials").glob("*/*.json")} == written
+
+
+class Refusing(AbstractWorkers):
+    """Does no job."""
+
+    free = 1
+
+    def submit(self, job: Any, before: Any) -> None:  # noqa: ARG002 - as all workers
+        raise AssertionError("a trial is done again")
+
+    def finished(self) -> list[Any]:
+        return []
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+
+class Dying(InThisProcess):
+    """Is killed at its tenth job."""
+
+    count = 0
+
+    def submit(self, job: Any, before: Any) -> None:
+        self.count += 1
+        if self.count == 10:
+            raise KeyboardInterrupt
+        super().submit(job, before)
+
+
+def test_a_search_that_was_killed_comes_to_the_same(first: tuple[Path, Searched], known: Data, tmp_path: Path) -> None:
+    def dying(bench: Bench, _: int) -> AbstractWorkers:
+        return Dying(bench)
+
+    with pytest.raises(KeyboardInterrupt):
+        searched(tmp_path, known, find=dying)
+    again = searched(tmp_path, known)
+    assert tried(again) == tried(first[1])
+    ours, theirs = (json.loads((one / "fits" / "best-found" / "fit.json").read_text()) for one in (tmp_path, first[0]))
+    assert ours["model"] == theirs["model"]
+
+
+def test_another_seed_is_another_search(first: tuple[Path, Searched], known: Data, tmp_path: Path) -> None:
+    again = searched(tmp_path, known, seed=1)
+    assert tried(again) != tried(first[1])
+
+
+def test_declared_selection_traces_choose_and_what_they_chose_is_exported_as_it_is(tmp_path: Path) -> None:
+    known = data(record("a", 150), others={Role.SELECTION: record("b", 100, seed=2)})
+    found = searched(tmp_path, known, iterations=200, export={"formats": ["onnx"]})
+    best, winner = found.results.fits[0], found.record.winning
+    assert winner is not None
+    assert best.selection_mse == pytest.approx(winner.selection_free_run_mse, rel=1e-9)
+    assert best.exports[0].largest_difference < 1e-9
+
+
+def test_several_outputs_are_one_search(tmp_path: Path) -> None:
+    known = data(record("a", 150, outputs=2))
+    found = searched(tmp_path, known, mapping="u -> y1+y2", iterations=20)
+    assert {one.mapping for one in found.results.fits} == {"u -> y1", "u -> y2"} or len(found.results.fits) >= 2
+    assert found.record.unit == "σ"
+
+
+def test_a_pipeline_and_the_command_search_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_csv(record("a", 150), tmp_path / "rig.csv")
+    words = ["auto", "rig.csv", "--iterations", "20", "--workers", "1", "--no-tracking"]
+    assert run_cli(words) == 0
+    said = capsys.readouterr().out
+    assert "Why this one:" in said
+    assert "budget is spent" in " ".join(said.split())
+    folder = tmp_path / "runs" / "auto-rig"
+    assert (folder / "bundle" / "model.json").is_file()
+    assert read_results(folder).command == "sysid auto rig.csv --iterations 20 --seed 0 --workers 1"
+    # What lies in the run folder makes the same run again.
+    (tmp_path / "again.yaml").write_text((folder / "pipeline.yaml").read_text(), encoding="utf-8")
+    assert run_cli(["run", "again.yaml", "--out", "runs/again", "--no-tracking"]) == 0
+    ours, theirs = (json.loads((tmp_path / "runs" / one / "sweep.json").read_text()) for one in ("again", "auto-rig"))
+    assert [one["key"] for one in ours["trials"]] == [one["key"] for one in theirs["trials"]]
+    assert run_cli(["run", "again.yaml", "--dry-run"]) == 0
+
+
+def test_python_searches_what_is_in_memory() -> None:
+    known = traces(record("a", 150))
+    found = sysid.auto(known, "u -> y", iterations=20)
+    assert found.fit is not None
+    assert found.to_frame()["rmse"].is_monotonic_increasing
+    assert found.to_frame()["front"].any()
+    assert found.why in str(found)
+    run = found.fit.simulate(known["a"]["u"])
+    assert run.shape == (150,)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"minutes": 1.0, "iterations": 5}, "two budgets"),
+        ({"minutes": 0.0}, "minutes"),
+        ({"iterations": 0}, "iterations"),
+    ],
+)
+def test_a_budget_that_is_none_is_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        sysid.auto(traces(record("a", 150)), "u -> y", **given)
+
+
+def test_a_data_set_without_estimation_traces_is_refused() -> None:
+    known = traces(record("a", 150))
+    with pytest.raises(ConfigError, match="no trace is for estimation"):
+        sysid.auto(replace(known, roles={"a": Role.TEST}), "u -> y", iterations=10)

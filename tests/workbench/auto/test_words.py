@@ -1,0 +1,62 @@
+"""Which trial is chosen, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sysid.models import ARX, NeuralStateSpace
+from sysid.reporting.sweep_record import Trial
+from sysid.workbench.auto.search import error
+from sysid.workbench.auto.words import choose, sentence
+from sysid.workbench.sweep.search_space import Point
+from tests.workbench.auto.test_plan import trial
+
+
+def network(number: int, rms: float, operations: int) -> Trial:
+    point = Point(number=number, structure=NeuralStateSpace(states=2, neurons=number), training={}, values={})
+    return trial(point, rms**2).model_copy(update={"operations": operations})
+
+
+def arx(number: int, rms: float) -> Trial:
+    point = Point(number=number, structure=ARX(na=1, nb=(1,), nk=(1,)), training={}, values={})
+    return trial(point, rms**2).model_copy(update={"operations": 2})
+
+
+def stable(trials: Sequence[Trial]) -> tuple[Trial, int]:
+    return trials[0], 0
+
+
+TRIALS = [arx(1, 2.0), network(2, 1.02, 20), network(3, 1.0, 60), network(4, 1.2, 10)]
+
+
+def test_the_smallest_of_those_that_are_as_good_is_chosen() -> None:
+    found = choose(TRIALS, error, stable)
+    assert (found.chosen.number, found.least.number) == (2, 3)
+    assert found.linear is not None
+    assert found.linear.number == 1
+
+
+def test_a_linear_model_that_is_as_good_is_chosen() -> None:
+    found = choose([arx(1, 1.01), network(2, 1.0, 60)], error, stable)
+    assert found.chosen.number == 1
+
+
+def test_unstable_ones_are_passed_over_and_counted() -> None:
+    def not_three(trials: Sequence[Trial]) -> tuple[Trial, int]:
+        n = next(place for place, one in enumerate(trials) if one.number not in {2, 3})
+        return trials[n], n
+
+    found = choose(TRIALS, error, not_three)
+    assert (found.chosen.number, found.refused) == (4, 2)
+
+
+def test_dropped_and_failed_trials_are_not_chosen() -> None:
+    dropped = network(5, 0.1, 5).model_copy(update={"dropped_at": 2})
+    failed = network(6, 0.1, 5).model_copy(update={"usable": False})
+    assert choose([*TRIALS, dropped, failed], error, stable).chosen.number == 2
+
+
+def test_the_sentence_says_what_against_what_and_why_it_ended() -> None:
+    said = sentence(choose(TRIALS, error, stable), TRIALS, unit="V", ended="the budget is spent", error=error)
+    for words in ("NSS 2/2", "NSS 2/3", "1.02\u00a0V", "4 tried", "49% less", "ARX [1; 1; 1]", "the budget is spent"):
+        assert words in said
