@@ -37,7 +37,11 @@ def searched(folder: Path, known: Data, *, told: list[Event] | None = None, find
     config = AutoConfig(**{**FIELDS, "iterations": FEW, **given})
     watchers = [] if told is None else [told.append]
     return run_auto(
-        auto_of(config, load=lambda: known), folder, command="sysid run tries", watchers=watchers, find_workers=find
+        auto_of(config, load=lambda: known, page=False),
+        folder,
+        command="sysid run tries",
+        watchers=watchers,
+        find_workers=find,
     )
 
 
