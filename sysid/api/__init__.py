@@ -38,6 +38,7 @@ from sysid.models import (
     BJ,
     NARX,
     OE,
+    GreyBox,
     LinearStateSpace,
     NeuralStateSpace,
     Start,
@@ -48,7 +49,18 @@ from sysid.models import (
 )
 from sysid.traces import Role
 
-__all__ = ["ARX", "NARX", "Comparison", "Fit", "NeuralStateSpace", "OrderSearch", "Role", "StabilityOptions", "Start"]
+__all__ = [
+    "ARX",
+    "NARX",
+    "Comparison",
+    "Fit",
+    "GreyBox",
+    "NeuralStateSpace",
+    "OrderSearch",
+    "Role",
+    "StabilityOptions",
+    "Start",
+]
 __all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining", "VectorStateSpace"]
 __all__ += ["VectorNeuralStateSpace"]
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]

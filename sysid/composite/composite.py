@@ -155,7 +155,7 @@ def _check_structure(mapping: Mapping, structure: AbstractStructure, training: T
             got=structure.kind,
             remedy=f"use the kind {estimators.JOINING[0]}",
         )
-    estimators.check(structure, len(mapping.inputs), training=training)
+    estimators.check(structure, mapping, training=training)
 
 
 @dataclass(frozen=True, kw_only=True)

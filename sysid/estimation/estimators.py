@@ -19,6 +19,9 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.estimation.equilibrium import equilibrium_notes
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.grey_box.fit import STARTS as GREY_STARTS
+from sysid.estimation.grey_box.fit import check_training as check_grey_training
+from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
@@ -55,6 +58,7 @@ from sysid.models import (
     OE,
     AbstractModel,
     AbstractStructure,
+    GreyBox,
     LinearStateSpace,
     Mapping,
     NeuralStateSpace,
@@ -170,11 +174,10 @@ class Estimator:
         return options
 
     def check(
-        self, training: object, initial: AbstractStructure | None, structure: Any, n_inputs: int, n_outputs: int
+        self, training: object, initial: AbstractStructure | None, structure: AbstractStructure, mapping: Mapping
     ) -> None:
         """Refuse what does not go together; see :func:`check`."""
-        structure.check_inputs(n_inputs)
-        structure.check_outputs(n_outputs)
+        structure.check_mapping(mapping)
         if training is not None:
             if self.training is None:
                 raise self.takes_none(training)
@@ -196,7 +199,7 @@ class Estimator:
                     got=initial.label,
                     remedy="leave initial out",
                 )
-            self.initial(structure, initial, n_inputs)
+            self.initial(structure, initial, len(mapping.inputs))
 
     def run(
         self,
@@ -316,6 +319,16 @@ ESTIMATORS: dict[str, Estimator] = {
             )
         ),
         Estimator(
+            structure=GreyBox,
+            name="a grey box",
+            fit=fit_grey_box,
+            training=Training,
+            check_training=check_grey_training,
+            no_posterior=ENDED,
+            begins="a grey box begins at the starts of its parameters",
+            starts=GREY_STARTS,
+        ),
+        Estimator(
             structure=TransferFunction,
             name="a transfer function",
             fit=fit_transfer_function,
@@ -399,9 +412,8 @@ def estimator_of(structure: AbstractStructure) -> Estimator:
 
 def check(
     structure: AbstractStructure,
-    n_inputs: int,
+    mapping: Mapping,
     *,
-    n_outputs: int = 1,
     training: object = None,
     initial: AbstractStructure | None = None,
 ) -> None:
@@ -409,15 +421,14 @@ def check(
 
     Args:
         structure: What is to be fitted.
-        n_inputs: Inputs of the mapping.
-        n_outputs: Outputs of the mapping.
+        mapping: Which channels go in, which come out.
         training: Its options, if any are given.
         initial: The structure of the fit that it is to start from, if there is one.
 
     Raises:
-        ConfigError: If the structure is not for so many inputs, an option does not apply, or it cannot start there.
+        ConfigError: If the structure is not for these channels, an option does not apply, or it cannot start there.
     """
-    estimator_of(structure).check(training, initial, structure, n_inputs, n_outputs)
+    estimator_of(structure).check(training, initial, structure, mapping)
 
 
 def fit(
@@ -462,7 +473,7 @@ def fit(
     if not structure.several_outputs:
         mapping.check_single(row.name)
     begun = None if initial is None else initial.model.structure
-    row.check(training, begun, structure, len(mapping.inputs), len(mapping.outputs))
+    row.check(training, begun, structure, mapping)
     if initial is not None:
         _check_terms(initial.model, mapping, traces[0].sample_time)
     return row.run(

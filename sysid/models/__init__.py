@@ -9,6 +9,9 @@ from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.ends import Ends
 from sysid.models.form import AbstractForm
+from sysid.models.equation_form import EquationForm
+from sysid.models.grey_box import GreyBox, InitialState, Parameter
+from sysid.models.grey_box_model import GreyBoxModel
 from sysid.models.history import History, Start, StartKind
 from sysid.models.innovations import Innovations
 from sysid.models.interpolation import Line
@@ -55,7 +58,11 @@ __all__ = [
     "CascadeRun",
     "Domain",
     "Ends",
+    "EquationForm",
+    "GreyBox",
+    "GreyBoxModel",
     "History",
+    "InitialState",
     "Innovations",
     "Lagged",
     "Lags",
@@ -70,6 +77,7 @@ __all__ = [
     "NeuralStateSpace",
     "NeuralStateSpaceModel",
     "PolynomialModel",
+    "Parameter",
     "Recursion",
     "Scaling",
     "SeveralOutputs",

@@ -87,6 +87,18 @@ class AbstractStructure(ABC):
         """
         return (mapping,) if self.several_outputs else mapping.each
 
+    def check_mapping(self, mapping: Mapping) -> None:
+        """Refuse channels that the structure is not for.
+
+        Args:
+            mapping: Which channels go in, which come out.
+
+        Raises:
+            ConfigError: If a field does not have one entry per channel, or the structure does not know one.
+        """
+        self.check_inputs(len(mapping.inputs))
+        self.check_outputs(len(mapping.outputs))
+
     def check_outputs(self, n_outputs: int) -> None:
         """Refuse a number of outputs that a structure of several is not for.
 

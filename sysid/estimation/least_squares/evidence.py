@@ -57,10 +57,12 @@ class Group:
     Args:
         name: For people.
         members: Positions in the flat parameter vector.
+        known: Whether its precision is known, and not the evidence's to find.
     """
 
     name: str
     members: NDArray[np.int64]
+    known: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,6 +134,7 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     )
     tiny = np.finfo(np.float64).tiny
     alphas = np.clip(gammas / np.maximum(2.0 * energies, tiny), *ALPHA_BOUNDS)
+    alphas = np.where([group.known for group in prior.groups], prior.alphas, alphas)
     beta = max(independent - float(gammas.sum()), 1.0) / max(2.0 * at.loss, tiny)
     return replace(prior, alphas=alphas, beta=beta), evidence
 

@@ -28,7 +28,9 @@ steered through :math:`\lambda` (``damping.factor``) by the gain ratio
 1. the **provider** linearises the residuals: :math:`J^T e` and :math:`J^T J`;
 2. the **damping** raises :math:`D` to the diagonal of :math:`H`;
 3. the **linear solve** gives :math:`\delta`, by Cholesky of :math:`R(H + \lambda D)R` with :math:`R =
-   \mathrm{diag}(H)^{-1/2}`, so that rounding does not see the parameters' units;
+   \mathrm{diag}(H)^{-1/2}`, so that rounding does not see the parameters' units; where the provider has **bounds**,
+   what would leave them is held there and the others are solved for again (an active set, Nocedal and Wright 2006,
+   section 16.5);
 4. the step is taken if :math:`\rho >` ``MIN_GAIN``, and :math:`\lambda` becomes the smaller the better the promise was
    kept, at least a third of itself; otherwise :math:`\lambda` grows, each time twice as fast (Nielsen 1999), and step 3
    is repeated at the price of one run over the records;
@@ -231,7 +233,7 @@ class LevenbergMarquardt:
         now = state.at.loss + state.prior.penalty(state.theta)
         damping = state.damping.scaled_by(np.diag(H))
         while damping.factor <= MAX_DAMPING:
-            step = _solve(H, damping, g)
+            step = _bounded(state.theta, provider.bounds, (H, damping, g))
             trial = state.theta + step
             promised = -float(g @ step + 0.5 * step @ (H @ step))
             gain = (now - provider.loss(trial) - state.prior.penalty(trial)) / promised if promised > 0.0 else -1.0
@@ -262,6 +264,33 @@ class LevenbergMarquardt:
         self.on_state(state)
         self.on_iteration(entry)
         return state
+
+
+def _bounded(
+    theta: NDArray[np.float64],
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+    terms: tuple[NDArray[np.float64], AbstractDamping, NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    """The damped step that stays within bounds: what would leave them goes as far as it may, the others adapt to it.
+
+    A parameter that stands at a bound, and that the gradient draws out of it, stays.
+    """
+    if bounds is None:
+        return _solve(*terms)
+    H, damping, g = terms
+    low, high = bounds[0] - theta, bounds[1] - theta
+    step = np.zeros(len(theta))
+    free = ~(((low >= 0.0) & (g > 0.0)) | ((high <= 0.0) & (g < 0.0)))
+    while free.any():
+        rest = g[free] + H[np.ix_(free, ~free)] @ step[~free]
+        scale = None if damping.scale is None else damping.scale[free]
+        step[free] = _solve(H[np.ix_(free, free)], replace(damping, scale=scale), rest)
+        out = free & ((step < low) | (step > high))
+        if not out.any():
+            break
+        step[out] = np.clip(step, low, high)[out]
+        free &= ~out
+    return np.clip(step, low, high)
 
 
 def _solve(H: NDArray[np.float64], damping: AbstractDamping, g: NDArray[np.float64]) -> NDArray[np.float64]:

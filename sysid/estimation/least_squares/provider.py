@@ -48,6 +48,11 @@ class AbstractProvider(ABC):
     n_samples: int
     """Samples that count."""
 
+    @property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Least and greatest value of each parameter; ``None`` where there are no bounds."""
+        return None
+
     @abstractmethod
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; ``inf`` where it is not finite.

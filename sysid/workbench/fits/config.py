@@ -206,9 +206,8 @@ class PipelineConfig(BaseModel):
         for fit in self.fits:
             initial = None if fit.initial is None else structures[fit.initial]
             try:
-                n_outputs = len(self.mapping.outputs)
-                structure = fit.structure.for_outputs(n_outputs)
-                check_request(structure, len(self.mapping.inputs), n_outputs=n_outputs, initial=initial)
+                structure = fit.structure.for_outputs(len(self.mapping.outputs))
+                check_request(structure, self.mapping, initial=initial)
             except ConfigError as error:
                 raise as_field_error(error, f"the fit {fit.name!r}") from error
         return self

@@ -1,0 +1,212 @@
+"""A graph of operations, each value once, and the programs that the register machine runs of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.kernels import register_machine as machine
+
+MOST_NODES = 50_000
+"""Values of one set of equations."""
+
+CONSTANT = "constant"
+FREE, WEIGHT, FIXED, NORM = "free", "weight", "fixed", "norm"
+"""Parameters: those that have names and are estimated, weights of networks, those that are declared, and the levels and
+scales of what a network sees."""
+CONTINUOUS_STATE, DISCRETE_STATE, INPUT = "continuous", "discrete", "input"
+LEAVES = (FREE, WEIGHT, FIXED, NORM, CONTINUOUS_STATE, DISCRETE_STATE, INPUT)
+"""What is given to a program, in the order of its registers."""
+
+WITH_OWN = frozenset({machine.GREATER, machine.NOT_LESS, machine.SIGN, machine.SQRT, machine.TABLE})
+"""Operations that have a switch or a table."""
+COMMUTES = frozenset({machine.ADD, machine.MUL, machine.MIN, machine.MAX})
+
+Key = tuple[object, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Program:
+    """Instructions for the register machine, and what another target prints.
+
+    Args:
+        code: Instructions ``(operation, a, b, c, own)``, shape ``(n, 5)``, over the registers ``[constants | parameters
+            | states | inputs | results]``.
+        results: Registers of the results.
+        constants: Values of the constants.
+        sizes: Numbers of parameters, states and inputs.
+    """
+
+    code: NDArray[np.int64]
+    results: NDArray[np.int64]
+    constants: NDArray[np.float64]
+    sizes: tuple[int, int, int]
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+        """As the machine takes it."""
+        return self.code, self.results, self.constants
+
+    @property
+    def first(self) -> int:
+        """The first register that an instruction writes."""
+        return len(self.constants) + sum(self.sizes)
+
+
+@dataclass(kw_only=True)
+class Graph:
+    """Values that are computed, each once whatever asks for it.
+
+    A value is the number of its node. A node is a constant, a leaf (a parameter, state or input), or an operation over
+    values that stand before it.
+    """
+
+    nodes: list[Key] = field(default_factory=list)
+    known: dict[Key, int] = field(default_factory=dict)
+
+    def _node(self, key: Key) -> int:
+        if key not in self.known:
+            if len(self.nodes) >= MOST_NODES:
+                raise ConfigError(
+                    "the equations compute too many values",
+                    where="equations",
+                    expected=f"at most {MOST_NODES:,}",
+                    remedy="use fewer or smaller networks, or shorter delays",
+                )
+            self.known[key] = len(self.nodes)
+            self.nodes.append(key)
+        return self.known[key]
+
+    def constant(self, value: float) -> int:
+        """A number."""
+        return self._node((CONSTANT, float(value) + 0.0))
+
+    def leaf(self, kind: str, place: int) -> int:
+        """A parameter, state or input, by its place among those of its kind."""
+        return self._node((kind, place))
+
+    def counts(self) -> dict[str, int]:
+        """How many there are of each kind of leaf, from the places that were asked for."""
+        found = dict.fromkeys(LEAVES, 0)
+        for kind, *rest in self.nodes:
+            if kind in found:
+                found[str(kind)] = max(found[str(kind)], int(rest[0]) + 1)  # type: ignore[call-overload]  # its place
+        return found
+
+    def value_of(self, node: int) -> float | None:
+        """The value of a constant; ``None`` for what is none."""
+        key = self.nodes[node]
+        return float(key[1]) if key[0] == CONSTANT else None  # type: ignore[arg-type]  # a constant's is a number
+
+    def apply(self, operation: int, a: int, b: int | None = None, c: int | None = None, own: int = 0) -> int:
+        """An operation over values; of constants the constant that it gives.
+
+        Args:
+            operation: Which, as the machine names it.
+            a: What it reads first.
+            b: Second, where there is one.
+            c: Third, where there is one.
+            own: The operation's own number: a switch or a table.
+
+        Returns:
+            The value.
+        """
+        found = self._simpler(operation, a, b)
+        if found is not None:
+            return found
+        if operation in COMMUTES and b is not None and b < a:
+            a, b = b, a
+        if operation == machine.ADD and b is not None:
+            for product, other in ((b, a), (a, b)):
+                if self.nodes[product][0] == machine.MUL:
+                    _, x, y, *_ = self.nodes[product]
+                    return self._node((machine.FMA, x, y, other, 0))
+        given = [self.value_of(one) for one in (a, b, c) if one is not None]
+        if None not in given and operation not in WITH_OWN:
+            folded = computed(operation, [float(one) for one in given])  # type: ignore[arg-type]  # none is None
+            if math.isfinite(folded):
+                return self.constant(folded)
+        return self._node((operation, a, b, c, own))
+
+    def _simpler(self, operation: int, a: int, b: int | None) -> int | None:
+        """What is no operation at all: nothing is added, or multiplied by 1."""
+        first, second = self.value_of(a), None if b is None else self.value_of(b)
+        if operation == machine.ADD:
+            return b if first == 0.0 else a if second == 0.0 else None
+        if operation == machine.SUB and second == 0.0:
+            return a
+        if operation == machine.MUL:
+            return b if first == 1.0 else a if second == 1.0 else None
+        if operation == machine.DIV and second == 1.0:
+            return a
+        if operation == machine.POW and second == 1.0:
+            return a
+        return None
+
+    def program(self, results: Sequence[int], counts: Mapping[str, int]) -> Program:
+        """What computes some values, and nothing else.
+
+        Args:
+            results: The values.
+            counts: How many leaves of each kind there are, used or not.
+
+        Returns:
+            The program.
+        """
+        needed = self._needed(results)
+        constants = [node for node in needed if self.nodes[node][0] == CONSTANT]
+        place = {node: at for at, node in enumerate(constants)}
+        at, firsts = len(constants), {}
+        for kind in LEAVES:
+            firsts[kind], at = at, at + counts[kind]
+        n_theta = counts[FREE] + counts[WEIGHT] + counts[FIXED] + counts[NORM]
+        sizes = (n_theta, counts[CONTINUOUS_STATE] + counts[DISCRETE_STATE], counts[INPUT])
+        code: list[list[int]] = []
+        for node in needed:
+            kind, *rest = self.nodes[node]
+            if kind in firsts:
+                place[node] = firsts[str(kind)] + int(rest[0])  # type: ignore[call-overload]  # a leaf's place
+            elif kind != CONSTANT:
+                reads = [0 if one is None else place[one] for one in rest[:3]]  # type: ignore[index]  # values
+                code.append([int(kind), *reads, int(rest[3])])  # type: ignore[call-overload]
+                place[node], at = at, at + 1
+        return Program(
+            code=np.array(code, dtype=np.uint64).reshape(-1, 5),
+            results=np.array([place[node] for node in results], dtype=np.uint64),
+            constants=np.array([self.value_of(node) for node in constants], dtype=np.float64),
+            sizes=sizes,
+        )
+
+    def _needed(self, results: Sequence[int]) -> list[int]:
+        """Every value that some need, in the order in which they can be computed."""
+        found: set[int] = set()
+        waiting = list(results)
+        while waiting:
+            node = waiting.pop()
+            if node not in found:
+                found.add(node)
+                key = self.nodes[node]
+                if not isinstance(key[0], str):
+                    waiting += [int(one) for one in key[1:4] if one is not None]  # type: ignore[call-overload]
+        return sorted(found)
+
+
+def computed(operation: int, values: Sequence[float]) -> float:
+    """One operation on numbers, by the machine itself.
+
+    Args:
+        operation: Which; no switch and no table.
+        values: What it reads.
+
+    Returns:
+        What it gives.
+    """
+    v = np.array([*values, *[0.0] * (4 - len(values))])
+    code = np.array([[operation, 0, min(1, len(values) - 1), min(2, len(values) - 1), 0]], dtype=np.int64)
+    machine.evaluate(code, v, 3, np.zeros(1), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)))
+    return float(v[3])

@@ -1,0 +1,597 @@
+"""From equations to programs: names become places, functions operations, and what remembers gets states of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.equations.functions import CONSTANTS, FUNCTIONS, OWN, operator
+from sysid.equations.graph import (
+    CONTINUOUS_STATE,
+    DISCRETE_STATE,
+    FIXED,
+    FREE,
+    INPUT,
+    NORM,
+    WEIGHT,
+    Graph,
+    Program,
+)
+from sysid.equations.syntax import Call, Delayed, Name, Node, Number, Operation, equation_error
+from sysid.equations.system import System
+from sysid.errors import ConfigError
+from sysid.kernels import register_machine as machine
+
+MOST_NEURONS = 200
+MOST_WEIGHTS = 5_000
+MOST_DELAYED = 100
+"""Samples that are kept of what is computed; what goes in may be delayed by any number of samples."""
+LONGEST_DELAY = 1_000_000
+"""Samples."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Net:
+    """A network within the equations: ``scale * (c + w z + v tanh(W z + b))`` of scaled arguments ``z``.
+
+    Args:
+        arguments: How many there are.
+        neurons: How many there are.
+        first: Where its weights begin: ``W`` and ``b`` row by row, ``v``, ``w``, ``c``.
+        norm: Where its levels and scales begin: of each argument the level and one over the scale; then its own.
+        probe: Where its arguments begin among the probes.
+        scaled: Whether its own scale was given.
+    """
+
+    arguments: int
+    neurons: int
+    first: int
+    norm: int
+    probe: int
+    scaled: bool
+
+    @property
+    def hidden(self) -> slice:
+        """``W`` and ``b``."""
+        return slice(self.first, self.first + self.neurons * (self.arguments + 1))
+
+    @property
+    def readout(self) -> slice:
+        """``v``."""
+        return slice(self.hidden.stop, self.hidden.stop + self.neurons)
+
+    @property
+    def linear(self) -> slice:
+        """``w`` and ``c``."""
+        return slice(self.readout.stop, self.readout.stop + self.arguments + 1)
+
+    @property
+    def stop(self) -> int:
+        """Where the next one's weights begin."""
+        return int(self.linear.stop)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Switch:
+    """What has a soft form for training.
+
+    Args:
+        probe: Where its argument is among the probes.
+        root: Whether it is a root, soft only near 0.
+    """
+
+    probe: int
+    root: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lowered:
+    """Equations as programs.
+
+    Parameters are ``[free | weights | fixed | norms]``; those that have sensitivities are the first two.
+
+    Args:
+        rates: Of the continuous states.
+        updates: Of the other states.
+        outputs: Of the outputs.
+        probes: Arguments of networks and switches.
+        counts: Of each kind of leaf.
+        states: Names of all states, those of what remembers included.
+        lagged: What each input of the programs is: an input of the mapping, and how many samples ago.
+        nets: The networks.
+        switches: What has a soft form for training.
+        norms: The levels and scales as they are before any data are seen.
+        places: Of each table its first row and its rows.
+        table: Rows of all tables, shape ``(n_rows, 2)``.
+    """
+
+    rates: Program
+    updates: Program
+    outputs: Program
+    probes: Program
+    counts: Dict[str, int]
+    states: tuple[str, ...]
+    lagged: tuple[tuple[int, float], ...]
+    nets: tuple[Net, ...]
+    switches: tuple[Switch, ...]
+    norms: tuple[float, ...]
+    places: NDArray[np.int64]
+    table: NDArray[np.float64]
+
+    @property
+    def n_continuous(self) -> int:
+        """States with a rate, the first ones."""
+        return self.counts[CONTINUOUS_STATE]
+
+    @property
+    def n_states(self) -> int:
+        """All states."""
+        return len(self.states)
+
+    @property
+    def n_weights(self) -> int:
+        """Weights of all networks."""
+        return self.counts[WEIGHT]
+
+    @property
+    def depth(self) -> int:
+        """Samples of the inputs before now that are read."""
+        return max((math.ceil(lag) for _, lag in self.lagged), default=0)
+
+    def given(self, inputs: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+        """What the programs read, of inputs with some samples before the first.
+
+        Args:
+            inputs: Shape ``(depth + n, n_inputs)``.
+            n: Samples.
+
+        Returns:
+            Shape ``(n, n_lagged)``: inputs now and some time ago, between samples interpolated.
+        """
+        found = np.empty((n, len(self.lagged)))
+        before = len(inputs) - n
+        for j, (channel, lag) in enumerate(self.lagged):
+            whole = math.floor(lag)
+            rest = lag - whole
+            found[:, j] = inputs[before - whole : before - whole + n, channel]
+            if rest > 0.0:
+                found[:, j] *= 1.0 - rest
+                found[:, j] += rest * inputs[before - whole - 1 : before - whole - 1 + n, channel]
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terms:
+    """What equations are lowered for.
+
+    Args:
+        inputs: Channels that go in.
+        outputs: Channels that come out.
+        sample_time: Seconds; ``None`` to see whether they can be lowered at all.
+        free: Names of parameters that are estimated.
+        fixed: Names of the others.
+        tables: Points of each table.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    sample_time: float | None
+    free: tuple[str, ...]
+    fixed: tuple[str, ...]
+    tables: Dict[str, tuple[tuple[float, float], ...]]
+
+
+def lower(system: System, terms: Terms) -> Lowered:
+    """Make programs of equations.
+
+    Args:
+        system: The equations.
+        terms: What they are lowered for.
+
+    Returns:
+        The programs.
+
+    Raises:
+        ConfigError: With line and column, of what cannot be lowered.
+    """
+    work = _Lowering(system=system, terms=terms)
+    right = {one.name: one.right for one in system.equations}
+    for name in system.order:  # in this order none of them is gone into twice
+        work.named(name, 0)
+    rates = [work.value(right[name]) for name in system.continuous]
+    for name in system.discrete:
+        work.updates[work.state(name)] = work.value(right[name])
+    outputs = [work.named(name, 0) for name in terms.outputs]
+    work.finish_delays()
+    return work.programs(rates, outputs)
+
+
+@dataclass(kw_only=True)
+class _Lowering:
+    system: System
+    terms: Terms
+    graph: Graph = field(default_factory=Graph)
+    updates: dict[int, int] = field(default_factory=dict)
+    """By the leaf of a state what it is at the next sample."""
+    hidden: list[str] = field(default_factory=list)
+    """Names of the states of what remembers."""
+    lagged: dict[tuple[int, float], int] = field(default_factory=dict)
+    chains: dict[object, list[int]] = field(default_factory=dict)
+    unfinished: list[str] = field(default_factory=list)
+    definitions: dict[str, int] = field(default_factory=dict)
+    entered: list[str] = field(default_factory=list)
+    remembering: dict[object, int] = field(default_factory=dict)
+    nets: list[Net] = field(default_factory=list)
+    norms: list[float] = field(default_factory=list)
+    switches: list[Switch] = field(default_factory=list)
+    probed: list[int] = field(default_factory=list)
+
+    # What functions make values with
+
+    def constant(self, value: float) -> int:
+        return self.graph.constant(value)
+
+    def value_of(self, node: int) -> float | None:
+        return self.graph.value_of(node)
+
+    def apply(self, operation: int, a: int, b: int | None = None, c: int | None = None, own: int = 0) -> int:
+        return self.graph.apply(operation, a, b, c, own)
+
+    def switch(self, operation: int, a: int) -> int:
+        """A switch or a root with a width of its own, the same for the same argument."""
+        root, known = operation == machine.SQRT, self.value_of(a)
+        if root and known is not None:
+            return self.constant(math.sqrt(max(known, 0.0)))
+        key = ("root" if root else "switch", a)
+        if key not in self.remembering:
+            self.remembering[key] = len(self.switches)
+            self.switches.append(Switch(probe=self.probe(a), root=root))
+        return self.graph.apply(operation, a, own=self.remembering[key])
+
+    def probe(self, value: int) -> int:
+        self.probed.append(value)
+        return len(self.probed) - 1
+
+    # Names
+
+    def state(self, name: str) -> int:
+        """The leaf of a state with a name."""
+        if name in self.system.continuous:
+            return self.graph.leaf(CONTINUOUS_STATE, self.system.continuous.index(name))
+        return self.graph.leaf(DISCRETE_STATE, self.system.discrete.index(name))
+
+    def memory(self, name: str) -> int:
+        """The leaf of a new state of something that remembers."""
+        self.hidden.append(name)
+        return self.graph.leaf(DISCRETE_STATE, len(self.system.discrete) + len(self.hidden) - 1)
+
+    def named(self, name: str, at: int) -> int:
+        """The value of a name, now."""
+        terms = self.terms
+        if name in self.system.states:
+            return self.state(name)
+        if name in self.system.definitions:
+            return self._definition(name, at)
+        if name in terms.free:
+            return self.graph.leaf(FREE, terms.free.index(name))
+        if name in terms.fixed:
+            return self.graph.leaf(FIXED, terms.fixed.index(name))
+        if name in CONSTANTS:
+            return self.constant(CONSTANTS[name])
+        return self.input(name, 0.0, at)
+
+    def input(self, name: str, lag: float, at: int) -> int:
+        """An input of the mapping, some samples ago."""
+        if name not in self.terms.inputs:
+            raise equation_error(
+                f"nothing says what {name} is",
+                self.system.text,
+                at,
+                expected=f"an input: {', '.join(self.terms.inputs) or 'there is none'}",
+                got=name,
+                remedy=f"add {name} to the mapping's inputs, or {name}: 1 to the parameters",
+            )
+        key = (self.terms.inputs.index(name), lag)
+        return self.graph.leaf(INPUT, self.lagged.setdefault(key, len(self.lagged)))
+
+    def _definition(self, name: str, at: int) -> int:
+        if name in self.entered:
+            raise equation_error(
+                f"{name} needs itself: {' -> '.join([*self.entered[self.entered.index(name) :], name])}",
+                self.system.text,
+                at,
+                expected="definitions that can be computed one after the other",
+                remedy="a delay of less than a sample reads what is now too: make it a sample or more",
+            )
+        if name not in self.definitions:
+            self.entered.append(name)
+            self.definitions[name] = self.value(self.system.definitions[name].right)
+            self.entered.pop()
+        return self.definitions[name]
+
+    # Delays
+
+    def _samples(self, node: Delayed | Call, seconds: float) -> float:
+        """A delay in samples; a whole number but for rounding is one."""
+        if not 0.0 <= seconds < math.inf:
+            raise equation_error(
+                "a delay is a number of seconds from 0 on", self.system.text, node.at, remedy="correct it"
+            )
+        if self.terms.sample_time is None:
+            return min(math.ceil(seconds), 1)
+        lag = seconds / self.terms.sample_time
+        return float(round(lag)) if abs(lag - round(lag)) < _WHOLE else lag
+
+    def delayed(self, node: Delayed) -> int:
+        lag = self._samples(node, node.lag) if node.seconds else node.lag
+        if lag > LONGEST_DELAY:
+            raise equation_error(
+                f"a delay of {lag:,.0f} samples",
+                self.system.text,
+                node.at,
+                expected=f"at most {LONGEST_DELAY:,}",
+                remedy="correct the delay, or the sample time of the data",
+            )
+        name = node.name
+        if name not in {*self.system.states, *self.system.definitions, *self.system.parameters, *CONSTANTS}:
+            return self.input(name, lag, node.at)
+        if name in {*self.system.parameters, *CONSTANTS} or lag == 0.0:
+            return self.named(name, node.at)
+        if name not in self.chains:
+            self.unfinished.append(name)
+        return self._kept(name, name, lag, node.at, lambda: self.named(name, node.at))
+
+    def _kept(self, key: object, name: str, lag: float, at: int, now: Callable[[], int]) -> int:
+        """What something was some samples ago, from states that hand it on."""
+        chain = self.chains.setdefault(key, [])
+        while len(chain) < math.ceil(lag):
+            if sum(map(len, self.chains.values())) >= MOST_DELAYED:
+                raise equation_error(
+                    f"more than {MOST_DELAYED} past samples of what is computed are read",
+                    self.system.text,
+                    at,
+                    expected="short delays of states and definitions; inputs may be delayed by any time",
+                    remedy="delay the inputs that it is computed from instead, or use a larger sample time",
+                )
+            chain.append(self.memory(f"{name}[k-{len(chain) + 1}]"))
+        whole = math.floor(lag)
+        rest = lag - whole
+        newer = chain[whole - 1] if whole else now()
+        if rest == 0.0:
+            return newer
+        share = self.apply(machine.MUL, self.constant(rest), self.apply(machine.SUB, chain[whole], newer))
+        return self.apply(machine.ADD, newer, share)
+
+    def finish_delays(self) -> None:
+        """Say what the first state of each delay holds next: what the name is now."""
+        while self.unfinished:
+            name = self.unfinished.pop()
+            self.chains[name] = self.chains.get(name, [])
+            value = self.named(name, 0)
+            if self.chains[name]:
+                self.updates[self.chains[name][0]] = value
+        for chain in self.chains.values():
+            for newer, older in zip(chain, chain[1:], strict=False):
+                self.updates[older] = newer
+
+    # Expressions
+
+    def value(self, node: Node) -> int:
+        """The value of an expression."""
+        if isinstance(node, Number):
+            return self.constant(node.value)
+        if isinstance(node, Name):
+            return self.named(node.name, node.at)
+        if isinstance(node, Delayed):
+            return self.delayed(node)
+        if isinstance(node, Call):
+            return self._call(node)
+        assert isinstance(node, Operation)  # noqa: S101 - there is no other node
+        return self._operation(node)
+
+    def _operation(self, node: Operation) -> int:
+        if len(node.operands) == 1:
+            inside = self.value(node.operands[0])
+            if node.operator == "not":
+                return self.apply(machine.SUB, self.constant(1.0), inside)
+            return self.apply(machine.NEG, inside)
+        # A sum of a thousand terms leans to the left: it is walked down, not gone into.
+        spine: list[Operation] = []
+        left: Node = node
+        while isinstance(left, Operation) and len(left.operands) > 1:
+            spine.append(left)
+            left = left.operands[0]
+        found = self.value(left)
+        for one in reversed(spine):
+            found = operator(self, one.operator, found, self.value(one.operands[1]))
+        return found
+
+    def _call(self, node: Call) -> int:
+        name = node.function
+        if name in OWN:
+            return {"relay": self._relay, "latch": self._latch, "hold": self._hold, "net": self._net,
+                    "delay": self._delay}[name](node)  # fmt: skip
+        arguments = [self.value(one) for one in node.parts]
+        if name in self.terms.tables:
+            return self.apply(machine.TABLE, arguments[0], own=list(self.terms.tables).index(name))
+        return FUNCTIONS[name].lower(self, *arguments)
+
+    def _taken(self, node: Call, names: tuple[str, ...]) -> list[Node]:
+        """Arguments and options of a function with states, in order."""
+        options = dict(node.options)
+        found = list(node.arguments) + [options[name] for name in names[len(node.arguments) :] if name in options]
+        if len(found) != len(names) or len(node.parts) != len(names):
+            raise equation_error(
+                f"{node.function} takes {', '.join(names)}",
+                self.system.text,
+                node.at,
+                expected=OWN[node.function],
+                remedy="give it those",
+            )
+        return found
+
+    def _number(self, node: Node, what: str) -> float:
+        found = self.value_of(self.value(node))
+        if found is None:
+            raise equation_error(
+                f"{what} is a number", self.system.text, node.at, expected="a number", remedy="write it as a number"
+            )
+        return found
+
+    # What remembers
+
+    def _remember(self, function: str, arguments: tuple[int, ...], rule: Callable[[int], int]) -> int:
+        """The value of a function of its arguments and of what it was a sample ago; the same call once."""
+        key = (function, *arguments)
+        if key not in self.remembering:
+            number = sum(1 for name in self.hidden if name.startswith(f"{function} ")) + 1
+            before = self.memory(f"{function} {number}")
+            self.remembering[key] = self.updates[before] = rule(before)
+        return self.remembering[key]
+
+    def _relay(self, node: Call) -> int:
+        x, on, off = (self.value(one) for one in self._taken(node, ("x", "on", "off")))
+        upper, lower_ = self.value_of(on), self.value_of(off)
+        if upper is not None and lower_ is not None and lower_ > upper:
+            raise equation_error(
+                "the relay goes off above where it goes on",
+                self.system.text,
+                node.at,
+                expected=OWN["relay"],
+                remedy="exchange on and off; for the opposite write 1 - relay(...)",
+            )
+        set_ = self.switch(machine.GREATER, self.apply(machine.SUB, x, on))
+        kept = self.switch(machine.NOT_LESS, self.apply(machine.SUB, x, off))
+        return self._remember("relay", (x, on, off), lambda before: self._set_or_kept(set_, kept, before))
+
+    def _latch(self, node: Call) -> int:
+        set_, reset = (self.value(one) for one in self._taken(node, ("set", "reset")))
+        kept = self.apply(machine.SUB, self.constant(1.0), reset)
+        return self._remember("latch", (set_, reset), lambda before: self._set_or_kept(set_, kept, before))
+
+    def _set_or_kept(self, set_: int, kept: int, before: int) -> int:
+        still = self.apply(machine.MUL, kept, before)
+        return self.apply(machine.MAX, set_, still)
+
+    def _hold(self, node: Call) -> int:
+        x, when = (self.value(one) for one in self._taken(node, ("x", "when")))
+        return self._remember("hold", (x, when), lambda before: self.apply(machine.SELECT, when, x, before))
+
+    def _delay(self, node: Call) -> int:
+        inside, seconds = self._taken(node, ("x", "tau"))
+        lag = self._samples(node, self._number(seconds, "a delay"))
+        value = self.value(inside)
+        if lag == 0.0:
+            return value
+        key = ("delay", value)
+        found = self._kept(key, f"delay {value}", lag, node.at, lambda: value)
+        self.updates[self.chains[key][0]] = value
+        return found
+
+    # Networks
+
+    def _net(self, node: Call) -> int:
+        options = dict(node.options)
+        if not node.arguments or set(options) - {"neurons", "scale"} or "neurons" not in options:
+            raise equation_error(
+                "a network takes what it sees, and neurons",
+                self.system.text,
+                node.at,
+                expected=f"{OWN['net']}, and a scale where one is known",
+                remedy="write for example net(x, u, neurons=5)",
+            )
+        k = self._number(options["neurons"], "neurons")
+        if k != round(k) or not 1 <= k <= MOST_NEURONS:
+            raise equation_error(
+                "not a number of neurons",
+                self.system.text,
+                node.at,
+                expected=f"a whole number from 1 to {MOST_NEURONS}",
+                remedy="write for example neurons=5",
+            )
+        scale = self._number(options["scale"], "a scale") if "scale" in options else 1.0
+        arguments = [self.value(one) for one in node.arguments]
+        net = Net(
+            arguments=len(arguments),
+            neurons=int(k),
+            first=self.nets[-1].stop if self.nets else 0,
+            norm=len(self.norms),
+            probe=len(self.probed),
+            scaled="scale" in options,
+        )
+        if net.stop > MOST_WEIGHTS:
+            raise ConfigError(
+                "the networks have too many weights",
+                where="equations",
+                expected=f"at most {MOST_WEIGHTS:,}",
+                got=net.stop,
+                remedy="use fewer neurons",
+            )
+        for value in arguments:
+            self.probe(value)
+        self.nets.append(net)
+        self.norms += [0.0, 1.0] * len(arguments) + [scale]
+        return self._layer(net, arguments)
+
+    def _layer(self, net: Net, arguments: list[int]) -> int:
+        def weight(place: int) -> int:
+            return self.graph.leaf(WEIGHT, place)
+
+        def norm(place: int) -> int:
+            return self.graph.leaf(NORM, net.norm + place)
+
+        scaled = [
+            self.apply(machine.MUL, self.apply(machine.SUB, value, norm(2 * i)), norm(2 * i + 1))
+            for i, value in enumerate(arguments)
+        ]
+        total = weight(net.linear.stop - 1)
+        for i, value in enumerate(scaled):
+            total = self.apply(machine.FMA, weight(net.linear.start + i), value, total)
+        for j in range(net.neurons):
+            row = net.first + j * (net.arguments + 1)
+            inside = weight(row + net.arguments)
+            for i, value in enumerate(scaled):
+                inside = self.apply(machine.FMA, weight(row + i), value, inside)
+            total = self.apply(machine.FMA, weight(net.readout.start + j), self.apply(machine.TANH, inside), total)
+        return self.apply(machine.MUL, norm(2 * net.arguments), total)
+
+    # Programs
+
+    def programs(self, rates: list[int], outputs: list[int]) -> Lowered:
+        """All that was lowered, as programs."""
+        system, terms, graph = self.system, self.terms, self.graph
+        names = (*system.continuous, *system.discrete, *self.hidden)
+        counts = graph.counts()
+        counts[CONTINUOUS_STATE] = len(system.continuous)
+        counts[DISCRETE_STATE] = len(system.discrete) + len(self.hidden)
+        counts[FREE], counts[FIXED] = len(terms.free), len(terms.fixed)
+        counts[WEIGHT], counts[NORM] = (self.nets[-1].stop if self.nets else 0), len(self.norms)
+        counts[INPUT] = len(self.lagged)
+        updates = [self.updates[graph.leaf(DISCRETE_STATE, i)] for i in range(counts[DISCRETE_STATE])]
+        points = [terms.tables[name] for name in terms.tables]
+        begins = np.cumsum([0, *map(len, points)])
+        return Lowered(
+            rates=graph.program(rates, counts),
+            updates=graph.program(updates, counts),
+            outputs=graph.program(outputs, counts),
+            probes=graph.program(self.probed, counts),
+            counts=counts,
+            states=names,
+            lagged=tuple(self.lagged),
+            nets=tuple(self.nets),
+            switches=tuple(self.switches),
+            norms=tuple(self.norms),
+            places=np.array(
+                [[begin, len(one)] for begin, one in zip(begins[:-1], points, strict=True)], dtype=np.int64
+            ).reshape(-1, 2),
+            table=np.array([point for one in points for point in one], dtype=np.float64).reshape(-1, 2),
+        )
+
+
+_WHOLE = 1e-6
+"""Samples by which a delay may miss a whole number."""

@@ -1,0 +1,138 @@
+"""What a fit of a grey box says of its parameters: their intervals, and what the records leave open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.least_squares.evidence import update
+from sysid.estimation.least_squares.levenberg_marquardt import Solution
+from sysid.estimation.uncertainty import Uncertainty
+from sysid.models.grey_box import Parameter
+
+Array = NDArray[np.float64]
+
+OPEN = 0.5
+"""Share of its prior's variance that a parameter keeps where the records do not determine it."""
+
+TOGETHER = 0.99
+"""Correlation above which two parameters cannot be told apart."""
+
+EVIDENCE_STEPS = 3
+"""Steps of the evidence of a fit that ended before its first."""
+
+
+def with_evidence(solution: Solution, provider: EquationProvider) -> Solution:
+    """A solution with its evidence, where it converged before there was any.
+
+    Args:
+        solution: Where the fit ended.
+        provider: The records.
+
+    Returns:
+        The solution.
+    """
+    if solution.evidence is not None or not solution.at.finite:
+        return solution
+    state = solution.state
+    prior, evidence = state.prior, state.evidence
+    for _ in range(EVIDENCE_STEPS):
+        prior, evidence = update(prior, state.theta, state.at, provider.n_samples)
+    return replace(solution, state=replace(state, prior=prior, evidence=evidence))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Findings:
+    """What is known of the parameters with a name where a fit ended.
+
+    Args:
+        parameters: Those that were estimated.
+        values: In their units.
+        covariance: In their units; NaN of those that the records leave open.
+        bound: Of each the bound at which it stands; an empty text for none.
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: Array
+    covariance: Array
+    bound: tuple[str, ...]
+
+    @classmethod
+    def of(cls, solution: Solution, provider: EquationProvider, parameters: tuple[Parameter, ...]) -> Findings:
+        """What a solution says.
+
+        Args:
+            solution: Where the fit ended, with its evidence.
+            provider: The records.
+            parameters: Those that were estimated.
+
+        Returns:
+            The findings. A parameter at a bound is taken to be there for the others' sake, and has no interval.
+        """
+        n, prior = len(parameters), solution.state.prior
+        low, high = (side[:n] for side in provider.bounds)
+        theta, scale = solution.theta[:n], provider.scale[:n]
+        at = ["low" if t <= a else "high" if t >= b else "" for t, a, b in zip(theta, low, high, strict=True)]
+        held = np.zeros(len(solution.theta), dtype=np.bool_)
+        held[:n] = [bool(side) for side in at]
+        H = prior.beta * solution.at.gauss_newton + np.diag(prior.precision)
+        covariance = np.full((n, n), np.nan)
+        free = np.flatnonzero(~held)
+        root = np.sqrt(np.diag(H)[free])
+        values, vectors = np.linalg.eigh(H[np.ix_(free, free)] / np.outer(root, root))
+        half = vectors / np.sqrt(np.maximum(values, 1e-15)) / root[:, None]
+        named = free[free < n]
+        inner = (half @ half.T)[: len(named), : len(named)]
+        left = np.diag(inner) * prior.precision[named]
+        inner[left > OPEN, :] = np.nan
+        inner[:, left > OPEN] = np.nan
+        covariance[np.ix_(named, named)] = inner
+        return cls(
+            parameters=parameters,
+            values=theta * scale,
+            covariance=covariance * np.outer(scale, scale),
+            bound=tuple(at),
+        )
+
+    def uncertainty(self, noise_variance: float) -> Uncertainty:
+        """As a fit keeps it.
+
+        Args:
+            noise_variance: Of the residuals.
+
+        Returns:
+            The uncertainty; a parameter's unit stands behind its name.
+        """
+        names = tuple(f"{one.name} [{one.unit}]" if one.unit else one.name for one in self.parameters)
+        return Uncertainty(names=names, values=self.values, covariance=self.covariance, noise_variance=noise_variance)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Parameters at a bound, that the records leave open, or that cannot be told apart."""
+        told = []
+        for one, value, side in zip(self.parameters, self.values, self.bound, strict=True):
+            if side:
+                told.append(
+                    f"The parameter {one.name} stands at its bound, {value:g}: it has no interval. Widen the bound, or "
+                    "fix it there."
+                )
+        deviations = np.sqrt(np.diag(self.covariance))
+        for one, deviation, side in zip(self.parameters, deviations, self.bound, strict=True):
+            if np.isnan(deviation) and not side:
+                told.append(
+                    f"The records do not determine the parameter {one.name}. Fix it, give it a prior, or record "
+                    "what it acts on."
+                )
+        with np.errstate(invalid="ignore"):
+            correlation = self.covariance / np.outer(deviations, deviations)
+        for i, one in enumerate(self.parameters):
+            for j in range(i):
+                if abs(correlation[i, j]) > TOGETHER:
+                    told.append(
+                        f"The parameters {self.parameters[j].name} and {one.name} can hardly be told apart (correlation "
+                        f"{correlation[i, j]:.4f}). Fix one of them, or give it a prior."
+                    )
+        return tuple(told)

@@ -1,0 +1,410 @@
+"""Grey boxes of traces: the free run's least error over parameters, weights and initial states, from several starts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError, TraceError
+from sysid.estimation.experiment import Experiment, experiments_of, unit_range
+from sysid.estimation.grey_box.findings import Findings, with_evidence
+from sysid.estimation.grey_box.layout import EquationLayout
+from sysid.estimation.grey_box.preparing import (
+    ROUNDS,
+    SHARPER,
+    WINDOW,
+    Stepping,
+    first_terms,
+    norms_for,
+    seen_terms,
+    substeps_for,
+    widths_for,
+)
+from sysid.estimation.grey_box.provider import EquationProvider, Record
+from sysid.estimation.least_squares.checkpoints import checkpoints_of
+from sysid.estimation.least_squares.damping import DAMPINGS
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.linear.arx import first_output
+from sysid.estimation.networks import multistart as starts
+from sysid.estimation.networks.choosing import Choice, choose
+from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
+from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
+from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.result import FitResult, Loop, Status
+from sysid.models import Mapping, Start
+from sysid.models.grey_box import GreyBox, lowered
+from sysid.models.grey_box_model import GreyBoxModel
+from sysid.traces import Trace
+
+Array = NDArray[np.float64]
+
+STARTS = 4
+"""Starts of a fit that asks for none: the declared parameters, and three around them. Halved at each checkpoint."""
+
+LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_subsets")
+"""Options of a training that concern lagged regressors."""
+
+FLAT = 1e-8
+"""Share of the loss that one more Newton step would take away, below which a fit stands at a minimum."""
+
+NOTHING_LEFT = 1e-24
+"""Mean squared error over the output's scale that is rounding."""
+
+FIRST_SUBSTEPS = 8
+"""Runge-Kutta steps before it is known how many are needed."""
+
+SAME = 1e-4
+"""By how much the loss of exact switches may exceed that of soft ones and be the same."""
+
+STEP_ROUNDS = 2
+"""Times that a fit goes on with shorter steps because its parameters turned out to need them."""
+
+
+def fit_grey_box(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    grey: GreyBox,
+    training: Training | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    selection: Sequence[Trace] = (),
+    vet: Callable[[starts.Network], bool] | None = None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> FitResult:
+    """Fit the parameters of equations, and the weights of networks in them, by the least error of the free run.
+
+    A record whose start is estimated has its own initial state, estimated with the parameters; the others begin at
+    rest, or where the structure says.
+
+    Args:
+        traces: Estimation traces; never concatenated.
+        mapping: Which channels go in, which comes out.
+        grey: The equations.
+        training: How to train; options for lagged regressors do not apply.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        selection: Traces that choose between starts; without them the evidence chooses.
+        vet: Whether a model's free run is stable; the best stable one of the ten best candidates is then chosen.
+        on_progress: Called after every iteration, from the threads that train.
+
+    Returns:
+        The fit, with the uncertainty of its parameters and the posterior of its output.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        ConfigError: If the equations do not know a channel of the mapping, or an option does not apply.
+        TraceError: If no sample counts, or the equations have no free run at their declared start.
+    """
+    began = time.perf_counter()
+    training, start = (training or Training()).with_starts(STARTS), start or Start()
+    check_training(training)
+    grey.check_mapping(mapping)
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    experiments = experiments_of(traces, mapping, start, rest)
+    ready = _ready(_template(traces[0], mapping, grey, experiments, rest), experiments)
+    starts.check_samples(ready.provider)
+    multistart = starts.Multistart(
+        training=training,
+        layout=EquationLayout(
+            parameters=grey.free, nets=ready.template.lowered.nets, provider=ready.provider, begun=ready.theta
+        ),
+        provider=ready.provider,
+        to_plain=ready.to_plain,
+        template=ready.template,
+        selection=selection,
+        start=start,
+        initial=None,
+        on_progress=on_progress,
+        checkpoints=checkpoints_of(on_progress),
+    )
+    candidates = [_settled(one, ready.provider) for one in starts.run(multistart)]
+    choice = choose(candidates, training.choose_by, vet)
+    done = _finished(ready, choice.chosen, training, stopped=multistart.stop.is_set())
+    candidates = [done.candidate if one is choice.chosen else one for one in candidates]
+    choice = Choice(chosen=done.candidate, stable=choice.stable)
+    records = [(e.inputs, e.history) for e in experiments]
+    status = multistart_status(done.candidate, candidates, records, interrupted=multistart.stop.is_set())
+    seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
+    found = multistart_result(choice, candidates, training, status, seconds)
+    return _told(found, done, (traces, selection, start))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Ready:
+    """A fit that can begin: the model but for its parameters, the records, and where the parameters start."""
+
+    template: GreyBoxModel
+    provider: EquationProvider
+    theta: Array
+    stepping: Stepping
+
+    @property
+    def to_plain(self) -> Array:
+        """From what is trained to the model's parameters."""
+        return np.eye(len(self.provider.scale), self.provider.n_parameters) * self.provider.scale[:, None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Done:
+    """A fit that has ended: the candidate, over the records as they were run last, and what was seen on the way."""
+
+    candidate: starts.Candidate
+    provider: EquationProvider
+    stepping: Stepping
+    softened: float
+
+    @property
+    def model(self) -> GreyBoxModel:
+        """The model."""
+        found = self.candidate.model
+        assert isinstance(found, GreyBoxModel)  # noqa: S101 - the template's class
+        return found
+
+
+def check_training(training: Training) -> None:
+    """Refuse what does not apply to equations.
+
+    Args:
+        training: How to train.
+
+    Raises:
+        ConfigError: If it is for one step ahead, or has options that are for lagged regressors alone.
+    """
+    if training.loop is not Loop.CLOSED:
+        raise ConfigError(
+            "a grey box has no open loop",
+            where="loop",
+            expected="closed",
+            got=training.loop.value,
+            remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
+        )
+    strangers = [name for name in LAGGED_ONLY if getattr(training, name) != getattr(Training(), name)]
+    if strangers:
+        raise ConfigError(
+            f"a grey box is not trained with {', '.join(strangers)}",
+            where="training",
+            expected="options that do not concern lagged regressors",
+            remedy=f"leave out {', '.join(strangers)}",
+        )
+
+
+def _template(
+    first: Trace, mapping: Mapping, grey: GreyBox, experiments: Sequence[Experiment], rest: float
+) -> GreyBoxModel:
+    """The model but for its parameters, and for what the records say of its states."""
+    low = lowered(grey, mapping.inputs, mapping.outputs, first.sample_time)
+    n, n_inputs = low.n_states, len(mapping.inputs)
+    return GreyBoxModel(
+        grey=grey,
+        theta=np.array([*(one.start for one in grey.free), *[0.0] * low.n_weights]),
+        norms=low.norms,
+        levels=(0.0,) * n,
+        spans=(1.0,) * n,
+        substeps=grey.substeps or FIRST_SUBSTEPS,
+        scaling=replace(unit_range(experiments), input_offset=(0.0,) * n_inputs, input_scale=(1.0,) * n_inputs),
+        mapping=mapping,
+        sample_time=first.sample_time,
+        input_units=tuple(first.channel(name).unit for name in mapping.inputs),
+        output_unit=first.channel(mapping.output).unit,
+        rest_output=rest,
+    )
+
+
+def _ready(template: GreyBoxModel, experiments: Sequence[Experiment]) -> _Ready:
+    """Levels, ranges and a step, from the records at the declared start."""
+    grey, form = template.grey, template.recursion
+    n_weights = template.lowered.n_weights
+    records = tuple(Record.of([experiment], form) for experiment in experiments)
+    means = np.array([np.mean([np.mean(record.output[:, j]) for record in records]) for j in range(form.n_outputs)])
+    limits = np.array([[one.low, one.high] for one in grey.free] + [[-np.inf, np.inf]] * n_weights).reshape(-1, 2).T
+    provider = EquationProvider(
+        form=first_terms(form, template.mapping.outputs, means),
+        records=records,
+        scale=np.array([*(one.scale for one in grey.free), *[1.0] * n_weights]),
+        limits=limits,
+    )
+    theta = np.zeros(provider.n_parameters)
+    theta[: len(grey.free)] = template.theta[: len(grey.free)] / provider.scale[: len(grey.free)]
+    theta = provider.with_states(theta, provider.states(theta, WINDOW))
+    stepping = Stepping(substeps=template.substeps, change=0.0)
+    if grey.substeps is None:
+        stepping = substeps_for(provider, theta)
+        provider = provider.with_form(replace(provider.form, substeps=stepping.substeps))
+    seen, begun = seen_terms(provider, theta)
+    provider = provider.with_form(seen)
+    theta = provider.with_states(theta, begun)
+    theta = provider.with_states(theta, provider.states(theta, WINDOW))
+    if not np.isfinite(provider.loss(theta)):
+        raise TraceError(
+            "the equations have no free run at their declared start",
+            where="equations",
+            expected="numbers over every record",
+            got="what grows without bound, or is no number",
+            remedy="start the parameters and initial states at values with which the equations run: look for "
+            "a sign, a division by 0, or the logarithm of what is not above 0",
+        )
+    seen = provider.form
+    template = replace(
+        template,
+        norms=tuple(map(float, norms_for(provider, theta))),
+        levels=tuple(map(float, seen.terms.level)),
+        spans=tuple(map(float, seen.terms.scale)),
+        substeps=stepping.substeps,
+    )
+    provider = provider.with_form(replace(template.recursion, widths=widths_for(provider, theta)))
+    return _Ready(template=template, provider=provider, theta=theta, stepping=stepping)
+
+
+def _settled(candidate: starts.Candidate, provider: EquationProvider) -> starts.Candidate:
+    """A candidate with its evidence, and the status of one whose gradient is zero to rounding."""
+    solution = with_evidence(candidate.solution, provider)
+    if solution.status in {Status.STALLED, Status.NOT_IMPROVED} and _at_minimum(solution, provider):
+        solution = replace(solution, status=Status.CONVERGED)
+    return replace(candidate, solution=solution)
+
+
+def _at_minimum(solution: Solution, provider: EquationProvider) -> bool:
+    at, prior = solution.at, solution.state.prior
+    if 2.0 * at.loss <= NOTHING_LEFT * provider.n_samples:
+        return True
+    if not at.finite:
+        return False
+    ridge = prior.precision / prior.beta
+    g = at.gradient + ridge * (solution.theta - prior.centre)
+    low, high = provider.bounds
+    free = ~(((solution.theta <= low) & (g > 0.0)) | ((solution.theta >= high) & (g < 0.0)))
+    H = at.gauss_newton + np.diag(ridge)
+    root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
+    scaled = g[free] / root
+    step = np.linalg.lstsq(H[np.ix_(free, free)] / np.outer(root, root), scaled, rcond=1e-12)[0]
+    return bool(scaled @ step <= FLAT * at.loss)
+
+
+def _finished(ready: _Ready, chosen: starts.Candidate, training: Training, *, stopped: bool) -> _Done:
+    """The chosen candidate with switches as they are, and with steps that its parameters need."""
+    provider, solution, stepping = ready.provider, chosen.solution, ready.stepping
+    softened = float("nan")
+    if provider.form.lowered.switches and not stopped:
+        provider, solution, softened = _sharpened(provider, solution, training)
+    exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
+    if ready.template.grey.substeps is None and not stopped:
+        for _ in range(STEP_ROUNDS):
+            stepping = substeps_for(exact, solution.theta)
+            if stepping.substeps <= provider.form.substeps or np.isnan(stepping.change):
+                stepping = replace(stepping, substeps=provider.form.substeps)
+                break
+            provider, exact = (
+                one.with_form(replace(one.form, substeps=stepping.substeps)) for one in (provider, exact)
+            )
+            solution = _gone_on(provider, solution, training)
+    seen, _ = seen_terms(exact, solution.theta)
+    model = replace(
+        ready.template,
+        theta=ready.to_plain @ solution.theta,
+        levels=tuple(map(float, seen.terms.level)),
+        spans=tuple(map(float, seen.terms.scale)),
+        substeps=provider.form.substeps,
+    )
+    candidate = _settled(replace(chosen, solution=solution, model=model), provider)
+    return _Done(candidate=candidate, provider=provider, stepping=stepping, softened=softened)
+
+
+def _sharpened(
+    provider: EquationProvider, solution: Solution, training: Training
+) -> tuple[EquationProvider, Solution, float]:
+    """Switches sharper and sharper, as long as the run with exact ones gains by it.
+
+    Returns:
+        The records with the switches of the best, the best, and its exact loss over the soft one.
+    """
+    exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
+    best, tried = (exact.loss(solution.theta), provider, solution), list[float]()
+    now, at = provider, solution
+    while len(tried) < ROUNDS and not best[0] <= best[2].at.loss * (1.0 + SAME):
+        tried.append(best[0])
+        now = now.with_form(replace(now.form, widths=SHARPER * now.form.widths))
+        at = _gone_on(now, at, training)
+        loss = exact.loss(at.theta)
+        if loss < best[0]:
+            best = (loss, now, at)
+    ratio = best[0] / max(best[2].at.loss, 1e-300)
+    return best[1], best[2], float(ratio)
+
+
+def _gone_on(provider: EquationProvider, solution: Solution, training: Training) -> Solution:
+    """The same fit under records that are run otherwise."""
+    engine = LevenbergMarquardt(
+        termination=Termination(
+            max_iterations=max(20, training.max_iterations // 5), max_time_s=training.max_time_s,
+            tolerance=training.tolerance, patience=10,
+        ),
+        damping=DAMPINGS[training.damping](),
+        evidence_after=5 if training.regularisation is None else None,
+    )  # fmt: skip
+    found = engine.minimise(provider, solution.theta, solution.state.prior)
+    whole = (*solution.curve, *found.curve[1:])
+    return replace(found, state=replace(found.state, curve=whole))
+
+
+def _told(found: FitResult, done: _Done, data: tuple[Sequence[Trace], Sequence[Trace], Start]) -> FitResult:
+    """The result with what is known of its parameters, and what was chosen on the way."""
+    model, solution = done.model, done.candidate.solution
+    posterior = _posterior(done, *data)
+    findings = Findings.of(solution, done.provider, model.grey.free)
+    n = max(done.provider.n_samples - model.n_parameters, 1)
+    variance = 2.0 * solution.at.loss / n * model.scaling.output_scale**2
+    notes = [_step_note(model, done.stepping)] if model.lowered.n_continuous else []
+    unread = [one for i, one in enumerate(model.mapping.inputs) if i not in {i for i, _ in model.lowered.lagged}]
+    notes += [f"The equations do not read {', '.join(unread)}."] if unread else []
+    switches = sum(not one.root for one in model.lowered.switches)
+    if switches:
+        notes.append(
+            f"{switches} switch{'es' * (switches > 1)} were trained through a soft form and are exact in the model; "
+            f"the squared error of the exact form is {done.softened:.3g} times that of the soft one."
+        )
+    warnings = list(findings.warnings)
+    if model.lowered.n_continuous and not done.stepping.enough:
+        warnings.append(_step_warning(model, done.stepping))
+    return replace(
+        found,
+        posterior=posterior,
+        uncertainty=findings.uncertainty(variance) if model.grey.free else None,
+        notes=(*found.notes, *notes, *warnings),
+        warnings=(*found.warnings, *warnings),
+    )
+
+
+def _step_note(model: GreyBoxModel, stepping: Stepping) -> str:
+    n = model.substeps
+    given = model.grey.substeps is not None
+    halved = "" if given else f"; half of that changes the output by {stepping.change:.1e} of its range"
+    return (
+        f"The equations go from sample to sample in {n} Runge-Kutta step{'s' * (n > 1)} of "
+        f"{model.sample_time / n:.4g} s{' as asked for' * given}{halved}."
+    )
+
+
+def _step_warning(model: GreyBoxModel, stepping: Stepping) -> str:
+    return (
+        f"{model.substeps} Runge-Kutta steps between samples are not enough: twice as many change the output by "
+        f"{stepping.change:.1e} of its range. The equations are stiff; make what is fast algebraic, or slower."
+    )
+
+
+def _posterior(done: _Done, traces: Sequence[Trace], selection: Sequence[Trace], start: Start) -> Posterior | None:
+    """Of the model's parameters; those at a bound stay there."""
+    model, solution = done.model, done.candidate.solution
+    p = len(done.provider.scale)
+    low, high = (side[:p] for side in done.provider.bounds)
+    theta = solution.theta[:p]
+    free = (theta > low) & (theta < high)
+    to_plain = np.eye(p, done.provider.n_parameters) * np.where(free, done.provider.scale, 0.0)[:, None]
+    runs, others = ([Experiment.for_model(t, model, start) for t in some] for some in (traces, selection))
+    found = laplace(solution.state, model, to_plain, runs, copies=1)
+    return None if found is None else calibrate(found, model, others)

@@ -1,0 +1,148 @@
+"""Where the parameters of a grey box stand, what draws them, and where its fits start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.equations import Net
+from sysid.estimation.grey_box.preparing import WINDOW
+from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.networks.initialise import AbstractLayout
+from sysid.models.grey_box import Parameter
+
+Array = NDArray[np.float64]
+
+FLAT_ALPHA = 1e-10
+"""Precision of what nothing is known of, in scaled numbers: a hundred thousand times its scale is ordinary."""
+
+READOUT_SPREAD = 1e-3
+"""Standard deviation of the readouts where a fit starts: the equations are then as they were written."""
+
+APART = 0.7
+"""Standard deviation of the starts after the first: of the logarithm of a parameter that has a sign, and of one that has
+none over its scale."""
+
+TRIES = 20
+"""Draws after which a start whose free run explodes is taken as it is."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EquationLayout(AbstractLayout):
+    """Where the parameters of one fit stand, and where they start.
+
+    Args:
+        parameters: Those that are estimated.
+        nets: The networks.
+        provider: The records.
+        begun: What is trained where the fit starts: declared starts, networks that do nothing, and initial states.
+    """
+
+    parameters: tuple[Parameter, ...]
+    nets: tuple[Net, ...]
+    provider: EquationProvider
+    begun: Array
+
+    @property
+    def _first_weight(self) -> int:
+        return len(self.parameters)
+
+    def centre(self) -> Array:
+        """What the prior draws the model's parameters to: the declared starts, and networks that do nothing."""
+        p = len(self.provider.scale)
+        return np.asarray(self.begun[:p] * self.provider.scale)
+
+    def prior(self, centre: Array, *, alpha: float, beta: float) -> Prior:
+        """The prior a fit begins with.
+
+        Args:
+            centre: What the parameters are drawn to.
+            alpha: Precision of the networks' weights.
+            beta: Precision of the residuals.
+
+        Returns:
+            The prior: what is declared of a parameter is known, of the others and of initial states nothing is, and
+            the networks' weights are the evidence's.
+        """
+        scale, p, w = self.provider.scale, len(self.provider.scale), self._first_weight
+        vague = [i for i, one in enumerate(self.parameters) if one.prior is None]
+        entries: list[tuple[str, NDArray[np.int64], bool, float]] = [
+            ("parameters", np.array(vague, dtype=np.int64), True, FLAT_ALPHA)
+        ]
+        for i, one in enumerate(self.parameters):
+            if one.prior is not None:
+                entries.append((one.name, np.array([i]), True, float(scale[i] / one.prior) ** 2))
+        for number, net in enumerate(self.nets, start=1):
+            hidden = w + np.arange(net.hidden.start, net.hidden.stop).reshape(net.neurons, -1)
+            for j in range(net.arguments + 1):
+                entries.append((f"net {number} hidden {j}", hidden[:, j], False, alpha))
+            for name, part in (("readout", net.readout), ("linear", net.linear)):
+                entries.append((f"net {number} {name}", w + np.arange(part.start, part.stop), False, alpha))
+        entries.append(("records", np.arange(p, len(centre)), True, FLAT_ALPHA))
+        entries = [entry for entry in entries if len(entry[1])]
+        del beta
+        return Prior(
+            centre=centre,
+            groups=tuple(Group(name=name, members=members, known=known) for name, members, known, _ in entries),
+            alphas=np.array([precision for *_, precision in entries]),
+            beta=1.0,
+        )
+
+    def draw(self, rng: np.random.Generator, centre: Array) -> Array:
+        """Networks of hidden weights after Nguyen and Widrow 1990 that hardly do anything, the rest as it is.
+
+        Args:
+            rng: Source of randomness.
+            centre: What is trained.
+
+        Returns:
+            What is trained.
+        """
+        theta, w = centre.copy(), self._first_weight
+        for net in self.nets:
+            k, n = net.neurons, net.arguments
+            directions = rng.uniform(-1.0, 1.0, (k, n))
+            length = 0.7 * k ** (1.0 / n)
+            weights = length * directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
+            biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
+            theta[w + net.hidden.start : w + net.hidden.stop] = np.column_stack([weights, biases]).ravel()
+            theta[w + net.readout.start : w + net.readout.stop] = READOUT_SPREAD * rng.standard_normal(k)
+        return theta
+
+    def start(self, number: int, rng: np.random.Generator, centre: Array) -> tuple[Array, Array]:
+        """The declared start first, and parameters around it after; the initial states suit each.
+
+        Args:
+            number: Which start, from 0 on.
+            rng: Source of randomness.
+            centre: Ignored: initial states are no parameters of the model.
+
+        Returns:
+            What is trained, and what it is drawn to.
+        """
+        del centre
+        begun = self.draw(rng, self.begun)
+        if number == 0:
+            return begun, self.begun
+        for _ in range(TRIES):
+            theta = self._scattered(begun, rng)
+            theta = self.provider.with_states(theta, self.provider.states(theta, WINDOW))
+            if np.isfinite(self.provider.loss(theta)):
+                return theta, self.begun
+        return begun, self.begun
+
+    def _scattered(self, theta: Array, rng: np.random.Generator) -> Array:
+        """Parameters around the declared ones, within their bounds."""
+        moved, (low, high) = theta.copy(), self.provider.bounds
+        for i, one in enumerate(self.parameters):
+            z = APART * rng.standard_normal()
+            if one.prior is not None:
+                moved[i] += z
+            elif one.start != 0.0:
+                moved[i] *= np.exp(z)
+            else:
+                moved[i] += z
+        return np.clip(moved, low, high)

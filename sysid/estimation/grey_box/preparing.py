@@ -1,0 +1,205 @@
+"""What equations need to know of the records before a fit: levels and ranges of what is hidden, and a step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.models.equation_form import EquationForm
+
+Array = NDArray[np.float64]
+
+WINDOW = 50
+"""Samples on which the states before a record are looked for."""
+
+ACCURACY = 1e-6
+"""How much half the step may change a free run, over the output's scale: far below what any noise hides."""
+
+MOST_SUBSTEPS = 256
+
+STEPPED = 5_000
+"""Samples of a record on which a step is tried."""
+
+SOFT = 0.02
+"""Width of a switch in training, over the range of its argument; then :data:`SHARPER` times that, again and again."""
+
+SOFT_ROOT = 1e-3
+"""Width of a root in training, over the largest magnitude of its argument."""
+
+SHARPER, ROUNDS = 0.25, 3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stepping:
+    """A number of Runge-Kutta steps and what is known of it.
+
+    Args:
+        substeps: From sample to sample.
+        change: What twice as many change of the free run, over the output's scale; not a number where the run is none.
+    """
+
+    substeps: int
+    change: float
+
+    @property
+    def enough(self) -> bool:
+        """Whether more would change nothing."""
+        return self.change <= ACCURACY
+
+
+def substeps_for(provider: EquationProvider, theta: Array) -> Stepping:
+    """As few Runge-Kutta steps as the records need at some parameters.
+
+    Args:
+        provider: The records.
+        theta: What is trained.
+
+    Returns:
+        The steps; the most accurate that were tried where none is enough.
+    """
+    form = provider.at(theta)
+    if form.lowered.n_continuous == 0:
+        return Stepping(substeps=1, change=0.0)
+    before: list[Array] | None = None
+    best = Stepping(substeps=1, change=float("nan"))
+    n = 1
+    while n <= 2 * MOST_SUBSTEPS:
+        runs = _runs(provider, theta, replace(form, substeps=n))
+        if before is not None:
+            change = max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(runs, before, strict=True))
+            if np.isfinite(change):
+                best = Stepping(substeps=n // 2, change=change)
+            if best.enough:
+                break
+        before, n = runs, 2 * n
+    return best
+
+
+def _runs(provider: EquationProvider, theta: Array, form: EquationForm) -> list[Array]:
+    """Free runs over the beginnings of the records, over the outputs' scales."""
+    found = []
+    with np.errstate(over="ignore", invalid="ignore"):  # a step that is too long explodes
+        for i, record in enumerate(provider.records):
+            x = provider.begin(form, theta, i)
+            found.append(form.run(record.u[:STEPPED], x) / form.output_scale)
+    return found
+
+
+def first_terms(form: EquationForm, outputs: Sequence[str], means: Array) -> EquationForm:
+    """Levels and ranges of the states where nothing but names is known: a state that is an output is as it is.
+
+    Args:
+        form: The form.
+        outputs: Names of the outputs.
+        means: Of each output, in its unit.
+
+    Returns:
+        The form with a guess.
+    """
+    terms, names = form.terms, form.lowered.states
+    level, scale = terms.level.copy(), np.where(terms.declared & (terms.level != 0.0), np.abs(terms.level), 1.0)
+    for i, name in enumerate(names):
+        owner = name.split("[k-")[0]
+        if owner in outputs:
+            j = list(outputs).index(owner)
+            scale[i] = form.output_scale[j]
+            if not terms.declared[i]:
+                level[i] = means[j]
+    return replace(form, terms=replace(terms, level=terms.held(level), scale=scale))
+
+
+def seen_terms(provider: EquationProvider, theta: Array) -> tuple[EquationForm, list[Array]]:
+    """Levels and ranges of the states as the records visit them, and where the records begin.
+
+    Args:
+        provider: The records.
+        theta: What is trained.
+
+    Returns:
+        The form with these, its parameters being those given, and the state before each record.
+    """
+    form = provider.at(theta)
+    begun = [provider.begin(form, theta, i) for i in range(len(provider.records))]
+    paths = [path[np.isfinite(path).all(axis=1)] for _, path in provider.paths(theta)]
+    whole = np.concatenate(paths) if paths else np.zeros((0, form.lowered.n_states))
+    if not len(whole):
+        return form, begun
+    low, high = whole.min(axis=0), whole.max(axis=0)
+    terms = form.terms
+    span = np.where(high > low, (high - low) / 2.0, terms.scale)
+    level = np.where(terms.declared, terms.level, (low + high) / 2.0)
+    return replace(form, terms=replace(terms, level=terms.held(level), scale=span)), begun
+
+
+def norms_for(provider: EquationProvider, theta: Array) -> Array:
+    """Levels and scales of what the networks see over the records, and of what they give.
+
+    A network whose scale is not given gets the one that moves the output by its range, had it given a constant.
+
+    Args:
+        provider: The records; the networks' weights are ignored.
+        theta: What is trained.
+
+    Returns:
+        Shape ``(n_norms,)``.
+    """
+    form = provider.at(theta)
+    low = form.lowered
+    norms = np.array(low.norms, dtype=np.float64)
+    if not low.nets:
+        return norms
+    probes = _probes(form, provider, theta)
+    n_free = low.counts["free"]
+    for net in low.nets:
+        for i in range(net.arguments):
+            seen = probes[:, net.probe + i]
+            bottom, top = (float(seen.min()), float(seen.max())) if len(seen) else (0.0, 0.0)
+            norms[net.norm + 2 * i] = (top + bottom) / 2.0
+            norms[net.norm + 2 * i + 1] = 2.0 / (top - bottom) if top > bottom else 1.0
+        if not net.scaled:
+            norms[net.norm + 2 * net.arguments] = _net_scale(form, provider, theta, n_free + net.stop - 1)
+    return norms
+
+
+def widths_for(provider: EquationProvider, theta: Array) -> Array:
+    """How soft each switch and root is in training: a share of what its argument ranges over.
+
+    Args:
+        provider: The records.
+        theta: What is trained.
+
+    Returns:
+        One for each switch, in the unit of its argument.
+    """
+    form = provider.at(theta)
+    if not form.lowered.switches:
+        return np.zeros(0)
+    switches = form.lowered.switches
+    probes = _probes(form, provider, theta)[:, [one.probe for one in switches]]
+    roots = np.array([one.root for one in switches])
+    reach = np.where(roots, np.abs(probes).max(axis=0, initial=0.0), np.ptp(probes, axis=0) if len(probes) else 0.0)
+    return np.where(roots, SOFT_ROOT, SOFT) * np.where(reach > 0.0, reach, 1.0)
+
+
+def _probes(form: EquationForm, provider: EquationProvider, theta: Array) -> Array:
+    found = np.concatenate([form.probed(u, path) for u, path in provider.paths(theta)])
+    return np.asarray(found[np.isfinite(found).all(axis=1)])
+
+
+def _net_scale(form: EquationForm, provider: EquationProvider, theta: Array, place: int) -> float:
+    """What a network has to give to move the output by its range."""
+    squares, n = 0.0, 0
+    for i, record in enumerate(provider.records):
+        x = provider.begin(form, theta, i)
+        S = np.zeros((len(x), place + 1))
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable start has none
+            _, J = form.moved(record.u[:STEPPED], x, S, place + 1)
+            moves = (J[:, :, place] / form.output_scale).ravel()
+        moves = moves[np.isfinite(moves)]
+        squares, n = squares + float(moves @ moves), n + len(moves)
+    rms = (squares / max(n, 1)) ** 0.5
+    return 1.0 / rms if 0.0 < rms < np.inf else 1.0

@@ -1,0 +1,276 @@
+"""Residuals and Jacobians of the free run of equations, for the Levenberg-Marquardt engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.experiment import Experiment
+from sysid.estimation.least_squares.correlation import correlation_time
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.models.equation_form import EquationForm
+
+Array = NDArray[np.float64]
+
+BLOCK = 2_000
+"""Samples whose Jacobian is in memory at the same time."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """One record as equations are run over it, the samples of its history included.
+
+    Args:
+        u: What the programs read, shape ``(n_samples, n_lagged)``.
+        output: In units, shape ``(n_samples, n_outputs)``.
+        roots: Roots of the weights, shape ``(n_samples,)``; ``None`` for all ones.
+        rest: What the programs read and the outputs of a system that has stood before the record.
+        free: Whether its initial state is estimated; otherwise it is at rest.
+    """
+
+    u: Array
+    output: Array
+    roots: Array | None
+    rest: tuple[Array, Array]
+    free: bool
+
+    @classmethod
+    def of(cls, experiments: Sequence[Experiment], form: EquationForm) -> Record:
+        """An experiment of each output as one record.
+
+        Args:
+            experiments: The same record for each output.
+            form: What is run over it.
+
+        Returns:
+            The record. Samples of a measured history count like the others; one alone is a system that has stood there.
+        """
+        first = experiments[0]
+        history = first.history
+        stood = len(history.output) == 1 and (first.past is None or bool(first.past.any()))
+        n_past = len(history.output) if not stood and first.past is not None and first.past.any() else 0
+        inputs = np.concatenate([history.inputs[:n_past], first.inputs])
+        columns = [np.concatenate([e.history.output[:n_past], e.output]) for e in experiments]
+        before, roots = first.past_weights[:n_past], None
+        if first.weights is not None or not before.all():
+            weights = np.ones(len(first.output)) if first.weights is None else first.weights
+            roots = np.sqrt(np.concatenate([before, weights]))
+        return cls(
+            u=form.given(inputs, history.inputs[:1] if n_past else history.inputs),
+            output=np.column_stack(columns),
+            roots=roots,
+            rest=(
+                form.given(history.inputs[:1], history.inputs[:1])[0],
+                np.array([e.history.output[0] for e in experiments]),
+            ),
+            free=first.free and not stood,
+        )
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which samples count."""
+        return np.ones(len(self.output), dtype=np.bool_) if self.roots is None else self.roots > 0.0
+
+    def errors(self, y: Array, scale: Array, rows: slice = slice(None)) -> Array:
+        """Weighted errors of some rows over the outputs' scales; zero where nothing counts, whatever stands there."""
+        away = (y - self.output[rows]) / scale
+        if self.roots is None:
+            return np.asarray(away)
+        roots = self.roots[rows, None]
+        return np.where(roots > 0.0, away * roots, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EquationProvider(AbstractProvider):
+    """Residuals of an :class:`EquationForm` in free run, over the outputs' scales.
+
+    What is trained is ``[parameters and weights over their scales | initial states, less their levels, over theirs]``,
+    initial states of those records that nothing is declared of.
+
+    Args:
+        form: Programs, scaling and what is known of the states; its first parameters are ignored.
+        records: The records.
+        scale: Of each parameter and weight, in its unit, shape ``(p,)``.
+        limits: Least and greatest of each, in its unit, shape ``(2, p)``.
+    """
+
+    form: EquationForm
+    records: tuple[Record, ...]
+    scale: Array
+    limits: Array
+    n_samples: int = field(init=False)
+    n_parameters: int = field(init=False)
+    """Those of the model and of the records' initial states."""
+
+    def __post_init__(self) -> None:
+        counted = sum(int(np.count_nonzero(record.known)) for record in self.records)
+        object.__setattr__(self, "n_samples", counted * self.form.n_outputs)
+        object.__setattr__(self, "n_parameters", len(self.scale) + len(self.open_states) * len(self._free))
+
+    @property
+    def open_states(self) -> NDArray[np.int64]:
+        """States of which a record's own value is estimated."""
+        return np.flatnonzero(~self.form.terms.fixed)
+
+    @property
+    def _free(self) -> list[int]:
+        return [i for i, record in enumerate(self.records) if record.free]
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Of parameters and of initial states, in what is trained."""
+        terms, places = self.form.terms, self.open_states
+        both = []
+        for row, states in zip(self.limits, (terms.low, terms.high), strict=True):
+            begun = (states[places] - terms.level[places]) / terms.scale[places]
+            both.append(np.concatenate([row / self.scale, *[begun] * len(self._free)]))
+        return both[0], both[1]
+
+    def places(self, record: int) -> slice:
+        """Where the initial state of a record that has one of its own stands."""
+        n = len(self.open_states)
+        at = len(self.scale) + self._free.index(record) * n
+        return slice(at, at + n)
+
+    def at(self, theta: Array) -> EquationForm:
+        """The form with these parameters.
+
+        Args:
+            theta: What is trained.
+
+        Returns:
+            The form.
+        """
+        return self.form.with_theta(theta[: len(self.scale)] * self.scale)
+
+    def with_states(self, theta: Array, states: Sequence[Array]) -> Array:
+        """The same parameters with other initial states.
+
+        Args:
+            theta: What is trained.
+            states: One for each record, in units.
+
+        Returns:
+            What is trained, with these.
+        """
+        changed, terms, free = theta.copy(), self.form.terms, self.open_states
+        for i, record in enumerate(self.records):
+            if record.free:
+                changed[self.places(i)] = ((states[i] - terms.level) / terms.scale)[free]
+        return changed
+
+    def begin(self, form: EquationForm, theta: Array, number: int) -> Array:
+        """The state before a record.
+
+        Args:
+            form: With the parameters.
+            theta: What is trained.
+            number: Which record.
+
+        Returns:
+            Shape ``(n_states,)``, in units.
+        """
+        record, terms = self.records[number], form.terms
+        if not record.free:
+            return form.resting(*record.rest)
+        x = terms.level.copy()
+        free = self.open_states
+        x[free] += terms.scale[free] * theta[self.places(number)]
+        return x
+
+    def loss(self, theta: Array) -> float:
+        """Half the weighted sum of squared residuals; see the base class."""
+        form, total = self.at(theta), 0.0
+        with np.errstate(over="ignore", invalid="ignore"):  # a free run that explodes has no loss
+            for i, record in enumerate(self.records):
+                error = record.errors(form.run(record.u, self.begin(form, theta, i)), form.output_scale)
+                total += 0.5 * float(np.vdot(error, error))
+        return total if np.isfinite(total) else np.inf
+
+    def linearise(self, theta: Array) -> Linearisation:
+        """Loss, gradient and Gauss-Newton matrix; see the base class."""
+        with np.errstate(over="ignore", invalid="ignore"):  # likewise
+            return self._linearised(theta)
+
+    def _linearised(self, theta: Array) -> Linearisation:
+        gradient, matrix = np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
+        loss = correlated = samples = 0.0
+        for number, record in enumerate(self.records):
+            errors = []
+            for error, J, places in self._blocks(theta, number):
+                flat = J.reshape(-1, J.shape[2])
+                loss += 0.5 * float(np.vdot(error, error))
+                gradient[places] += flat.T @ error.ravel()
+                matrix[np.ix_(places, places)] += flat.T @ flat
+                errors.append(error)
+            for column in np.concatenate(errors).T:
+                correlated += len(column) * correlation_time(column)
+                samples += len(column)
+        return Linearisation(
+            loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / max(samples, 1.0)
+        )
+
+    def _blocks(self, theta: Array, number: int) -> Iterator[tuple[Array, Array, NDArray[np.int64]]]:
+        """Weighted errors and their derivatives by some of what is trained, and which."""
+        form, record, p = self.at(theta), self.records[number], len(self.scale)
+        if record.free:
+            free = self.open_states
+            x, S = self.begin(form, theta, number), np.zeros((form.lowered.n_states, p + len(free)))
+            S[free, p + np.arange(len(free))] = form.terms.scale[free]
+            places = np.concatenate([np.arange(p), np.arange(p + len(theta))[self.places(number)]])
+        else:
+            x, S = form.resting_moves(*record.rest, p)
+            places = np.arange(p)
+        scale = np.concatenate([self.scale, np.ones(S.shape[1] - p)])
+        for first in range(0, len(record.output), BLOCK):
+            rows = slice(first, min(first + BLOCK, len(record.output)))
+            y, J = form.moved(record.u[rows], x, S, p)
+            J *= scale
+            J /= form.output_scale[:, None]
+            if record.roots is not None:
+                J = np.where(record.roots[rows, None, None] > 0.0, J * record.roots[rows, None, None], 0.0)
+            yield record.errors(y, form.output_scale, rows), J, places
+
+    def paths(self, theta: Array) -> list[tuple[Array, Array]]:
+        """What the programs read, and every state that the records visit.
+
+        Args:
+            theta: What is trained.
+
+        Returns:
+            One pair for each record.
+        """
+        form = self.at(theta)
+        found = []
+        for i, record in enumerate(self.records):
+            path = np.empty((len(record.u), form.lowered.n_states))
+            form.run(record.u, self.begin(form, theta, i), path)
+            found.append((record.u, path))
+        return found
+
+    def states(self, theta: Array, samples: int) -> list[Array]:
+        """The state before each record, as its first samples show it.
+
+        Args:
+            theta: Parameters; initial states among them are ignored.
+            samples: How many.
+
+        Returns:
+            One for each record, in units; at rest for those that are.
+        """
+        form = self.at(theta)
+        found = []
+        for record in self.records:
+            x = form.resting(*record.rest)
+            if record.free:
+                known = record.known[:samples]
+                x = form.estimated(record.u[:samples], record.output[:samples], x, known)
+            found.append(x)
+        return found
+
+    def with_form(self, form: EquationForm) -> EquationProvider:
+        """The same records under another form of the same sizes."""
+        return replace(self, form=form)

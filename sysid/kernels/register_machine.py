@@ -1,0 +1,474 @@
+r"""A register machine, compiled once: it runs the equations of any grey box, and their exact sensitivities.
+
+A program is a list of instructions over numbered registers, ``[constants | parameters | states | inputs | results]``;
+each has an operation, up to three registers that it reads, and a number of its own (a switch, a table). Nothing is
+compiled for a new set of equations, and no text ever becomes code: equations are data here.
+
+Three programs make a model: the rates :math:`f = dx_c/dt` of the continuous states, the updates :math:`x_d(k+1)` of the
+others, and the outputs. Continuous states go from sample to sample by the classical Runge-Kutta method in ``substeps``
+equal steps, inputs and other states being held.
+
+The sensitivities are those of what is computed, steps and all, not of the differential equation. Each instruction
+leaves its partial derivatives; one pass back over them per result gives a row of :math:`\partial f/\partial x` and
+:math:`\partial f/\partial p` (reverse mode, Griewank and Walther 2008, "Evaluating derivatives", chapter 3); and with
+:math:`S = dx/d(p, x_0)` a stage at :math:`x_i`, where :math:`S_i` is a combination of the stages before, has
+
+.. math:: K_i = \frac{\partial f}{\partial x} S_i + \frac{\partial f}{\partial p},
+
+so that the method is applied to :math:`(x, S)` as to :math:`x`.
+
+A switch (``>``, ``>=``, ``sign``) of width 0 is exact and has no derivative; of a width :math:`w` it is the logistic
+function of its argument over :math:`w`, that fits are trained through. A root of width 0 is exact, and its derivative
+knows no bound near 0, where a step of finite length makes nonsense of it; of a width :math:`w` it is
+:math:`x/(x^2+w^2)^{1/4}`.
+
+Limits: states are dense, a step costs some :math:`n^2 p` multiply-adds for the sensitivities.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+ADD, SUB, MUL, DIV, NEG, POW, FMA, ABS, MIN, MAX = range(10)
+SQRT, EXP, LOG, TANH, SIN, COS, ATAN, SIGN, GREATER, NOT_LESS, SELECT, TABLE = range(10, 22)
+
+_TINY = 1e-300
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _table(x, begin, n, table):
+    """Value and slope of a piecewise linear function, its ends held."""
+    if not x > table[begin, 0]:
+        return (table[begin, 1] if x <= table[begin, 0] else math.nan), 0.0
+    if x >= table[begin + n - 1, 0]:
+        return table[begin + n - 1, 1], 0.0
+    low, high = begin, begin + n - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle, 0] <= x:
+            low = middle
+        else:
+            high = middle
+    slope = (table[high, 1] - table[low, 1]) / (table[high, 0] - table[low, 0])
+    return table[low, 1] + slope * (x - table[low, 0]), slope
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _logistic(x):
+    return 0.5 + 0.5 * math.tanh(0.5 * x)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def evaluate(code, v, first, widths, places, table):
+    """Run a program: the registers from ``first`` on are written.
+
+    Args:
+        code: Instructions ``(operation, a, b, c, own)``, shape ``(n, 5)``.
+        v: Registers.
+        first: The first result.
+        widths: Of each switch.
+        places: Of each table its first row and its rows, shape ``(n_tables, 2)``.
+        table: Rows ``(x, y)`` of all tables.
+    """
+    for i in range(len(code)):
+        op = code[i, 0]
+        a = v[code[i, 1]]
+        if op == FMA:
+            r = a * v[code[i, 2]] + v[code[i, 3]]
+        elif op == MUL:
+            r = a * v[code[i, 2]]
+        elif op == ADD:
+            r = a + v[code[i, 2]]
+        elif op == SUB:
+            r = a - v[code[i, 2]]
+        elif op == DIV:
+            r = a / v[code[i, 2]]
+        elif op == NEG:
+            r = -a
+        elif op == TANH:
+            r = math.tanh(a)
+        elif op == SQRT:
+            w = widths[code[i, 4]]
+            if a <= 0.0:
+                r = 0.0
+            elif w > 0.0:
+                r = a / math.sqrt(math.sqrt(a * a + w * w))
+            else:
+                r = math.sqrt(a)
+        elif op == ABS:
+            r = abs(a)
+        elif op == MIN:
+            b = v[code[i, 2]]
+            r = a if a <= b or a != a else b
+        elif op == MAX:
+            b = v[code[i, 2]]
+            r = a if a >= b or a != a else b
+        elif op == SELECT:
+            if a >= 1.0:
+                r = v[code[i, 2]]
+            elif a <= 0.0:
+                r = v[code[i, 3]]
+            else:
+                r = v[code[i, 3]] + a * (v[code[i, 2]] - v[code[i, 3]])
+        elif op == GREATER or op == NOT_LESS:
+            w = widths[code[i, 4]]
+            if w > 0.0:
+                r = _logistic(a / w)
+            elif op == GREATER:
+                r = 1.0 if a > 0.0 else 0.0
+            else:
+                r = 1.0 if a >= 0.0 else 0.0
+        elif op == SIGN:
+            w = widths[code[i, 4]]
+            if w > 0.0:
+                r = math.tanh(0.5 * a / w)
+            else:
+                r = 1.0 if a > 0.0 else (-1.0 if a < 0.0 else 0.0)
+        elif op == TABLE:
+            r = _table(a, places[code[i, 4], 0], places[code[i, 4], 1], table)[0]
+        elif op == POW:
+            r = a ** v[code[i, 2]]
+        elif op == EXP:
+            r = math.exp(a) if a < 709.0 else math.inf
+        elif op == LOG:
+            r = math.log(a) if a > 0.0 else (-math.inf if a == 0.0 else math.nan)
+        elif op == SIN:
+            r = math.sin(a) if abs(a) < math.inf else math.nan
+        elif op == COS:
+            r = math.cos(a) if abs(a) < math.inf else math.nan
+        else:
+            r = math.atan(a)
+        v[first + i] = r
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _partials(code, v, first, widths, places, table, d):
+    """Partial derivatives of every instruction with respect to what it reads, shape ``(n, 3)``."""
+    for i in range(len(code)):
+        op = code[i, 0]
+        a, r = v[code[i, 1]], v[first + i]
+        d[i, 0] = d[i, 1] = d[i, 2] = 0.0
+        if op == FMA:
+            d[i, 0], d[i, 1], d[i, 2] = v[code[i, 2]], a, 1.0
+        elif op == MUL:
+            d[i, 0], d[i, 1] = v[code[i, 2]], a
+        elif op == ADD:
+            d[i, 0] = d[i, 1] = 1.0
+        elif op == SUB:
+            d[i, 0], d[i, 1] = 1.0, -1.0
+        elif op == DIV:
+            d[i, 0], d[i, 1] = 1.0 / v[code[i, 2]], -r / v[code[i, 2]]
+        elif op == NEG:
+            d[i, 0] = -1.0
+        elif op == TANH:
+            d[i, 0] = 1.0 - r * r
+        elif op == SQRT:
+            w = widths[code[i, 4]]
+            if w > 0.0 and a >= 0.0:
+                q = a * a + w * w
+                d[i, 0] = (1.0 - 0.5 * a * a / q) / math.sqrt(math.sqrt(q))
+            else:
+                d[i, 0] = 0.5 / r if r > 0.0 else 0.0
+        elif op == ABS:
+            d[i, 0] = 1.0 if a > 0.0 else (-1.0 if a < 0.0 else 0.0)
+        elif op == MIN:
+            d[i, 0 if a <= v[code[i, 2]] else 1] = 1.0
+        elif op == MAX:
+            d[i, 0 if a >= v[code[i, 2]] else 1] = 1.0
+        elif op == SELECT:
+            if a >= 1.0:
+                d[i, 1] = 1.0
+            elif a <= 0.0:
+                d[i, 2] = 1.0
+            else:
+                d[i, 0] = v[code[i, 2]] - v[code[i, 3]]
+                d[i, 1], d[i, 2] = a, 1.0 - a
+        elif op == GREATER or op == NOT_LESS:
+            w = widths[code[i, 4]]
+            if w > 0.0:
+                d[i, 0] = r * (1.0 - r) / w
+        elif op == SIGN:
+            w = widths[code[i, 4]]
+            if w > 0.0:
+                d[i, 0] = 0.5 * (1.0 - r * r) / w
+        elif op == TABLE:
+            d[i, 0] = _table(a, places[code[i, 4], 0], places[code[i, 4], 1], table)[1]
+        elif op == POW:
+            b = v[code[i, 2]]
+            d[i, 0] = b * a ** (b - 1.0) if b != 0.0 else 0.0
+            d[i, 1] = r * math.log(a) if a > 0.0 else 0.0
+        elif op == EXP:
+            d[i, 0] = r
+        elif op == LOG:
+            d[i, 0] = 1.0 / a
+        elif op == SIN:
+            d[i, 0] = math.cos(a) if abs(a) < math.inf else math.nan
+        elif op == COS:
+            d[i, 0] = -math.sin(a) if abs(a) < math.inf else math.nan
+        else:
+            d[i, 0] = 1.0 / (1.0 + a * a)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _row(code, d, result, first, bar):
+    """What one result moves by with every register that is no result, left in ``bar``."""
+    for i in range(len(bar)):
+        bar[i] = 0.0
+    bar[result] = 1.0
+    for i in range(len(code) - 1, -1, -1):
+        g = bar[first + i]
+        if g != 0.0:
+            if d[i, 0] != 0.0:
+                bar[code[i, 1]] += g * d[i, 0]
+            if d[i, 1] != 0.0:
+                bar[code[i, 2]] += g * d[i, 1]
+            if d[i, 2] != 0.0:
+                bar[code[i, 3]] += g * d[i, 2]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def registers(constants, theta, n, m, n_code):
+    """Registers with constants and parameters in place."""
+    v = np.zeros(len(constants) + len(theta) + n + m + n_code)
+    v[: len(constants)] = constants
+    v[len(constants) : len(constants) + len(theta)] = theta
+    return v
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill(v, at, x, u):
+    for i in range(len(x)):
+        v[at + i] = x[i]
+    for i in range(len(u)):
+        v[at + len(x) + i] = u[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _finite(x):
+    total = 0.0
+    for i in range(len(x)):
+        total += x[i]
+    return math.isfinite(total)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def values(program, theta, path, u, widths, places, table, y):
+    """The results of one program along a path of states, written to ``y``.
+
+    Args:
+        program: Code, results and constants.
+        theta: Parameters.
+        path: States, shape ``(n_samples, n)``.
+        u: Inputs, shape ``(n_samples, m)``.
+        widths: Of each switch.
+        places: Of each table.
+        table: Rows of all tables.
+        y: Shape ``(n_samples, n_results)``, written.
+    """
+    code, results, constants = program
+    n, m = path.shape[1], u.shape[1]
+    v = registers(constants, theta, n, m, len(code))
+    at = len(constants) + len(theta)
+    for t in range(len(u)):
+        _fill(v, at, path[t], u[t])
+        evaluate(code, v, at + n + m, widths, places, table)
+        for j in range(len(results)):
+            y[t, j] = v[results[j]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def free_run(programs, theta, x, u, substeps, step, widths, places, table, y, path):
+    """Run a model, writing ``y`` and leaving in ``x`` the state after the last sample.
+
+    Args:
+        programs: Rates, updates and outputs, each a tuple of code, results and constants.
+        theta: Parameters, those that are not fitted behind those that are.
+        x: Continuous states, then the others, before the first sample, shape ``(n,)``; overwritten.
+        u: Inputs, shape ``(n_samples, m)``.
+        substeps: Runge-Kutta steps from sample to sample.
+        step: Seconds of one of them.
+        widths: Of each switch; 0 is exact.
+        places: Of each table its first row and its rows.
+        table: Rows of all tables.
+        y: Shape ``(n_samples, n_outputs)``, written; not a number from where the state is none.
+        path: States before each sample, shape ``(n_samples, n)``, written; without rows nobody asks.
+    """
+    rates, updates, outputs = programs
+    n, m, n_c = len(x), u.shape[1], len(rates[1])
+    vf = registers(rates[2], theta, n, m, len(rates[0]))
+    vg = registers(updates[2], theta, n, m, len(updates[0]))
+    vh = registers(outputs[2], theta, n, m, len(outputs[0]))
+    af, ag, ah = len(rates[2]) + len(theta), len(updates[2]) + len(theta), len(outputs[2]) + len(theta)
+    later = np.empty(n - n_c)
+    slope, total = np.empty(n_c), np.empty(n_c)
+    stage = x.copy()
+    for t in range(len(u)):
+        if not _finite(x):
+            y[t:] = math.nan
+            path[t:] = math.nan
+            return
+        if len(path) > 0:
+            path[t] = x
+        _fill(vh, ah, x, u[t])
+        evaluate(outputs[0], vh, ah + n + m, widths, places, table)
+        for j in range(len(outputs[1])):
+            y[t, j] = vh[outputs[1][j]]
+        if n > n_c:
+            _fill(vg, ag, x, u[t])
+            evaluate(updates[0], vg, ag + n + m, widths, places, table)
+            for i in range(n - n_c):
+                later[i] = vg[updates[1][i]]
+        if n_c > 0:
+            _fill(vf, af, x, u[t])
+            for _ in range(substeps):
+                stage[:] = x
+                total[:] = 0.0
+                for s in range(4):
+                    for i in range(n_c):
+                        vf[af + i] = stage[i]
+                    evaluate(rates[0], vf, af + n + m, widths, places, table)
+                    weight = 2.0 if s == 1 or s == 2 else 1.0
+                    ahead = step if s == 2 else 0.5 * step
+                    for i in range(n_c):
+                        slope[i] = vf[rates[1][i]]
+                        total[i] += weight * slope[i]
+                        stage[i] = x[i] + ahead * slope[i]
+                for i in range(n_c):
+                    x[i] += step / 6.0 * total[i]
+        for i in range(n - n_c):
+            x[n_c + i] = later[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _moves(program, d, bar, n_theta, first, S, p, result, out):
+    """How one result moves: its row against the states' sensitivities, and its own with the parameters."""
+    code, _, constants = program
+    _row(code, d, result, first, bar)
+    begin, states = len(constants), len(constants) + n_theta
+    for q in range(len(out)):
+        out[q] = bar[begin + q] if q < p else 0.0
+    for j in range(len(S)):
+        g = bar[states + j]
+        if g != 0.0:
+            line = S[j]
+            for q in range(len(out)):
+                out[q] += g * line[q]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sensitivities(programs, theta, p, x, S, u, substeps, step, widths, places, table, y, J):
+    """Run a model with the derivatives of its outputs.
+
+    Args:
+        programs: As in :func:`free_run`.
+        theta: Parameters.
+        p: How many of them have columns of their own, the first of all columns; 0 for the initial state's alone.
+        x: State before the first sample, shape ``(n,)``; overwritten.
+        S: Its derivatives, shape ``(n, n_columns)``; overwritten.
+        u: Inputs, shape ``(n_samples, m)``.
+        substeps: Runge-Kutta steps from sample to sample.
+        step: Seconds of one of them.
+        widths: Of each switch; 0 is exact.
+        places: Of each table.
+        table: Rows of all tables.
+        y: Shape ``(n_samples, n_outputs)``, written.
+        J: Shape ``(n_samples, n_outputs, n_columns)``, written.
+    """
+    rates, updates, outputs = programs
+    n, m, n_c, columns = len(x), u.shape[1], len(rates[1]), S.shape[1]
+    vf = registers(rates[2], theta, n, m, len(rates[0]))
+    vg = registers(updates[2], theta, n, m, len(updates[0]))
+    vh = registers(outputs[2], theta, n, m, len(outputs[0]))
+    af, ag, ah = len(rates[2]) + len(theta), len(updates[2]) + len(theta), len(outputs[2]) + len(theta)
+    df, dg, dh = np.zeros((len(rates[0]), 3)), np.zeros((len(updates[0]), 3)), np.zeros((len(outputs[0]), 3))
+    bf, bg, bh = np.zeros(len(vf)), np.zeros(len(vg)), np.zeros(len(vh))
+    later, S_later = np.empty(n - n_c), np.empty((n - n_c, columns))
+    total, S_total = np.empty(n_c), np.empty((n_c, columns))
+    slope, S_slope = np.empty(n_c), np.empty((n_c, columns))
+    stage, S_stage = x.copy(), S.copy()
+    for t in range(len(u)):
+        if not _finite(x):
+            y[t:] = math.nan
+            J[t:] = math.nan
+            return
+        _fill(vh, ah, x, u[t])
+        evaluate(outputs[0], vh, ah + n + m, widths, places, table)
+        _partials(outputs[0], vh, ah + n + m, widths, places, table, dh)
+        for j in range(len(outputs[1])):
+            y[t, j] = vh[outputs[1][j]]
+            _moves(outputs, dh, bh, len(theta), ah + n + m, S, p, outputs[1][j], J[t, j])
+        if n > n_c:
+            _fill(vg, ag, x, u[t])
+            evaluate(updates[0], vg, ag + n + m, widths, places, table)
+            _partials(updates[0], vg, ag + n + m, widths, places, table, dg)
+            for i in range(n - n_c):
+                later[i] = vg[updates[1][i]]
+                _moves(updates, dg, bg, len(theta), ag + n + m, S, p, updates[1][i], S_later[i])
+        if n_c > 0:
+            _fill(vf, af, x, u[t])
+            S_stage[n_c:] = S[n_c:]
+            for _ in range(substeps):
+                stage[:] = x
+                S_stage[:n_c] = S[:n_c]
+                total[:] = 0.0
+                S_total[:] = 0.0
+                for s in range(4):
+                    for i in range(n_c):
+                        vf[af + i] = stage[i]
+                    evaluate(rates[0], vf, af + n + m, widths, places, table)
+                    _partials(rates[0], vf, af + n + m, widths, places, table, df)
+                    weight = 2.0 if s == 1 or s == 2 else 1.0
+                    ahead = step if s == 2 else 0.5 * step
+                    for i in range(n_c):
+                        slope[i] = vf[rates[1][i]]
+                        total[i] += weight * slope[i]
+                        _moves(rates, df, bf, len(theta), af + n + m, S_stage, p, rates[1][i], S_slope[i])
+                    for i in range(n_c):
+                        stage[i] = x[i] + ahead * slope[i]
+                        for q in range(columns):
+                            S_total[i, q] += weight * S_slope[i, q]
+                            S_stage[i, q] = S[i, q] + ahead * S_slope[i, q]
+                for i in range(n_c):
+                    x[i] += step / 6.0 * total[i]
+                    for q in range(columns):
+                        S[i, q] += step / 6.0 * S_total[i, q]
+        for i in range(n - n_c):
+            x[n_c + i] = later[i]
+            for q in range(columns):
+                S[n_c + i, q] = S_later[i, q]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def derivatives(program, theta, p, x, u, widths, places, table, r, Jx, Jp):
+    """The results of one program at one point, with their derivatives.
+
+    Args:
+        program: Code, results and constants.
+        theta: Parameters.
+        p: How many of them are asked for.
+        x: State, shape ``(n,)``.
+        u: Inputs, shape ``(m,)``.
+        widths: Of each switch.
+        places: Of each table.
+        table: Rows of all tables.
+        r: Shape ``(n_results,)``, written.
+        Jx: Shape ``(n_results, n)``, written.
+        Jp: Shape ``(n_results, p)``, written.
+    """
+    code, results, constants = program
+    n, m = len(x), len(u)
+    v = registers(constants, theta, n, m, len(code))
+    at = len(constants) + len(theta)
+    first = at + n + m
+    _fill(v, at, x, u)
+    evaluate(code, v, first, widths, places, table)
+    d, bar = np.zeros((len(code), 3)), np.zeros(len(v))
+    _partials(code, v, first, widths, places, table, d)
+    for j in range(len(results)):
+        r[j] = v[results[j]]
+        _row(code, d, results[j], first, bar)
+        Jx[j] = bar[at : at + n]
+        Jp[j] = bar[len(constants) : len(constants) + p]

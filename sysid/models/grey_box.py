@@ -1,0 +1,364 @@
+"""Grey box: equations that somebody wrote, with parameters to estimate and networks for what is not known."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping as Dict
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Any
+
+from sysid.equations import Lowered, System, Terms, lower
+from sysid.errors import ConfigError, shortened
+from sysid.models.base import AbstractStructure
+from sysid.models.lags import whole
+from sysid.models.mapping import Mapping
+
+MOST_PARAMETERS = 500
+MOST_SUBSTEPS = 1_000
+MOST_POINTS = 10_000
+"""Points of all tables together."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A parameter of the equations, in its own unit.
+
+    Args:
+        name: Its name in the equations.
+        start: Where its estimation starts; its value, where it is fixed.
+        low: Least value.
+        high: Greatest value.
+        prior: Standard deviation of what is known of it before the data, around the start; ``None`` where nothing is.
+        fixed: Whether it is known, and not estimated.
+        unit: Its unit, for people.
+
+    Raises:
+        ConfigError: If the numbers do not go together.
+    """
+
+    name: str
+    start: float
+    low: float = -math.inf
+    high: float = math.inf
+    prior: float | None = None
+    fixed: bool = False
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        where = f"parameters, {self.name}"
+        for name in ("start", "low", "high", "prior"):
+            _number(self, name, where, least_finite=name in {"start", "prior"})
+        if not self.low <= self.start <= self.high or not self.low < self.high:
+            raise ConfigError(
+                f"{self.name} starts outside its bounds",
+                where=where,
+                expected=f"low < high, and a start from {self.low:g} to {self.high:g}",
+                got=f"{self.start:g}",
+                remedy="correct the start or the bounds",
+            )
+        if self.prior is not None and not self.prior > 0.0:
+            raise ConfigError(
+                "a prior is a standard deviation", where=where, expected="above 0", got=self.prior,
+                remedy=f"write fixed: true where {self.name} is known",
+            )  # fmt: skip
+
+    @property
+    def scale(self) -> float:
+        """What is a large change of it."""
+        if self.prior is not None:
+            return self.prior
+        if self.start != 0.0:
+            return abs(self.start)
+        finite = [abs(bound) for bound in (self.low, self.high) if math.isfinite(bound) and bound != 0.0]
+        return min(finite, default=1.0)
+
+    def to_dict(self) -> float | dict[str, Any]:
+        """As it is written: a number where only the start is given."""
+        return _written(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InitialState:
+    """What is known of a state before the first sample.
+
+    Args:
+        name: The state.
+        start: Its value there; where the record's own is estimated, where that starts.
+        low: Least value.
+        high: Greatest value.
+        fixed: Whether every record begins at that value, and none is estimated.
+        unit: Its unit, for people.
+
+    Raises:
+        ConfigError: If the numbers do not go together.
+    """
+
+    name: str
+    start: float
+    low: float = -math.inf
+    high: float = math.inf
+    fixed: bool = False
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        where = f"initial, {self.name}"
+        for name in ("start", "low", "high"):
+            _number(self, name, where, least_finite=name == "start")
+        if not self.low <= self.start <= self.high or not self.low < self.high:
+            raise ConfigError(
+                f"{self.name} begins outside its bounds",
+                where=where,
+                expected=f"low < high, and a start from {self.low:g} to {self.high:g}",
+                got=f"{self.start:g}",
+                remedy="correct the start or the bounds",
+            )
+
+    def to_dict(self) -> float | dict[str, Any]:
+        """As it is written: a number where only the start is given."""
+        return _written(self)
+
+
+Table = tuple[str, tuple[tuple[float, float], ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GreyBox(AbstractStructure):
+    """Equations with parameters to estimate, as MATLAB's ``idnlgrey`` and ``greyest``.
+
+    Args:
+        equations: One a line: ``dx/dt = ...``, ``x[k+1] = ...``, and what is computed now, ``y = ...``, the outputs
+            among it. Names that are neither states, definitions nor parameters are inputs of the mapping.
+        parameters: By name the start, or ``{start:, low:, high:, prior:, fixed:, unit:}``.
+        initial: By state its value before the first sample, or ``{start:, low:, high:, fixed:}``. What is not named is
+            at equilibrium in a record that begins at rest, and estimated in others.
+        tables: By name the points ``[[x, y], ...]`` of a function that is interpolated between them.
+        substeps: Runge-Kutta steps from sample to sample; by default as many as the records need, which is told.
+
+    Raises:
+        ConfigError: With line and column of what is wrong with the equations, or naming another field.
+
+    Example:
+        >>> tank = GreyBox(equations="dlevel/dt = a*pump - b*sqrt(level)", parameters={"a": 0.1, "b": {"start": 0.2}})
+        >>> tank.label
+        'GreyBox 1/2'
+    """
+
+    equations: str
+    parameters: tuple[Parameter, ...] | Dict[str, Any] = ()
+    initial: tuple[InitialState, ...] | Dict[str, Any] = ()
+    tables: tuple[Table, ...] | Dict[str, Any] = ()
+    substeps: int | None = None
+
+    kind = "GreyBox"
+
+    def __post_init__(self) -> None:
+        text = self.equations
+        if isinstance(text, Sequence) and not isinstance(text, str) and all(isinstance(one, str) for one in text):
+            object.__setattr__(self, "equations", "\n".join(text))
+        if not isinstance(self.equations, str):
+            raise ConfigError(
+                "the equations are no text", where="equations", expected="text, one equation a line",
+                got=shortened(text), remedy="write equations: | and the equations below it, indented",
+            )  # fmt: skip
+        object.__setattr__(self, "parameters", _entries(self.parameters, Parameter, "parameters"))
+        object.__setattr__(self, "initial", _entries(self.initial, InitialState, "initial"))
+        object.__setattr__(self, "tables", _tables(self.tables))
+        if self.substeps is not None and not (whole(self.substeps) and 1 <= self.substeps <= MOST_SUBSTEPS):
+            raise ConfigError(
+                "not a number of steps", where="substeps", expected=f"a whole number from 1 to {MOST_SUBSTEPS:,}",
+                got=shortened(self.substeps), remedy="leave substeps out: as many as are needed are chosen",
+            )  # fmt: skip
+        self._check_system()
+
+    def _check_system(self) -> None:
+        """Refuse equations that cannot be lowered for any mapping, before one is known."""
+        system = self.system
+        lowered(self, system.others, (*system.states, *system.definitions), None)
+        for one in self._states_given:
+            if one.name not in system.states:
+                near = difflib.get_close_matches(one.name, system.states, n=1)
+                raise ConfigError(
+                    f"{one.name} is no state", where="initial", expected=f"one of {', '.join(system.states) or 'none'}",
+                    got=one.name, remedy=f"did you mean {near[0]}?" if near else "remove it",
+                )  # fmt: skip
+
+    @property
+    def named(self) -> tuple[Parameter, ...]:
+        """The parameters."""
+        return self.parameters  # type: ignore[return-value]  # brought into this form when it was made
+
+    @property
+    def _states_given(self) -> tuple[InitialState, ...]:
+        return self.initial  # type: ignore[return-value]  # likewise
+
+    @property
+    def free(self) -> tuple[Parameter, ...]:
+        """Parameters that are estimated."""
+        return tuple(one for one in self.named if not one.fixed)
+
+    @property
+    def fixed(self) -> tuple[Parameter, ...]:
+        """Parameters that are known."""
+        return tuple(one for one in self.named if one.fixed)
+
+    @property
+    def begins(self) -> dict[str, InitialState]:
+        """By state what is known of it before the first sample."""
+        return {one.name: one for one in self._states_given}
+
+    @property
+    def points(self) -> dict[str, tuple[tuple[float, float], ...]]:
+        """By table its points."""
+        return dict(self.tables)  # type: ignore[arg-type]  # brought into this form when it was made
+
+    @property
+    def system(self) -> System:
+        """The equations, read."""
+        return _system(self.equations, tuple(one.name for one in self.named), tuple(self.points))
+
+    @property
+    def label(self) -> str:
+        """States and estimated parameters, and the weights of networks, as ``GreyBox 2/5+41``."""
+        weights = lowered(self, self.system.others, (), None).n_weights
+        return f"{self.kind} {len(self.system.states)}/{len(self.free)}{f'+{weights}' if weights else ''}"
+
+    def check_mapping(self, mapping: Mapping) -> None:
+        """Refuse a mapping whose inputs or outputs the equations do not know."""
+        self.system.check_names(mapping.inputs, mapping.outputs)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields as JSON values."""
+        return {
+            "kind": self.kind,
+            "equations": self.equations,
+            "parameters": {one.name: one.to_dict() for one in self.named},
+            "initial": {one.name: one.to_dict() for one in self._states_given},
+            "tables": {name: [list(point) for point in points] for name, points in self.points.items()},
+            "substeps": self.substeps,
+        }
+
+
+@lru_cache(maxsize=64)
+def _system(text: str, parameters: tuple[str, ...], tables: tuple[str, ...]) -> System:
+    return System.read(text, parameters, tables)
+
+
+@lru_cache(maxsize=64)
+def lowered(
+    structure: GreyBox, inputs: tuple[str, ...], outputs: tuple[str, ...], sample_time: float | None
+) -> Lowered:
+    """The programs of a grey box.
+
+    Args:
+        structure: The grey box.
+        inputs: Channels that go in.
+        outputs: Channels that come out.
+        sample_time: Seconds; ``None`` to see whether there are such programs.
+
+    Returns:
+        The programs.
+
+    Raises:
+        ConfigError: With line and column, of what cannot be lowered.
+    """
+    terms = Terms(
+        inputs=inputs,
+        outputs=outputs,
+        sample_time=sample_time,
+        free=tuple(one.name for one in structure.free),
+        fixed=tuple(one.name for one in structure.fixed),
+        tables=structure.points,
+    )
+    return lower(structure.system, terms)
+
+
+def _entries(given: Any, kind: Any, where: str) -> tuple[Any, ...]:
+    """Parameters, or initial states, from what people write."""
+    if isinstance(given, tuple) and all(isinstance(one, kind) for one in given):
+        return given
+    if not isinstance(given, Dict) or len(given) > MOST_PARAMETERS:
+        raise ConfigError(
+            f"{where} are no entries by name", where=where, expected=f"up to {MOST_PARAMETERS}, as in {{k: 0.5}}",
+            got=shortened(given), remedy=f"write {where}: {{NAME: {{start: 0.5, low: 0}}}}",
+        )  # fmt: skip
+    known = [one.name for one in fields(kind) if one.name != "name"]
+    found = []
+    for name, entry in given.items():
+        if not isinstance(name, str) or not name.strip():
+            raise ConfigError(
+                "not a name", where=where, expected="text", got=shortened(name), remedy="put it in quotes"
+            )
+        written = entry if isinstance(entry, Dict) else {"start": entry}
+        for key in written:
+            if key not in known:
+                near = difflib.get_close_matches(str(key), known, n=1)
+                raise ConfigError(
+                    f"unknown field {key!r}", where=f"{where}, {name}", expected=f"one of {', '.join(known)}",
+                    got=shortened(key), remedy=f"did you mean {near[0]}?" if near else "remove it",
+                )  # fmt: skip
+        if "start" not in written:
+            raise ConfigError(
+                f"{name} has no start", where=f"{where}, {name}", expected="a start, as in {start: 0.5}",
+                got=", ".join(map(str, written)) or "nothing", remedy="add start: and a value of the right size",
+            )  # fmt: skip
+        found.append(kind(name=name, **written))
+    return tuple(found)
+
+
+def _tables(given: Any) -> tuple[Table, ...]:
+    """Tables from what people write."""
+    pairs = given.items() if isinstance(given, Dict) else given
+    found: list[Table] = []
+    for name, points in pairs:
+        rows = (
+            [point for point in points if isinstance(point, list | tuple) and len(point) == 2]
+            if isinstance(points, list | tuple)
+            else []
+        )  # noqa: E501, PLR2004 - x and y
+        numbers = [tuple(_real(value) for value in row) for row in rows]
+        rising = all(a[0] < b[0] for a, b in zip(numbers, numbers[1:], strict=False))
+        if len(numbers) < 2 or len(numbers) != len(points) or not rising or not all(map(_finite, numbers)):  # noqa: PLR2004
+            raise ConfigError(
+                f"{name} is no table", where="tables", expected="points [[x, y], ...], at least two, x rising",
+                got=shortened(points), remedy="write for example valve: [[0, 0], [1, 0.4], [2, 1]]",
+            )  # fmt: skip
+        found.append((str(name), tuple(numbers)))  # type: ignore[arg-type]  # pairs, by the check above
+    if sum(len(points) for _, points in found) > MOST_POINTS:
+        raise ConfigError(
+            "too many points", where="tables", expected=f"at most {MOST_POINTS:,}", remedy="thin them out"
+        )
+    return tuple(found)
+
+
+def _real(value: object) -> float:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+
+
+def _finite(values: Sequence[float]) -> bool:
+    return all(math.isfinite(value) for value in values)
+
+
+def _number(entry: Any, name: str, where: str, *, least_finite: bool) -> None:
+    """Bring a field into its form, or refuse what is no number."""
+    given = getattr(entry, name)
+    if given is None and name == "prior":
+        return
+    value = _real(given)
+    if math.isnan(value) or (least_finite and not math.isfinite(value)):
+        raise ConfigError(
+            f"{name} is no number", where=where, expected="a number", got=shortened(given),
+            remedy="write for example {start: 0.5, low: 0, high: 2}",
+        )  # fmt: skip
+    object.__setattr__(entry, name, value)
+
+
+def _written(entry: Any) -> float | dict[str, Any]:
+    given = {
+        one.name: getattr(entry, one.name)
+        for one in fields(entry)
+        if one.name != "name" and (one.name == "start" or getattr(entry, one.name) != one.default)
+    }
+    return float(given["start"]) if len(given) == 1 else given
