@@ -42,6 +42,7 @@ from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial
+from sysid.estimation.record_notes import acts_at_once, undetermined
 from sysid.estimation.result import FitResult
 from sysid.estimation.stability.check import (
     AbstractStabilityCheck,
@@ -234,7 +235,9 @@ class Estimator:
             found = self.with_posterior(found, traces, named["start"], given.get("selection", ()))
             told = () if found.posterior is not None else (f"No interval of the output: {self.no_posterior}.",)
             off = equilibrium_notes(found.model, traces, named["start"])
-            return replace(found, notes=(*found.notes, *told, *off), warnings=(*found.warnings, *off))
+            late = acts_at_once(found.model, traces, named["start"])
+            warned = (*undetermined(traces, mapping), *late, *off)
+            return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
 
         return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
 

@@ -40,6 +40,9 @@ from scipy import linalg
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.result import Evidence
 
+BETA_LIMIT = float(np.finfo(np.float64).eps ** -2)
+"""Precision of the residuals where nothing but rounding is left of them: outputs are scaled to about 1."""
+
 ALPHA_BOUNDS = (1e-9, 1e9)
 """Bounds of a prior's precision in scaled numbers, where weights of order 1 are ordinary: a group outside them is
 free, or switched off, for every practical purpose."""
@@ -135,7 +138,8 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     tiny = np.finfo(np.float64).tiny
     alphas = np.clip(gammas / np.maximum(2.0 * energies, tiny), *ALPHA_BOUNDS)
     alphas = np.where([group.known for group in prior.groups], prior.alphas, alphas)
-    beta = max(independent - float(gammas.sum()), 1.0) / max(2.0 * at.loss, tiny)
+    left = max(independent - float(gammas.sum()), 1.0)
+    beta = min(left / max(2.0 * at.loss, tiny * left), BETA_LIMIT)
     return replace(prior, alphas=alphas, beta=beta), evidence
 
 

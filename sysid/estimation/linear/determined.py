@@ -9,12 +9,8 @@ import numpy as np
 
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.poles import sections_of
+from sysid.estimation.record_notes import informative
 from sysid.models import Domain, Mapping, Scaling, TransferFunction, TransferFunctionModel
-
-SAME = 1e-9
-"""Part of an input that others do not explain, below which it is made of them."""
-STILL = 8.0 * np.finfo(np.float64).eps
-"""How far an input moves, relative to its size, below which it never changes."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -23,46 +19,23 @@ class Determined:
 
     Args:
         kept: Their places among all inputs; one at least.
-        notes: What is to be said of the others.
     """
 
     kept: tuple[int, ...]
-    notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, experiments: Sequence[Experiment], mapping: Mapping) -> Determined:
+    def of(cls, experiments: Sequence[Experiment]) -> Determined:
         """Look at some records.
 
         Args:
             experiments: The records; masked samples say nothing.
-            mapping: Names the inputs.
 
         Returns:
             What they determine.
         """
         seen = [e.inputs if e.usable is None else e.inputs[e.usable] for e in experiments]
         whole = np.concatenate(seen) if sum(map(len, seen)) else np.concatenate([e.inputs for e in experiments])
-        kept: list[int] = []
-        notes = []
-        for j, name in enumerate(mapping.inputs):
-            column = whole[:, j]
-            if np.ptp(column) <= STILL * np.abs(column).max(initial=0.0):
-                notes.append(
-                    f"{name} never changes in these records: they say nothing of its effect, which is put at 0."
-                )
-                continue
-            others = np.column_stack([whole[:, kept], np.ones(len(whole))])
-            others = others / np.maximum(np.linalg.norm(others, axis=0), np.finfo(np.float64).tiny)
-            left = column - others @ np.linalg.lstsq(others, column, rcond=None)[0]
-            if kept and np.linalg.norm(left) <= SAME * np.linalg.norm(column - column.mean()):
-                names = ", ".join(mapping.inputs[i] for i in kept)
-                notes.append(
-                    f"{name} is made of {names} in these records: they do not tell their effects apart, and all of it "
-                    f"is given to {names}."
-                )
-                continue
-            kept.append(j)
-        return cls(kept=tuple(kept) or (0,), notes=tuple(notes))
+        return cls(kept=informative(whole) or (0,))
 
     def narrowed(self, orders: TransferFunction) -> TransferFunction:
         """The structure of the inputs that are kept.

@@ -14,7 +14,7 @@ from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.determined import STILL, Determined
+from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.transfer_function_search import AbstractProblem
@@ -71,7 +71,7 @@ def fit_transfer_function(
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     whole = tuple(_bridged(experiment) for experiment in experiments_of(traces, mapping, start, rest))
     _check(orders, mapping, whole)
-    determined = Determined.of(whole, mapping)
+    determined = Determined.of(whole)
     experiments, own = tuple(determined.only(e) for e in whole), determined.narrowed(orders)
     problem = _Problem(
         experiments=experiments,
@@ -100,7 +100,7 @@ def fit_transfer_function(
     # cores a fit took four times as long with them.
     with one_blas_thread():
         fit = problem.solve(began, on_iteration, score if selection else None)
-    return replace(fit, model=of_all_inputs(fit.model), notes=(*fit.notes, *determined.notes, *_still(experiments)))
+    return replace(fit, model=of_all_inputs(fit.model))
 
 
 def _bridged(experiment: Experiment) -> Experiment:
@@ -112,13 +112,6 @@ def _bridged(experiment: Experiment) -> Experiment:
     return replace(
         experiment, output=np.where(usable, experiment.output, np.interp(places, known, experiment.output[known]))
     )
-
-
-def _still(experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    values = np.concatenate([e.output if e.usable is None else e.output[e.usable] for e in experiments])
-    if len(values) and np.ptp(values) > STILL * np.abs(values).max():
-        return ()
-    return ("The output never changes in these records: they say nothing of a response to any input.",)
 
 
 def _mean_mse(model: AbstractModel, traces: Sequence[Trace], start: Start) -> float:

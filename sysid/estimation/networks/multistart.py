@@ -426,4 +426,5 @@ def score(multistart: Multistart, model: Network) -> float:
         else:
             output = model.predict(inputs[n:], target[n:], history)
         errors.append(np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2, axis=0) * unit)
-    return float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")
+    with np.errstate(divide="ignore"):  # a trace that is met exactly, such as a constant: the mean is 0
+        return float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")

@@ -126,7 +126,7 @@ SAYS_NOTHING = {
 
 @pytest.mark.parametrize("kind", SAYS_NOTHING)
 @pytest.mark.parametrize("start", [ESTIMATED, Start()], ids=["estimated", "rest"])
-def test_an_input_that_says_nothing_is_named_and_the_other_fitted(kind: str, start: Start) -> None:
+def test_an_input_that_says_nothing_has_no_effect_and_the_other_is_fitted(kind: str, start: Start) -> None:
     u = np.r_[np.full(5, -1.0), steps(300, 3)]
     y = lfilter([0.0, 0.2], [1.0, -0.8], u + 1.0) + 2.0
     trace = trace_of(np.column_stack([u, SAYS_NOTHING[kind](u)]), y)
@@ -134,14 +134,12 @@ def test_an_input_that_says_nothing_is_named_and_the_other_fitted(kind: str, sta
     found = model_of(fit)
     np.testing.assert_allclose([found.denominator(0)[1], found.numerator(0)[0]], [-0.8, 0.2], atol=1e-8)
     assert found.numerator(1).tolist() == [0.0]
-    assert any(note.startswith("u2 ") for note in fit.notes)
 
 
 def test_an_output_that_never_changes_has_no_response() -> None:
     fit = tf(trace_of(steps(80, 1)[:, None], np.full(80, 0.3)), TransferFunction(poles=(2,), zeros=(1,)))
     assert model_of(fit).numerator(0).tolist() == [0.0, 0.0]
     np.testing.assert_allclose(fit.model.simulate(steps(20, 5)[:, None]), 0.3)
-    assert any(note.startswith("The output never changes") for note in fit.notes)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

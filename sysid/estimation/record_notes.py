@@ -1,0 +1,158 @@
+"""What the records of a fit leave open, and what the fit leaves out of them: told for every kind of structure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from sysid.models import AbstractModel, History, Mapping, Start, beginning
+from sysid.traces import Trace
+
+STILL = 8.0 * np.finfo(np.float64).eps
+"""How far a channel moves, relative to its size, below which it never changes."""
+SAME = 1e-9
+"""Part of an input that others do not explain, below which it is made of them."""
+
+LAGS = 5
+"""Past errors and inputs that are taken out of the error, before the input of the same sample is looked at."""
+LEAST_SAMPLES = 100
+MOST_SAMPLES = 20_000
+"""Samples of a record that are looked at: more would not make the finding any surer."""
+LEAST_ERROR = 1e-2
+"""Part of the output's standard deviation that the error must have to be worth an explanation."""
+SHARE, SURE = 0.2, 1e-6
+"""Part of the error that an input of the same sample must explain, and how improbable that is by chance."""
+
+
+def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
+    """What the records say nothing of: a channel that never changes, an input that is made of others.
+
+    Args:
+        traces: The records that are fitted; masked samples say nothing.
+        mapping: Which channels go in, which come out.
+
+    Returns:
+        One sentence for each such channel.
+    """
+    usable = [trace.usable_samples for trace in traces]
+    if not any(seen.any() for seen in usable):
+        return ()
+    inputs = np.concatenate([t.columns(mapping.inputs)[seen] for t, seen in zip(traces, usable, strict=True)])
+    outputs = np.concatenate([t.columns(mapping.outputs)[seen] for t, seen in zip(traces, usable, strict=True)])
+    told = [
+        f"{name} never changes in these records: they say nothing of a response to any input."
+        for name, column in zip(mapping.outputs, outputs.T, strict=True)
+        if _still(column)
+    ]
+    kept = informative(inputs)
+    for j, name in enumerate(mapping.inputs):
+        if _still(inputs[:, j]):
+            told.append(f"{name} never changes in these records: they say nothing of its effect.")
+        elif j not in kept:
+            names = ", ".join(mapping.inputs[i] for i in kept if i < j)
+            told.append(f"{name} is made of {names} in these records: they do not tell their effects apart.")
+    return tuple(told)
+
+
+def informative(inputs: NDArray[np.float64]) -> tuple[int, ...]:
+    """The inputs whose effects records tell: those that move, and are not made of ones before them.
+
+    Args:
+        inputs: All that count, shape ``(n_samples, n_inputs)``.
+
+    Returns:
+        Their places, in order.
+    """
+    kept: list[int] = []
+    for j, column in enumerate(inputs.T):
+        if not _still(column) and not (kept and _made_of(column, inputs[:, kept])):
+            kept.append(j)
+    return tuple(kept)
+
+
+def acts_at_once(model: AbstractModel, traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
+    """Whether an input acts within its sample where the model lets it act only later.
+
+    The error of the free run is explained by its own past and past inputs, and then by the inputs of the same sample as
+    well: an F test says whether they explain more than chance would.
+
+    Args:
+        model: The fitted model.
+        traces: The records that it was fitted to; the longest is looked at.
+        start: What stands before it.
+
+    Returns:
+        One sentence for each such input, none where the model has the path, or the error is small.
+    """
+    if not traces or not model.mapping.inputs:
+        return ()
+    trace = max(traces, key=len)
+    inputs, output, usable = trace.columns(model.mapping.inputs), model.measured(trace), trace.usable_samples
+    begun = beginning(model, inputs, output, start, usable)
+    window = slice(begun.first, begun.first + MOST_SAMPLES)
+    inputs, output, usable = inputs[window], output[window].reshape(len(output[window]), -1), usable[window]
+    if usable.sum() < LEAST_SAMPLES + LAGS * (1 + inputs.shape[1]):
+        return ()
+    error = output - model.simulate(inputs, begun.history).reshape(output.shape)
+    if not np.isfinite(error).all():
+        return ()
+    told = []
+    for j in informative(inputs[usable]):
+        name = model.mapping.inputs[j]
+        for i, target in enumerate(model.mapping.outputs):
+            wanted = np.std(error[usable, i]) > LEAST_ERROR * np.std(output[usable, i])
+            if not wanted or _has_path(model, inputs, begun.history, j, i):
+                continue
+            share = _share(error[:, i], inputs, j, usable)
+            if share > 0.0:
+                told.append(
+                    f"{100 * share:.0f} % of what is left of {target} moves with {name} of the same sample: either "
+                    f"{name} acts at once, which this model leaves out (give it the lag 0: nk: 0, delays: 0, "
+                    f"input_delays from 0, feedthrough: true), or {name} is fed back from {target}."
+                )
+    return tuple(told)
+
+
+def _still(column: NDArray[np.float64]) -> bool:
+    return bool(np.ptp(column) <= STILL * np.abs(column).max(initial=0.0))
+
+
+def _made_of(column: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    basis = _unit(np.column_stack([others, np.ones(len(column))]))
+    left = column - basis @ np.linalg.lstsq(basis, column, rcond=None)[0]
+    return bool(np.linalg.norm(left) <= SAME * np.linalg.norm(column - column.mean()))
+
+
+def _unit(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    tiny = float(np.finfo(np.float64).tiny)
+    lengths = np.maximum(np.sqrt(np.sum(columns**2, axis=0)), tiny)
+    return np.asarray(columns / lengths, dtype=np.float64)
+
+
+def _has_path(model: AbstractModel, inputs: NDArray[np.float64], history: History, j: int, i: int) -> bool:
+    """Whether an output of the model moves with an input of the same sample."""
+    few = inputs[: LAGS + 1]
+    moved = few.copy()
+    moved[-1, j] += np.std(inputs[:, j]) or 1.0
+    before, after = (model.simulate(u, history).reshape(len(u), -1)[-1, i] for u in (few, moved))
+    return bool(before != after)
+
+
+def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usable: NDArray[np.bool_]) -> float:
+    """The part of the error's innovation that an input of the same sample explains; 0 where chance may do it."""
+    past = [np.roll(column, lag) for column in (error, *inputs.T) for lag in range(1, LAGS + 1)]
+    whole = np.logical_and.reduce([np.roll(usable, lag) for lag in range(LAGS + 1)])
+    whole[:LAGS] = False
+    base = np.column_stack([*past, np.ones(len(error))])[whole]
+    basis, _ = np.linalg.qr(_unit(base))
+    left, new = (x[whole] - basis @ (basis.T @ x[whole]) for x in (error, inputs[:, j]))
+    free = len(left) - base.shape[1] - 1
+    if free < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(inputs[whole, j]):
+        return 0.0
+    both = float(left @ left) * float(new @ new)
+    share = float(left @ new) ** 2 / max(both, float(np.finfo(np.float64).tiny))
+    by_chance = stats.f.sf(share * free / max(1.0 - share, np.finfo(np.float64).eps), 1, free)
+    return share if share > SHARE and by_chance < SURE else 0.0

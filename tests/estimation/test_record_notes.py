@@ -1,0 +1,89 @@
+"""What records leave open, and what a fit leaves out of them, is told for every kind of structure."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import sysid
+from sysid.errors import UserError
+
+N = 400
+STRUCTURES = [
+    sysid.ARX(na=1, nb=1, nk=1),
+    sysid.TransferFunction(poles=(1,), zeros=(0,), delays=(1,)),
+    sysid.LinearStateSpace(states=1),
+    sysid.OE(nb=1, nf=1, nk=1),
+    sysid.NARX(input_delays=1, output_delays=1, neurons=1),
+]
+"""One of each kind that can leave the lag 0 out."""
+BUDGET = {"NARX": sysid.Training(max_iterations=5, starts=1), "NSS": sysid.Training(max_iterations=5, starts=1)}
+
+
+def _u(seed: int = 0) -> np.ndarray:
+    return np.repeat(np.random.default_rng(seed).uniform(-1, 1, N // 4), 4)
+
+
+def _y(u: np.ndarray, dead: int) -> np.ndarray:
+    """``y(k) = 0.9 y(k-1) + 0.1 u(k - dead)``."""
+    late = np.r_[np.zeros(dead), u][:N]
+    return np.convolve(late, 0.1 * 0.9 ** np.arange(N))[:N]
+
+
+def _fit(u: np.ndarray, y: np.ndarray, structure: object) -> sysid.FitResult:
+    mapping = "u -> y" if u.ndim == 1 else "+".join(f"u{j + 1}" for j in range(u.shape[1])) + " -> y"
+    traces = sysid.data((u, y), sample_time=1.0, split=(0.6, 0.4))
+    training = BUDGET.get(structure.kind) if hasattr(structure, "kind") else None
+    return sysid.fit(traces, mapping, structure, **({} if training is None else {"training": training}))
+
+
+@pytest.mark.parametrize("structure", STRUCTURES, ids=lambda s: s.kind)
+def test_an_input_that_acts_at_once_is_told_where_the_model_leaves_it_out(structure: object) -> None:
+    u = _u()
+    told = [note for note in _fit(u, _y(u, dead=0), structure).warnings if "of the same sample" in note]
+    assert len(told) == 1
+    assert "u acts at once" in told[0]
+
+
+@pytest.mark.parametrize("structure", STRUCTURES, ids=lambda s: s.kind)
+def test_nothing_is_told_where_the_input_acts_later(structure: object) -> None:
+    u = _u()
+    y = _y(u, dead=1) + 0.02 * np.random.default_rng(1).standard_normal(N)
+    assert not [note for note in _fit(u, y, structure).warnings if "of the same sample" in note]
+
+
+def test_nothing_is_told_where_the_model_has_the_path() -> None:
+    u = _u()
+    y = _y(u, dead=0) + 0.1 * u**3  # an error that moves with u of the same sample
+    fit = _fit(u, y, sysid.ARX(na=1, nb=1, nk=0))
+    assert not [note for note in fit.warnings if "of the same sample" in note]
+
+
+@pytest.mark.parametrize("structure", [*STRUCTURES, sysid.NeuralStateSpace(states=1, neurons=1)], ids=lambda s: s.kind)
+def test_channels_that_say_nothing_are_named(structure: sysid.ARX) -> None:
+    u = _u()
+    inputs = np.column_stack([u, 2.0 * u + 1.0, np.full(N, 3.0)])
+    wide = {
+        "ARX": sysid.ARX(na=1, nb=(1, 1, 1), nk=(1, 1, 1)),
+        "TransferFunction": sysid.TransferFunction(poles=(1,) * 3, zeros=(0,) * 3, delays=(1,) * 3),
+        "OE": sysid.OE(nb=(1, 1, 1), nf=(1, 1, 1), nk=(1, 1, 1)),
+    }.get(structure.kind, structure)
+    told = _fit(inputs, _y(u, dead=1), wide).warnings
+    assert "u2 is made of u1 in these records: they do not tell their effects apart." in told
+    assert "u3 never changes in these records: they say nothing of its effect." in told
+    assert not [note for note in told if note.startswith("u1 ")]
+
+
+@pytest.mark.parametrize("level", [0.0, 3.0])
+@pytest.mark.parametrize("structure", [*STRUCTURES, sysid.NeuralStateSpace(states=1, neurons=1)], ids=lambda s: s.kind)
+def test_a_constant_output_is_told_and_no_number_overflows(structure: object, level: float) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        try:
+            fit = _fit(_u(), np.full(N, level), structure)
+        except UserError as refused:  # also an answer, in words
+            assert "y" in str(refused)
+            return
+    assert "y never changes in these records: they say nothing of a response to any input." in fit.warnings
