@@ -5,15 +5,18 @@ Nothing here is compiled, cached or clever; each function is the formula written
 
 from __future__ import annotations
 
+import cmath
 import tempfile
 from collections.abc import Callable
+from collections.abc import Mapping as Dict
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.equations.syntax import Call, Delayed, Name, Node, Number, Operation
 from sysid.kernels.neurons import NEURONS
-from sysid.models import Cascade, Ends, History, Limit, Member, NeuralForm, Recursion
+from sysid.models import Cascade, Ends, GreyBoxModel, History, Limit, Member, NeuralForm, Recursion
 
 
 def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float64]) -> float:
@@ -193,3 +196,169 @@ def first_order_record() -> Path:
     rows = np.column_stack([0.5 * np.arange(200), u, y])
     np.savetxt(file, rows, delimiter=",", header="t [s],u [V],y [V]", comments="", fmt="%.17g")
     return file
+
+
+class EquationTwin:
+    """Equations walked through as a tree, in plain Python: of real numbers, or of complex ones for derivatives.
+
+    It has one network at most, and one of each function that remembers.
+
+    Args:
+        model: A grey box, for its equations and terms; parameters are given.
+        theta: Parameters and weights, as the model's; complex for a derivative by the complex step.
+    """
+
+    def __init__(self, model: GreyBoxModel, theta: NDArray[np.complex128]) -> None:
+        self.model, self.theta = model, theta
+        self.system = model.grey.system
+        free = model.grey.free
+        self.values = {one.name: one.start for one in model.grey.fixed} | {"pi": np.pi}
+        self.values |= {one.name: theta[i] for i, one in enumerate(free)}
+        self.weights = theta[len(free) :]
+
+    def run(self, inputs: NDArray[np.float64], begin: Dict[str, complex]) -> NDArray[np.complex128]:
+        """The free run.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``; before the first they stand.
+            begin: Every state before the first sample, by name.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``.
+        """
+        system, model = self.system, self.model
+        right = {one.name: one.right for one in system.equations}
+        self.inputs = inputs
+        self.past: list[dict[str, complex]] = []
+        self.begin = dict(begin)
+        states = {name: begin[name] for name in system.states}
+        self.memory = {name: begin[name] for name in model.lowered.states if name.split()[0] in _REMEMBERING}
+        found, steps = [], model.substeps
+        h = model.sample_time / steps
+        for _ in inputs:
+            now = self._all(states)
+            found.append([now[name] for name in model.mapping.outputs])
+            later = {name: self._of(right[name], now) for name in system.discrete}
+            remembered = dict(self.remembered)
+            moving = dict(states)
+            for _ in range(steps):
+                k: list[dict[str, complex]] = []
+                for ahead in (0.0, h / 2.0, h / 2.0, h):
+                    at = moving | {n: moving[n] + ahead * k[-1][n] for n in system.continuous if k}
+                    here = self._all(at)
+                    k.append({n: self._of(right[n], here) for n in system.continuous})
+                for n in system.continuous:
+                    moving[n] += h / 6.0 * (k[0][n] + 2.0 * k[1][n] + 2.0 * k[2][n] + k[3][n])
+            self.past.append(now)
+            states, self.memory = moving | later, remembered
+        return np.array(found)
+
+    def _all(self, states: Dict[str, complex]) -> dict[str, complex]:
+        """Everything that has a name, at some states."""
+        self.remembered: dict[str, complex] = {}
+        inputs = self.inputs[len(self.past)]
+        now = {**self.values, **states, **dict(zip(self.model.mapping.inputs, inputs, strict=True))}
+        for name in self.system.order:
+            now[name] = self._of(self.system.definitions[name].right, now)
+        for one in self.system.equations:
+            self._of(one.right, now)  # so that all that remembers has been asked
+        return now
+
+    def _of(self, node: Node, now: Dict[str, complex]) -> complex:
+        if isinstance(node, Number):
+            return node.value
+        if isinstance(node, Name):
+            return now[node.name]
+        if isinstance(node, Delayed):
+            lag = node.lag / self.model.sample_time if node.seconds else node.lag
+            whole = int(lag + 1e-9)
+            rest = max(lag - whole, 0.0)
+            newer, older = self._ago(node.name, whole, now), self._ago(node.name, whole + (rest > 1e-9), now)
+            return newer + rest * (older - newer)
+        if isinstance(node, Operation):
+            return _operated(node.operator, [self._of(one, now) for one in node.operands])
+        assert isinstance(node, Call)
+        return self._called(node, now)
+
+    def _ago(self, name: str, lag: int, now: Dict[str, complex]) -> complex:
+        t = len(self.past)
+        if lag == 0:
+            return now[name]
+        if lag <= t:
+            return self.past[t - lag][name]
+        if name in self.model.mapping.inputs:
+            return complex(self.inputs[0][self.model.mapping.inputs.index(name)])
+        return self.begin[f"{name}[k-{lag - t}]"]
+
+    def _called(self, node: Call, now: Dict[str, complex]) -> complex:
+        a = [self._of(one, now) for one in node.parts]
+        name = node.function
+        if name in self.model.grey.points:
+            x, y = np.array(self.model.grey.points[name]).T
+            place = int(np.clip(np.searchsorted(x, a[0].real, side="right") - 1, 0, len(x) - 2))
+            slope = (y[place + 1] - y[place]) / (x[place + 1] - x[place])
+            inside = x[0] < a[0].real < x[-1]
+            return complex(y[place] + slope * (a[0] - x[place]) if inside else np.interp(a[0].real, x, y))
+        if name == "net":
+            return self._net(a[: len(node.arguments)])
+        before = self.memory.get(f"{name} 1", 0.0)
+        if name == "relay":
+            self.remembered["relay 1"] = 1.0 if a[0].real > a[1].real else before if a[0].real >= a[2].real else 0.0
+        elif name == "latch":
+            self.remembered["latch 1"] = 1.0 if a[0].real > 0 else 0.0 if a[1].real > 0 else before
+        elif name == "hold":
+            self.remembered["hold 1"] = a[0] if a[1].real > 0 else before
+        else:
+            return _FUNCTIONS[name](*a)
+        return self.remembered[f"{name} 1"]
+
+    def _net(self, a: list[complex]) -> complex:
+        (net,) = self.model.lowered.nets
+        norms, n = self.model.norms, len(a)
+        z = np.array([(value - norms[2 * i]) * norms[2 * i + 1] for i, value in enumerate(a)])
+        hidden = self.weights[net.hidden].reshape(net.neurons, n + 1)
+        linear = self.weights[net.linear]
+        total = self.weights[net.readout] @ np.tanh(hidden[:, :n] @ z + hidden[:, n]) + linear[:n] @ z + linear[n]
+        return complex(norms[2 * n] * total)
+
+
+_REMEMBERING = ("relay", "latch", "hold")
+
+
+def _by_real(choose: Callable[..., complex]) -> Callable[..., complex]:
+    return lambda *a: choose(a, key=lambda value: complex(value).real)
+
+
+def _clamped(x: complex, low: complex, high: complex) -> complex:
+    return min(max(x, low, key=_real), high, key=_real)
+
+
+def _real(value: complex) -> float:
+    return complex(value).real
+
+
+_FUNCTIONS: dict[str, Callable[..., complex]] = {
+    "abs": lambda x: x if x.real >= 0 else -x,
+    "sqrt": lambda x: cmath.sqrt(x) if x.real > 0 else 0.0,
+    "sign": lambda x: float(np.sign(x.real)),
+    "log10": lambda x: cmath.log(x) / np.log(10.0),
+    "min": _by_real(min),
+    "max": _by_real(max),
+    "clamp": _clamped,
+    "saturate": _clamped,
+    "deadzone": lambda x, low, high: x - _clamped(x, low, high),
+    "where": lambda c, yes, no: yes if c.real > 0 else no,
+    **{name: getattr(cmath, name) for name in ("exp", "log", "tanh", "sinh", "cosh", "sin", "cos", "tan", "atan")},
+}
+
+
+def _operated(sign: str, a: list[complex]) -> complex:
+    if len(a) == 1:
+        return -a[0] if sign == "-" else 1.0 - a[0]
+    x, y = a
+    compared = {"<": x.real < y.real, "<=": x.real <= y.real, ">": x.real > y.real, ">=": x.real >= y.real}
+    if sign in compared:
+        return float(compared[sign])
+    if sign in {"and", "or"}:
+        return (min if sign == "and" else max)(x, y, key=_real)
+    return {"+": lambda: x + y, "-": lambda: x - y, "*": lambda: x * y, "/": lambda: x / y, "^": lambda: x**y}[sign]()

@@ -142,7 +142,7 @@ def _power(g: Values, a: int, b: int) -> int:
     square = g.apply(machine.MUL, a, a)
     if power == MOST_FACTORS:
         return g.apply(machine.MUL, square, square)
-    return square if power == 2.0 else g.apply(machine.MUL, square, a)  # noqa: PLR2004 - the square
+    return square if power == 2.0 else g.apply(machine.MUL, square, a)
 
 
 def operator(g: Values, sign: str, a: int, b: int) -> int:

@@ -42,13 +42,13 @@ class Program:
         sizes: Numbers of parameters, states and inputs.
     """
 
-    code: NDArray[np.int64]
-    results: NDArray[np.int64]
+    code: NDArray[np.uint64]
+    results: NDArray[np.uint64]
     constants: NDArray[np.float64]
     sizes: tuple[int, int, int]
 
     @property
-    def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    def arrays(self) -> tuple[NDArray[np.uint64], NDArray[np.uint64], NDArray[np.float64]]:
         """As the machine takes it."""
         return self.code, self.results, self.constants
 
@@ -168,12 +168,12 @@ class Graph:
         sizes = (n_theta, counts[CONTINUOUS_STATE] + counts[DISCRETE_STATE], counts[INPUT])
         code: list[list[int]] = []
         for node in needed:
-            kind, *rest = self.nodes[node]
-            if kind in firsts:
-                place[node] = firsts[str(kind)] + int(rest[0])  # type: ignore[call-overload]  # a leaf's place
-            elif kind != CONSTANT:
+            key, *rest = self.nodes[node]
+            if key in firsts:
+                place[node] = firsts[str(key)] + int(rest[0])  # type: ignore[call-overload]  # a leaf's place
+            elif key != CONSTANT:
                 reads = [0 if one is None else place[one] for one in rest[:3]]  # type: ignore[index]  # values
-                code.append([int(kind), *reads, int(rest[3])])  # type: ignore[call-overload]
+                code.append([int(key), *reads, int(rest[3])])  # type: ignore[call-overload]
                 place[node], at = at, at + 1
         return Program(
             code=np.array(code, dtype=np.uint64).reshape(-1, 5),

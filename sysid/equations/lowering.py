@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -376,7 +377,7 @@ class _Lowering:
             if self.chains[name]:
                 self.updates[self.chains[name][0]] = value
         for chain in self.chains.values():
-            for newer, older in zip(chain, chain[1:], strict=False):
+            for newer, older in pairwise(chain):
                 self.updates[older] = newer
 
     # Expressions
@@ -476,7 +477,7 @@ class _Lowering:
 
     def _set_or_kept(self, set_: int, kept: int, before: int) -> int:
         still = self.apply(machine.MUL, kept, before)
-        return self.apply(machine.MAX, set_, still)
+        return self.apply(machine.SELECT, set_, self.constant(1.0), still)
 
     def _hold(self, node: Call) -> int:
         x, when = (self.value(one) for one in self._taken(node, ("x", "when")))

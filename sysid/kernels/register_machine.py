@@ -35,8 +35,6 @@ from numba import njit
 ADD, SUB, MUL, DIV, NEG, POW, FMA, ABS, MIN, MAX = range(10)
 SQRT, EXP, LOG, TANH, SIN, COS, ATAN, SIGN, GREATER, NOT_LESS, SELECT, TABLE = range(10, 22)
 
-_TINY = 1e-300
-
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _table(x, begin, n, table):
@@ -102,10 +100,10 @@ def evaluate(code, v, first, widths, places, table):
             r = abs(a)
         elif op == MIN:
             b = v[code[i, 2]]
-            r = a if a <= b or a != a else b
+            r = a if a <= b or math.isnan(a) else b
         elif op == MAX:
             b = v[code[i, 2]]
-            r = a if a >= b or a != a else b
+            r = a if a >= b or math.isnan(a) else b
         elif op == SELECT:
             if a >= 1.0:
                 r = v[code[i, 2]]
@@ -113,7 +111,7 @@ def evaluate(code, v, first, widths, places, table):
                 r = v[code[i, 3]]
             else:
                 r = v[code[i, 3]] + a * (v[code[i, 2]] - v[code[i, 3]])
-        elif op == GREATER or op == NOT_LESS:
+        elif op in (GREATER, NOT_LESS):
             w = widths[code[i, 4]]
             if w > 0.0:
                 r = _logistic(a / w)
@@ -123,10 +121,8 @@ def evaluate(code, v, first, widths, places, table):
                 r = 1.0 if a >= 0.0 else 0.0
         elif op == SIGN:
             w = widths[code[i, 4]]
-            if w > 0.0:
-                r = math.tanh(0.5 * a / w)
-            else:
-                r = 1.0 if a > 0.0 else (-1.0 if a < 0.0 else 0.0)
+            hard = 1.0 if a > 0.0 else (-1.0 if a < 0.0 else 0.0)
+            r = math.tanh(0.5 * a / w) if w > 0.0 else hard
         elif op == TABLE:
             r = _table(a, places[code[i, 4], 0], places[code[i, 4], 1], table)[0]
         elif op == POW:
@@ -186,7 +182,7 @@ def _partials(code, v, first, widths, places, table, d):
             else:
                 d[i, 0] = v[code[i, 2]] - v[code[i, 3]]
                 d[i, 1], d[i, 2] = a, 1.0 - a
-        elif op == GREATER or op == NOT_LESS:
+        elif op in (GREATER, NOT_LESS):
             w = widths[code[i, 4]]
             if w > 0.0:
                 d[i, 0] = r * (1.0 - r) / w
@@ -330,7 +326,7 @@ def free_run(programs, theta, x, u, substeps, step, widths, places, table, y, pa
                     for i in range(n_c):
                         vf[af + i] = stage[i]
                     evaluate(rates[0], vf, af + n + m, widths, places, table)
-                    weight = 2.0 if s == 1 or s == 2 else 1.0
+                    weight = 2.0 if s in (1, 2) else 1.0
                     ahead = step if s == 2 else 0.5 * step
                     for i in range(n_c):
                         slope[i] = vf[rates[1][i]]
@@ -420,7 +416,7 @@ def sensitivities(programs, theta, p, x, S, u, substeps, step, widths, places, t
                         vf[af + i] = stage[i]
                     evaluate(rates[0], vf, af + n + m, widths, places, table)
                     _partials(rates[0], vf, af + n + m, widths, places, table, df)
-                    weight = 2.0 if s == 1 or s == 2 else 1.0
+                    weight = 2.0 if s in (1, 2) else 1.0
                     ahead = step if s == 2 else 0.5 * step
                     for i in range(n_c):
                         slope[i] = vf[rates[1][i]]

@@ -8,8 +8,8 @@ from sysid.models.cascade_batch import simulate_family
 from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.ends import Ends
-from sysid.models.form import AbstractForm
 from sysid.models.equation_form import EquationForm
+from sysid.models.form import AbstractForm
 from sysid.models.grey_box import GreyBox, InitialState, Parameter
 from sysid.models.grey_box_model import GreyBoxModel
 from sysid.models.history import History, Start, StartKind
@@ -76,8 +76,8 @@ __all__ = [
     "NeuralForm",
     "NeuralStateSpace",
     "NeuralStateSpaceModel",
-    "PolynomialModel",
     "Parameter",
+    "PolynomialModel",
     "Recursion",
     "Scaling",
     "SeveralOutputs",

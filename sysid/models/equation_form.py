@@ -171,7 +171,7 @@ class EquationForm(AbstractForm):
         """
         inputs = np.asarray(inputs, dtype=np.float64)
         needed = max((channel + 1 for channel, _ in self.lowered.lagged), default=0)
-        if inputs.ndim != 2 or inputs.shape[1] < needed:  # noqa: PLR2004 - samples and inputs
+        if inputs.ndim != 2 or inputs.shape[1] < needed:
             raise TraceError(
                 "the inputs do not fit the model",
                 expected=f"inputs and history of shape (n, {needed})",

@@ -8,6 +8,7 @@ from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 from sysid.equations import Lowered, System, Terms, lower
@@ -155,10 +156,11 @@ class GreyBox(AbstractStructure):
     kind = "GreyBox"
 
     def __post_init__(self) -> None:
-        text = self.equations
-        if isinstance(text, Sequence) and not isinstance(text, str) and all(isinstance(one, str) for one in text):
-            object.__setattr__(self, "equations", "\n".join(text))
-        if not isinstance(self.equations, str):
+        text: Any = self.equations
+        if isinstance(text, list | tuple) and all(isinstance(one, str) for one in text):
+            text = "\n".join(text)
+            object.__setattr__(self, "equations", text)
+        if not isinstance(text, str):
             raise ConfigError(
                 "the equations are no text", where="equations", expected="text, one equation a line",
                 got=shortened(text), remedy="write equations: | and the equations below it, indented",
@@ -212,7 +214,7 @@ class GreyBox(AbstractStructure):
     @property
     def points(self) -> dict[str, tuple[tuple[float, float], ...]]:
         """By table its points."""
-        return dict(self.tables)  # type: ignore[arg-type]  # brought into this form when it was made
+        return dict(self.tables)
 
     @property
     def system(self) -> System:
@@ -317,10 +319,10 @@ def _tables(given: Any) -> tuple[Table, ...]:
             [point for point in points if isinstance(point, list | tuple) and len(point) == 2]
             if isinstance(points, list | tuple)
             else []
-        )  # noqa: E501, PLR2004 - x and y
+        )
         numbers = [tuple(_real(value) for value in row) for row in rows]
-        rising = all(a[0] < b[0] for a, b in zip(numbers, numbers[1:], strict=False))
-        if len(numbers) < 2 or len(numbers) != len(points) or not rising or not all(map(_finite, numbers)):  # noqa: PLR2004
+        rising = all(a[0] < b[0] for a, b in pairwise(numbers))
+        if len(numbers) < 2 or len(numbers) != len(points) or not rising or not all(map(_finite, numbers)):
             raise ConfigError(
                 f"{name} is no table", where="tables", expected="points [[x, y], ...], at least two, x rising",
                 got=shortened(points), remedy="write for example valve: [[0, 0], [1, 0.4], [2, 1]]",

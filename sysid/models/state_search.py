@@ -198,6 +198,6 @@ class StateSearch:
                     break
             else:
                 damping *= 10.0
-                if damping > 1e12:  # noqa: PLR2004 - no step is left
+                if damping > 1e12:
                     break
         return xi

@@ -46,6 +46,11 @@ SS = {"kind": "SS", "states": 1}
 OE = {"kind": "OE", "nb": [1, 1], "nf": [1, 1], "nk": [1, 1]}
 BJ = {"kind": "BJ", "nb": [1, 1], "nc": 1, "nd": 1, "nf": [1, 1], "nk": [1, 1]}
 ARMAX = {"kind": "ARMAX", "na": 1, "nb": [1, 1], "nc": 1, "nk": [1, 1]}
+GREY = {
+    "kind": "GreyBox",
+    "equations": "doutlet/dt = (gain*(valve + inlet) - outlet + level)/lag",
+    "parameters": {"gain": {"start": 1, "low": 0}, "level": 80, "lag": {"start": 2, "low": 0.1}},
+}
 TF = {"kind": "TransferFunction", "poles": [1, 1], "zeros": [0, 0], "delays": [1, 1]}
 
 EVERYWHERE = ("python", "fits", "sweep", "member")
@@ -70,6 +75,7 @@ FITS = [
         EVERYWHERE, id="NARX gated, an ensemble",
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
+    pytest.param(GREY, {"seed": 7, "max_iterations": 12, "starts": 2}, ALONE, id="GreyBox"),
     pytest.param(VECTOR_SS, None, ALONE, id="VectorSS, of one"),
     pytest.param(VECTOR_NSS, {"seed": 7, "max_iterations": 4, "starts": 1}, ALONE, id="VectorNSS, of one"),
     pytest.param(VECTOR, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="NARX of several outputs, of one"),
@@ -231,6 +237,13 @@ WRONG = {
         EVERYWHERE,
     ),
     "an open loop of hidden states": (NSS, {"loop": "open"}, "a neural state space has no open loop", EVERYWHERE),
+    "an open loop of equations": (GREY, {"loop": "open"}, "a grey box has no open loop", ALONE),
+    "a parameter that is not there": (
+        GREY | {"parameters": {"gain": 1, "level": 80}},
+        None,
+        "nothing says what lag is",
+        ALONE[:2],
+    ),
     "an unknown choice": (NARX, {"choose_by": "dice"}, "unknown value of choose_by", EVERYWHERE),
     "no iterations": (NARX, {"max_iterations": 0}, "max_iterations is too small", EVERYWHERE),
     "negative starts": (TF, {"scattered_starts": -1}, "scattered_starts is negative", EVERYWHERE),

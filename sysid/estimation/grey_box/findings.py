@@ -87,8 +87,9 @@ class Findings:
         named = free[free < n]
         inner = (half @ half.T)[: len(named), : len(named)]
         left = np.diag(inner) * prior.precision[named]
-        inner[left > OPEN, :] = np.nan
-        inner[:, left > OPEN] = np.nan
+        lost = (left > OPEN) & np.array([parameters[i].prior is None for i in named], dtype=np.bool_)
+        inner[lost, :] = np.nan
+        inner[:, lost] = np.nan
         covariance[np.ix_(named, named)] = inner
         return cls(
             parameters=parameters,
@@ -130,9 +131,9 @@ class Findings:
             correlation = self.covariance / np.outer(deviations, deviations)
         for i, one in enumerate(self.parameters):
             for j in range(i):
-                if abs(correlation[i, j]) > TOGETHER:
-                    told.append(
-                        f"The parameters {self.parameters[j].name} and {one.name} can hardly be told apart (correlation "
-                        f"{correlation[i, j]:.4f}). Fix one of them, or give it a prior."
-                    )
+                pair, found = f"{self.parameters[j].name} and {one.name}", correlation[i, j]
+                told += [
+                    f"The parameters {pair} can hardly be told apart (correlation {found:.4f}). Fix one of them, or "
+                    "give it a prior."
+                ] * bool(abs(found) > TOGETHER)
         return tuple(told)

@@ -59,7 +59,7 @@ FIRST_SUBSTEPS = 8
 """Runge-Kutta steps before it is known how many are needed."""
 
 SAME = 1e-4
-"""By how much the loss of exact switches may exceed that of soft ones and be the same."""
+"""By how much the loss of exact switches may differ from that of soft ones and be the same."""
 
 STEP_ROUNDS = 2
 """Times that a fit goes on with shorter steps because its parameters turned out to need them."""
@@ -326,15 +326,15 @@ def _sharpened(
     exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
     best, tried = (exact.loss(solution.theta), provider, solution), list[float]()
     now, at = provider, solution
-    while len(tried) < ROUNDS and not best[0] <= best[2].at.loss * (1.0 + SAME):
+    while len(tried) < ROUNDS and not abs(best[0] - best[2].at.loss) <= SAME * best[2].at.loss:
         tried.append(best[0])
         now = now.with_form(replace(now.form, widths=SHARPER * now.form.widths))
         at = _gone_on(now, at, training)
         loss = exact.loss(at.theta)
         if loss < best[0]:
             best = (loss, now, at)
-    ratio = best[0] / max(best[2].at.loss, 1e-300)
-    return best[1], best[2], float(ratio)
+    soft = best[2].at.loss
+    return best[1], best[2], best[0] / soft if soft > 1e-200 else 1.0
 
 
 def _gone_on(provider: EquationProvider, solution: Solution, training: Training) -> Solution:

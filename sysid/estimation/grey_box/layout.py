@@ -23,8 +23,8 @@ READOUT_SPREAD = 1e-3
 """Standard deviation of the readouts where a fit starts: the equations are then as they were written."""
 
 APART = 0.7
-"""Standard deviation of the starts after the first: of the logarithm of a parameter that has a sign, and of one that has
-none over its scale."""
+"""Standard deviation of the starts after the first: of the logarithm of a parameter that has a sign, of one that
+has none over its scale."""
 
 TRIES = 20
 """Draws after which a start whose free run explodes is taken as it is."""
@@ -77,10 +77,10 @@ class EquationLayout(AbstractLayout):
                 entries.append((one.name, np.array([i]), True, float(scale[i] / one.prior) ** 2))
         for number, net in enumerate(self.nets, start=1):
             hidden = w + np.arange(net.hidden.start, net.hidden.stop).reshape(net.neurons, -1)
-            for j in range(net.arguments + 1):
-                entries.append((f"net {number} hidden {j}", hidden[:, j], False, alpha))
-            for name, part in (("readout", net.readout), ("linear", net.linear)):
-                entries.append((f"net {number} {name}", w + np.arange(part.start, part.stop), False, alpha))
+            parts = {f"hidden {j}": hidden[:, j] for j in range(net.arguments + 1)}
+            parts |= {"readout": w + np.arange(net.readout.start, net.readout.stop)}
+            parts |= {"linear": w + np.arange(net.linear.start, net.linear.stop)}
+            entries += [(f"net {number} {name}", members, False, alpha) for name, members in parts.items()]
         entries.append(("records", np.arange(p, len(centre)), True, FLAT_ALPHA))
         entries = [entry for entry in entries if len(entry[1])]
         del beta

@@ -30,7 +30,7 @@ SOFT = 0.02
 SOFT_ROOT = 1e-3
 """Width of a root in training, over the largest magnitude of its argument."""
 
-SHARPER, ROUNDS = 0.25, 3
+SHARPER, ROUNDS = 0.25, 6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

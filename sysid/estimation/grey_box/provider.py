@@ -198,7 +198,7 @@ class EquationProvider(AbstractProvider):
     def _linearised(self, theta: Array) -> Linearisation:
         gradient, matrix = np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
         loss = correlated = samples = 0.0
-        for number, record in enumerate(self.records):
+        for number in range(len(self.records)):
             errors = []
             for error, J, places in self._blocks(theta, number):
                 flat = J.reshape(-1, J.shape[2])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult, Loop, Status
+from sysid.estimation import FitResult, Loop, Status, Training
 from sysid.estimation.estimators import estimator_of, with_stability
 from sysid.estimation.networks.choosing import VETTED
 from sysid.reporting.sweep_record import Trial
@@ -119,13 +119,16 @@ class Checks:
     def _whole(self, trial: Trial, fits: Sequence[FitResult], number: int) -> FitResult:
         """The fit with its posterior, which is too large to be kept of every trial: made from where training ended."""
         job, outcome, fit = self.driver.last[trial.number], self._outcome(trial), fits[number]
-        if any(one["checkpoint"] is None for one in stored_models(outcome)):
+        row = estimator_of(fit.model.structure)
+        if row.training is not Training:
             estimation, start = self.bench.traces.with_role(Role.ESTIMATION), self.bench.start
-            return estimator_of(fit.model.structure).with_posterior(fit, estimation, start, self.bench.selection)
-        training = {**job.training, "starts": 1, "ensemble": 1, "input_subsets": ()}
-        again, _ = train(self.bench, replace(job, after=job.key, resume=True, training=training), outcome)[number]
-        if not np.array_equal(again.model.recursion.numbers, fit.model.recursion.numbers):
-            # An ensemble is no single start's: all of the trial is done again.
+            return row.with_posterior(fit, estimation, start, self.bench.selection)
+        again = None
+        if all(one["checkpoint"] is not None for one in stored_models(outcome)):
+            training = {**job.training, "starts": 1, "ensemble": 1, "input_subsets": ()}
+            again, _ = train(self.bench, replace(job, after=job.key, resume=True, training=training), outcome)[number]
+        if again is None or not np.array_equal(again.model.recursion.numbers, fit.model.recursion.numbers):
+            # Hidden states have no checkpoint, and an ensemble is no single start's: all of the trial is done again.
             before = None if job.after is None else self.driver.store.read(job.after)
             again, _ = train(self.bench, job, before)[number]
         return replace(fit, posterior=again.posterior)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from sysid.estimation.least_squares.evidence import Group, Prior, update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
@@ -170,3 +170,40 @@ def test_sensitivities_near_the_largest_number_end_in_no_step_and_no_warning():
     )
     solution = LevenbergMarquardt(evidence_after=None).minimise(exploding, np.array([1.0, 1e-3]), flat_prior(2))
     assert_allclose(solution.theta, [1.0, 1e-3])
+
+
+class _Line(AbstractProvider):
+    """Residuals ``A theta - b`` within bounds."""
+
+    def __init__(self, A: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+        self.A, self.b, self.sides, self.n_samples = A, b, (low, high), len(b)
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.sides
+
+    def loss(self, theta: np.ndarray) -> float:
+        return 0.5 * float(np.sum((self.A @ theta - self.b) ** 2))
+
+    def linearise(self, theta: np.ndarray) -> Linearisation:
+        error = self.A @ theta - self.b
+        return Linearisation(loss=self.loss(theta), gradient=self.A.T @ error, gauss_newton=self.A.T @ self.A)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_bounds_give_the_least_squares_within_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    A, b = rng.standard_normal((30, 5)), 3.0 * rng.standard_normal(30)
+    low, high = np.full(5, -0.2), rng.uniform(0.0, 0.4, 5)
+    line = _Line(A, b, low, high)
+    found = LevenbergMarquardt(evidence_after=None).minimise(line, np.zeros(5), flat_prior(5, 1e-12))
+    assert found.theta == pytest.approx(lsq_linear(A, b, (low, high), tol=1e-14).x, abs=1e-6)
+
+
+def test_a_precision_that_is_known_is_not_the_evidences_to_find() -> None:
+    groups = tuple(Group(name=f"{i}", members=np.array([i]), known=i == 0) for i in range(2))
+    prior = Prior(centre=np.zeros(2), groups=groups, alphas=np.array([0.3, 0.3]), beta=1.0)
+    at = Linearisation(loss=1.0, gradient=np.zeros(2), gauss_newton=np.eye(2))
+    found, _ = update(prior, np.ones(2), at, 50)
+    assert found.alphas[0] == 0.3
+    assert found.alphas[1] != 0.3

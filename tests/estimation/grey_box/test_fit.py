@@ -1,0 +1,173 @@
+"""Grey boxes of records whose parameters are known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sysid
+from sysid.errors import ConfigError, TraceError
+from sysid.estimation.grey_box.fit import fit_grey_box
+from sysid.estimation.result import FitResult, Status
+from sysid.models import GreyBox, GreyBoxModel, Mapping, Start, StartKind
+from sysid.traces import Channel, Trace
+from sysid.validation import predict_interval
+
+MAPPING = Mapping.parse("u -> y")
+ESTIMATED = Start(kind=StartKind.ESTIMATED)
+
+
+def a_trace(u: np.ndarray, y: np.ndarray, *, sample_time: float = 0.5, name: str = "record") -> Trace:
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+    return Trace(name=name, sample_time=sample_time, channels=channels, values=np.column_stack([u, y]))
+
+
+def steps(n: int, seed: int = 0, *, low: float = 0.0, high: float = 2.0) -> np.ndarray:
+    return np.repeat(np.random.default_rng(seed).uniform(low, high, n // 15 + 1), 15)[:n]
+
+
+def first_order(gain: float, lag: float, *, n: int = 200, begin: float = 0.0, seed: int = 0) -> Trace:
+    """The exact samples of ``lag dx/dt = gain u - x``, with noise of 0.01."""
+    u, x = steps(n, seed), np.empty(n + 1)
+    x[0], pole = begin, np.exp(-0.5 / lag)
+    for t in range(n):
+        x[t + 1] = pole * x[t] + (1.0 - pole) * gain * u[t]
+    return a_trace(u, x[:n] + 0.01 * np.random.default_rng(seed + 1).standard_normal(n))
+
+
+def fitted(
+    traces: list[Trace],
+    equations: str,
+    training: sysid.Training | None = None,
+    *,
+    start: Start = ESTIMATED,
+    **fields: Any,
+) -> FitResult:
+    return fit_grey_box(
+        traces, MAPPING, GreyBox(equations=equations, **fields), training or sysid.Training(starts=1), start=start
+    )
+
+
+LAG = "dx/dt = (gain*u - x)/lag; y = x"
+
+
+def test_parameters_and_initial_states_of_several_records_are_found() -> None:
+    records = [first_order(3.0, 4.0, begin=begin, seed=seed) for begin, seed in ((5.0, 0), (-2.0, 7))]
+    fit = fitted(records, LAG, parameters={"gain": 1, "lag": {"start": 1, "low": 0.01, "unit": "s"}})
+    model, known = fit.model, fit.uncertainty
+    assert isinstance(model, GreyBoxModel)
+    assert known is not None
+    assert fit.status is Status.CONVERGED
+    assert known.names == ("gain", "lag [s]")
+    assert (np.abs(known.values - [3.0, 4.0]) < 3.0 * known.standard_deviations).all()
+    assert (known.standard_deviations < 0.02).all()
+    assert model.parameters == dict(zip(("gain", "lag"), known.values, strict=True))
+    assert known.noise_variance == pytest.approx(1e-4, rel=0.2)
+
+
+def test_a_record_at_rest_begins_at_equilibrium() -> None:
+    record = first_order(3.0, 4.0, begin=3.0 * steps(200)[0])
+    fit = fitted([record], LAG, parameters={"gain": 1, "lag": 1}, start=Start())
+    assert fit.model.parameters == pytest.approx({"gain": 3.0, "lag": 4.0}, rel=0.01)  # type: ignore[attr-defined]
+    assert fit.model.simulate(np.full((5, 1), 2.0)) == pytest.approx(np.full(5, 6.0), rel=0.01)
+
+
+def test_a_declared_beginning_is_kept() -> None:
+    record = first_order(3.0, 4.0, begin=5.0)
+    fit = fitted(
+        [record], LAG, parameters={"gain": 1, "lag": 1}, initial={"x": {"start": 5.0, "fixed": True}}, start=Start()
+    )
+    assert fit.model.parameters == pytest.approx({"gain": 3.0, "lag": 4.0}, rel=0.01)  # type: ignore[attr-defined]
+    assert fit.model.simulate(np.zeros((1, 1)))[0] == 5.0
+
+
+def test_a_bound_that_binds_is_told_and_has_no_interval() -> None:
+    fit = fitted([first_order(3.0, 4.0)], LAG, parameters={"gain": {"start": 1, "high": 2}, "lag": 1})
+    assert fit.model.parameters["gain"] == 2.0  # type: ignore[attr-defined]
+    assert fit.uncertainty is not None
+    assert np.isnan(fit.uncertainty.standard_deviations[0])
+    assert any("gain stands at its bound, 2" in warning for warning in fit.warnings)
+
+
+def test_parameters_that_the_record_leaves_open_are_told() -> None:
+    fit = fitted([first_order(3.0, 4.0)], "dx/dt = (a*b*u - x)/lag; y = x", parameters={"a": 1, "b": 1, "lag": 1})
+    assert any("a and b can hardly be told apart" in w or "not determine" in w for w in fit.warnings)
+    assert fit.model.parameters["a"] * fit.model.parameters["b"] == pytest.approx(3.0, rel=0.01)  # type: ignore[attr-defined]
+
+
+def test_a_prior_decides_what_the_record_leaves_open() -> None:
+    fit = fitted(
+        [first_order(3.0, 4.0)], "dx/dt = (a*b*u - x)/lag; y = x",
+        parameters={"a": {"start": 2, "prior": 0.001}, "b": 1, "lag": 1},
+    )  # fmt: skip
+    found = fit.model.parameters  # type: ignore[attr-defined]
+    assert (found["a"], found["b"]) == (pytest.approx(2.0, abs=0.01), pytest.approx(1.5, rel=0.02))
+    assert fit.warnings == ()
+
+
+def test_a_network_finds_what_the_equations_leave_out() -> None:
+    u, x = steps(300, low=-1.0, high=1.0), np.zeros(301)
+    for t in range(300):
+        x[t + 1] = 0.8 * x[t] + 0.2 * np.sin(3.0 * u[t])
+    record = a_trace(u, x[:300])
+    fit = fitted([record], "x[k+1] = a*x + net(u; neurons=4); y = x", sysid.Training(starts=2, max_iterations=150),
+                 parameters={"a": 0.5}, initial={"x": {"start": 0.0, "fixed": True}}, start=Start(),)  # fmt: skip
+    assert fit.model.parameters["a"] == pytest.approx(0.8, abs=0.01)  # type: ignore[attr-defined]
+    assert np.abs(fit.model.simulate(u[:, None]) - x[:300]).max() < 0.05
+
+
+def test_a_switch_is_trained_soft_and_exact_in_the_model() -> None:
+    u, x = steps(400, low=-1.0, high=2.0), np.zeros(401)
+    for t in range(400):
+        x[t + 1] = 0.7 * x[t] + (0.6 if u[t] > 0.8 else -0.1)
+    fit = fitted(
+        [a_trace(u, x[:400])], "x[k+1] = a*x + where(u > level, up, down); y = x",
+        parameters={"a": 0.5, "level": 0.5, "up": 1, "down": 0}, initial={"x": {"start": 0.0, "fixed": True}}, start=Start(),
+    )  # fmt: skip
+    assert np.abs(fit.model.simulate(u[:, None]) - x[:400]).max() < 0.02
+    assert any("1 switch were trained" in note for note in fit.notes)
+
+
+def test_the_step_is_chosen_and_told() -> None:
+    fit = fitted([first_order(3.0, 0.2)], LAG, parameters={"gain": 3, "lag": 0.2})
+    assert fit.model.substeps > 4  # type: ignore[attr-defined]
+    assert any("Runge-Kutta steps of" in note for note in fit.notes)
+    asked = fitted([first_order(3.0, 4.0)], LAG, parameters={"gain": 3, "lag": 4}, substeps=2)
+    assert any("2 Runge-Kutta steps of 0.25 s as asked for" in note for note in asked.notes)
+
+
+def test_intervals_of_the_output_hold_the_measurement() -> None:
+    fit = fitted([first_order(3.0, 4.0)], LAG, parameters={"gain": 1, "lag": 1})
+    other = first_order(3.0, 4.0, seed=11)
+    interval = predict_interval(fit, other, start=ESTIMATED)
+    assert interval.coverage(other["y"][-len(interval.output) :]).share > 0.88
+
+
+def test_a_fit_is_stored_and_read_again() -> None:
+    fit = fitted([first_order(3.0, 4.0)], LAG, parameters={"gain": 1, "lag": 1})
+    again = FitResult.from_dict(fit.to_dict())
+    inputs = steps(50)[:, None]
+    assert np.array_equal(again.model.simulate(inputs), fit.model.simulate(inputs))
+
+
+def test_masked_samples_do_not_count() -> None:
+    record = first_order(3.0, 4.0)
+    values = record.values.copy()
+    values[60:90, 1] = 1e6
+    usable = np.ones(200, dtype=bool)
+    usable[60:90] = False
+    masked = Trace(name="m", sample_time=0.5, channels=record.channels, values=values, usable=usable)
+    fit = fitted([masked], LAG, parameters={"gain": 1, "lag": 1})
+    assert fit.model.parameters == pytest.approx({"gain": 3.0, "lag": 4.0}, rel=0.01)  # type: ignore[attr-defined]
+
+
+def test_equations_without_a_run_are_refused() -> None:
+    with pytest.raises(TraceError, match="no free run at their declared start"):
+        fitted([first_order(3.0, 4.0)], "dx/dt = log(-gain) + u; y = x", parameters={"gain": 1.0})
+
+
+def test_options_of_lagged_regressors_are_refused() -> None:
+    with pytest.raises(ConfigError, match="a grey box is not trained with stride"):
+        fitted([first_order(3.0, 4.0)], LAG, sysid.Training(stride=2), parameters={"gain": 1, "lag": 1})

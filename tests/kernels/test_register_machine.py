@@ -1,0 +1,164 @@
+"""The register machine against equations walked through in plain Python, and its derivatives against the complex step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from sysid.models import GreyBox, GreyBoxModel, Mapping, Scaling
+from sysid.models.grey_box import lowered
+from sysid.testing import EquationTwin
+
+PARAMETERS = {"a": 0.7, "b": 0.4, "c": {"start": 1.3, "fixed": True}}
+
+EQUATIONS = {
+    "a rate": "dx/dt = -a*x + b*u + c*v; y = x",
+    "two rates of each other": "dx/dt = z; dz/dt = -a*x - b*z^3 + u - v/c; y = x + 0.1*z",
+    "the next sample": "x[k+1] = a*x + b*u; y = c*x + v",
+    "both": "dx/dt = -a*x + z; z[k+1] = b*z + u*c; y = x*z + v",
+    "roots and powers": "dx/dt = -a*sqrt(x) + b*abs(u) + 0.2; y = x^c + x**2 + x^-1 + v",
+    "functions": "dx/dt = -a*x + sin(u) + cos(v); y = exp(-x) + log(3 + b*x) + tanh(c*x) + atan(x) + tan(0.1*x)",
+    "more functions": "dx/dt = -a*x + u; y = sinh(x) + cosh(b*x) + log10(4 + c*v) + pi",
+    "limits": "dx/dt = -a*x + saturate(b*u, -0.3, 0.4); y = deadzone(x, -0.05, 0.05) + min(x, v, c) + max(x, 0)",
+    "conditions": "dx/dt = where(u > 0.2 and not v > 0.5, -a*x, b - x); y = x + sign(v)*c + (u >= 0.1)",
+    "a relay": "dx/dt = -a*x + b*relay(u, on=0.4, off=-0.4); y = x*c + v",
+    "a latch and a hold": "dx/dt = -a*x + b*latch(u > 0.8, v > 0.8); y = x + hold(v*c, u > 0)",
+    "delayed inputs": "dx/dt = -a*x + b*u(t - 0.5) + c*v(t - 0.2); y = x + u[k-3]",
+    "delayed states": "dx/dt = -a*x + b*u; y = x + c*x(t - 0.25) + v",
+    "an output's own past": "y[k] = a*y[k-1] - 0.2*y[k-2] + b*u[k-1] + c*v",
+    "a delayed expression": "dx/dt = -a*x + b*delay(u*v, 0.3); y = c*x",
+    "definitions in any order": "y = x*flow; flow = a*head + c; head = u - b*x; dx/dt = flow - x + v",
+    "a table": "dx/dt = -a*x + bend(u); y = x + b*bend(2*v) + c",
+    "a network": "dx/dt = -a*x + net(x, u, v; neurons=3); y = b*x + c",
+    "a long sum": "y = " + " + ".join(f"a*u^{1 + i % 3}" for i in range(150)) + " + b*v + c",
+}
+TABLES = {"bend": [[-1, -0.5], [0, 0.1], [0.4, 1.0], [2, 1.2]]}
+
+
+def a_model(name: str, **fields: Any) -> GreyBoxModel:
+    text = EQUATIONS[name]
+    tables = TABLES if "bend" in text else {}
+    grey = GreyBox(equations=text, parameters=PARAMETERS, tables=tables)
+    mapping = Mapping.parse("u+v -> y")
+    low = lowered(grey, mapping.inputs, mapping.outputs, 0.1)
+    rng = np.random.default_rng(3)
+    return GreyBoxModel(
+        grey=grey,
+        theta=np.concatenate([[0.7, 0.4], 0.5 * rng.standard_normal(low.n_weights)]),
+        norms=tuple(np.array(low.norms) + 0.1 * rng.standard_normal(len(low.norms))),
+        levels=(0.0,) * low.n_states,
+        spans=(1.0,) * low.n_states,
+        scaling=Scaling.identity(2),
+        mapping=mapping,
+        sample_time=0.1,
+        input_units=("V", "V"),
+        output_unit="V",
+        rest_output=0.0,
+        **{"substeps": 3, **fields},
+    )
+
+
+def a_run(model: GreyBoxModel, n: int = 60) -> tuple[np.ndarray, dict[str, float]]:
+    rng = np.random.default_rng(5)
+    names = model.lowered.states
+    remembers = [name.split()[0] in {"relay", "latch"} for name in names]
+    return rng.uniform(-1.0, 1.0, (n, 2)), {
+        name: 0.0 if flag else float(rng.uniform(0.2, 0.8)) for name, flag in zip(names, remembers, strict=True)
+    }
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_a_run_is_that_of_the_tree(name: str) -> None:
+    model = a_model(name)
+    inputs, begin = a_run(model)
+    # Between two kept samples of an expression nobody but the machine knows its states: they all begin at zero.
+    begin |= {state: 0.0 for state in begin if state.startswith("delay ")}
+    form = model.recursion
+    found = form.run(form.given(inputs, inputs[:1]), np.array([begin[state] for state in model.lowered.states]))
+    if name == "a delayed expression":
+        zeroed = GreyBox(
+            equations="dx/dt = -a*x + b*w; y = c*x", parameters=PARAMETERS
+        )  # the same, its delay made by hand
+        lagged = np.concatenate([np.zeros(3), (inputs[:, 0] * inputs[:, 1])[:-3]])[:, None]
+        mapping = Mapping.parse("w -> y")
+        model = replace(model, grey=zeroed, mapping=mapping, levels=(0.0,), spans=(1.0,))
+        expected = EquationTwin(model, model.theta).run(lagged, begin)
+    else:
+        expected = EquationTwin(model, model.theta).run(inputs, begin)
+    assert_allclose(found, expected.real, rtol=1e-12, atol=1e-13)
+
+
+STEP = 1e-30
+SMOOTH = [name for name in EQUATIONS if name not in {"a delayed expression"}]
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_derivatives_are_those_of_the_complex_step(name: str) -> None:
+    model = a_model(name)
+    inputs, begin = a_run(model, n=30)
+    form, states = model.recursion, model.lowered.states
+    n, p = len(states), len(model.theta)
+    S = np.zeros((n, p + n))
+    S[:, p:] = np.eye(n)
+    x = np.array([begin[state] for state in states])
+    y, J = form.moved(form.given(inputs, inputs[:1]), x.copy(), S, p)
+    assert_allclose(y, form.run(form.given(inputs, inputs[:1]), x.copy()), rtol=1e-14)
+    for i in range(p + n):
+        theta, start = model.theta.astype(complex), {key: complex(value) for key, value in begin.items()}
+        if i < p:
+            theta[i] += 1j * STEP
+        else:
+            start[states[i - p]] += 1j * STEP
+        expected = EquationTwin(model, theta).run(inputs, start).imag / STEP
+        assert_allclose(J[:, :, i], expected, rtol=1e-9, atol=1e-11)
+
+
+def test_soft_switches_have_the_derivatives_of_what_is_computed() -> None:
+    model = a_model("conditions")
+    form = replace(model.recursion, widths=np.full(len(model.lowered.switches), 0.05))
+    inputs, begin = a_run(model, n=30)
+    u, x = form.given(inputs, inputs[:1]), np.array(list(begin.values()))
+    _, J = form.moved(u, x.copy(), np.zeros((1, 2)), 2)
+    for i in range(2):
+        apart = 1e-6 * np.eye(2)[i]
+        two = [form.with_theta(model.theta + sign * apart).run(u, x.copy()) for sign in (1.0, -1.0)]
+        assert_allclose(J[:, :, i], (two[0] - two[1]) / 2e-6, atol=1e-8)
+
+
+def test_a_soft_root_has_a_slope_at_zero_and_is_the_root_elsewhere() -> None:
+    grey = GreyBox(equations="y = sqrt(u)")
+    mapping = Mapping.parse("u -> y")
+    low = lowered(grey, mapping.inputs, mapping.outputs, 1.0)
+    model = replace(
+        a_model("a rate"), grey=grey, mapping=mapping, theta=np.zeros(0), levels=(), spans=(), norms=low.norms
+    )
+    form = replace(model.recursion, widths=np.array([1e-4]))
+    soft, exact = (one.run(np.array([[-1.0], [0.0], [1.0]]), np.zeros(0))[:, 0] for one in (form, model.recursion))
+    assert soft.tolist() == pytest.approx([0.0, 0.0, 1.0], abs=1e-8)
+    assert exact.tolist() == [0.0, 0.0, 1.0]
+
+
+def test_what_explodes_is_no_number_and_takes_no_time() -> None:
+    grey = GreyBox(equations="dx/dt = x^3 + u; y = x")
+    model = replace(
+        a_model("a rate"), grey=grey, mapping=Mapping.parse("u -> y"), theta=np.zeros(0), levels=(1.0,), norms=()
+    )
+    y = model.recursion.run(np.ones((5_000, 1)), np.array([1.0]))
+    assert np.isfinite(y[0])
+    assert np.isnan(y[-1])
+
+
+def test_the_method_is_of_fourth_order() -> None:
+    grey = GreyBox(equations="dx/dt = -x; y = x")
+    base = replace(
+        a_model("a rate"), grey=grey, mapping=Mapping.parse("-> y"), theta=np.zeros(0), levels=(0.0,), norms=()
+    )
+    errors = []
+    for substeps in (1, 2):
+        form = replace(base, substeps=substeps, sample_time=0.5).recursion
+        errors.append(abs(form.run(np.zeros((3, 0)), np.array([1.0]))[2, 0] - np.exp(-1.0)))
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.3)
