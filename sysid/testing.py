@@ -277,7 +277,7 @@ class EquationTwin:
             return newer + rest * (older - newer)
         if isinstance(node, Operation):
             return _operated(node.operator, [self._of(one, now) for one in node.operands])
-        assert isinstance(node, Call)
+        assert isinstance(node, Call)  # noqa: S101 - there is no other node
         return self._called(node, now)
 
     def _ago(self, name: str, lag: int, now: Dict[str, complex]) -> complex:

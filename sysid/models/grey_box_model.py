@@ -120,7 +120,13 @@ class GreyBoxModel(AbstractModel):
         """The same model with other parameters."""
         return replace(self, theta=theta)
 
-    def output_moves(self, factor: Array, inputs: Array, history: History) -> Array:
+    def output_moves(
+        self,
+        factor: Array,
+        inputs: Array,
+        history: History,
+        measured: Array | None = None,  # noqa: ARG002 - one step ahead nothing is predicted
+    ) -> Array:
         """How the free run moves with the parameters; see the base class.
 
         A state that is estimated from several samples stays where it is; one at rest moves with the parameters.

@@ -1,4 +1,4 @@
-"""The register machine against equations walked through in plain Python, and its derivatives against the complex step."""
+"""The register machine against equations walked through in plain Python, and against the complex step."""
 
 from __future__ import annotations
 

@@ -124,7 +124,8 @@ def test_a_switch_is_trained_soft_and_exact_in_the_model() -> None:
         x[t + 1] = 0.7 * x[t] + (0.6 if u[t] > 0.8 else -0.1)
     fit = fitted(
         [a_trace(u, x[:400])], "x[k+1] = a*x + where(u > level, up, down); y = x",
-        parameters={"a": 0.5, "level": 0.5, "up": 1, "down": 0}, initial={"x": {"start": 0.0, "fixed": True}}, start=Start(),
+        parameters={"a": 0.5, "level": 0.5, "up": 1, "down": 0},
+        initial={"x": {"start": 0.0, "fixed": True}}, start=Start(),
     )  # fmt: skip
     assert np.abs(fit.model.simulate(u[:, None]) - x[:400]).max() < 0.02
     assert any("1 switch were trained" in note for note in fit.notes)
