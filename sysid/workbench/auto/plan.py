@@ -9,7 +9,7 @@ from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training
-from sysid.estimation.estimators import check, estimator_of
+from sysid.estimation.estimators import estimator_of
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import Budget
 from sysid.workbench.auto.families import FAMILIES, Family, Try, suggested
@@ -140,7 +140,8 @@ class Plan:
         n = self.looked.n_outputs
         structure = one.structure.for_outputs(n)
         try:
-            check(structure, self.looked.n_inputs, n_outputs=n if structure.several_outputs else 1)
+            structure.check_inputs(self.looked.n_inputs)
+            structure.check_outputs(n if structure.several_outputs else 1)
         except ConfigError:
             return False
         return True
