@@ -78,10 +78,10 @@ def test_base_code_needs_no_extra(tmp_path):
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
         "sysid.export.onnx_blocks onnx",
-        "sysid.export.onnx_body onnx",
+        "sysid.export.onnx_core onnx",
         "sysid.export.onnx_nodes onnx",
+        "sysid.export.onnx_outputs onnx",
         "sysid.export.onnx_sequence onnx",
-        "sysid.export.onnx_state_space onnx",
         "sysid.export.onnx_step onnx",
         "sysid.export.torch_module torch",
         "sysid.sklearn",

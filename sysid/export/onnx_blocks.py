@@ -12,7 +12,7 @@ from typing import Any
 from onnx import TensorProto, helper
 
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.onnx_step import ends, within_a_body
+from sysid.export.onnx_outputs import ends
 from sysid.export.surrogate import Surrogate
 
 CELLS = 25_600
@@ -83,3 +83,20 @@ def _body(surrogate: Surrogate, nodes: Nodes, size: str, kinds: dict[str, int]) 
     ]
     end = [helper.make_tensor_value_info(on, TensorProto.BOOL, []), inner.value("state_out", state)]
     return inner.graph("block_of_samples", begin + sequences[0], end + sequences[1])
+
+
+def within_a_body(nodes: Nodes, prefix: str) -> Nodes:
+    """The same nodes as part of another graph's loop, with other names for what goes in and comes out.
+
+    Args:
+        nodes: From ``u`` and ``state`` to ``y``, ``state_out`` and ``flags``.
+        prefix: Put before these names.
+
+    Returns:
+        The nodes; new names get the prefix too.
+    """
+    own = {name: f"{prefix}{name}" for name in ("u", "state", "y", "state_out", "flags")}
+    for node in nodes.nodes:
+        for names in (node.input, node.output):
+            names[:] = [own.get(name, name) for name in names]
+    return nodes.within(prefix)

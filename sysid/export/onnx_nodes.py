@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,23 +21,32 @@ TO_END = int(np.iinfo(np.int64).max)
 """As the end of a Slice: to the end, whatever the length."""
 
 
+LONGEST = 40
+"""Letters of the values in an index constant's name, beyond which a digest stands for the rest."""
+
+
+ROWS_OF_A_SLICE = 30
+"""Rows from which on copying a slice is quicker than gathering them."""
+
+
 class Nodes:
     """Nodes and constants of one graph.
 
     Args:
         dtype: Of the numbers.
         prefix: Put before every name. ONNX wants names unique across a graph and the bodies inside it.
+        trailing: Axes behind the channels where these lie along the first one.
     """
 
-    def __init__(self, dtype: DTypeLike, prefix: str = "") -> None:
+    def __init__(self, dtype: DTypeLike, prefix: str = "", trailing: int = 1) -> None:
         self.dtype = np.dtype(dtype)
-        self.prefix = prefix
+        self.prefix, self.trailing = prefix, trailing
         self.nodes: list[Any] = []
         self.constants: dict[str, Any] = {}
 
     def within(self, prefix: str) -> Nodes:
         """The same graph, with other names: for one of several stages."""
-        part = Nodes(self.dtype, prefix)
+        part = Nodes(self.dtype, prefix, self.trailing)
         part.nodes, part.constants = self.nodes, self.constants
         return part
 
@@ -44,10 +54,21 @@ class Nodes:
         """Add a constant of the graph's number type."""
         return self._constant(name, np.asarray(values, dtype=self.dtype))
 
+    def column(self, name: str, values: ArrayLike) -> str:
+        """Add a constant of every channel, to be laid against values with channels along the first axis."""
+        return self.numbers(name, np.asarray(values).reshape(-1, *([1] * self.trailing)))
+
+    def truths(self, name: str, values: Sequence[bool]) -> str:
+        """Add a constant of truth values, of every channel."""
+        array = np.asarray(values, dtype=bool).reshape(-1, *([1] * self.trailing))
+        return self._constant(name, array)
+
     def integers(self, values: ArrayLike) -> str:
         """Add an index constant, named by its values and kept once."""
         array = np.asarray(values, dtype=np.int64)
         text = "_".join("end" if value == TO_END else str(value) for value in array.ravel())
+        if len(text) > LONGEST:
+            text = f"{text[:LONGEST]}_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
         return self._constant(f"index{array.ndim}_{text}", array)
 
     def whole(self, value: int) -> str:
@@ -65,31 +86,59 @@ class Nodes:
         self.nodes.append(helper.make_node(operator, list(inputs), [output], name=f"make_{output}", **attributes))
         return output
 
-    def split(self, value: str, outputs: Sequence[str], axis: int = -1) -> list[str]:
-        """Cut a value into equal parts along an axis, the last by default, one for each name."""
-        if len(outputs) == 1:
+    def rows(self, value: str, rows: Sequence[int], count: int, name: str) -> str:
+        """Some rows along the first axis of a value that has ``count``; no node where they are all."""
+        return self.rows_of([(value, count)], [(0, row) for row in rows], name)
+
+    def rows_of(self, values: Sequence[tuple[str, int]], rows: Sequence[tuple[int, int]], name: str) -> str:
+        """Rows of several values, one behind the other, each by value and row.
+
+        A slice is copied as one piece, where a gather takes as long for every row as a node does for thirty.
+
+        Args:
+            values: Their names, and how many rows they have.
+            rows: Which are taken.
+            name: Of what it gives.
+
+        Returns:
+            The name.
+        """
+        runs: list[list[int]] = []
+        for value, row in rows:
+            if runs and runs[-1][0] == value and runs[-1][2] == row:
+                runs[-1][2] = row + 1
+            else:
+                runs.append([value, row, row + 1])
+        if len(runs) > max(1, len(rows) // ROWS_OF_A_SLICE):
+            starts = np.cumsum([0, *(count for _, count in values)])
+            whole = values[0][0]
+            if len(values) > 1:
+                whole = self.add("Concat", [one for one, _ in values], f"{name}_from", axis=0)
+            return self.add("Gather", [whole, self.integers([int(starts[v]) + row for v, row in rows])], name, axis=0)
+        pieces: list[str] = []
+        for value, first, end in runs:
+            source, count = values[value]
+            if (first, end) != (0, count):
+                span = [self.integers([at]) for at in (first, end, 0)]
+                source = self.add("Slice", [source, *span], name if len(runs) == 1 else f"{name}_{len(pieces)}")
+            pieces.append(source)
+        return pieces[0] if len(pieces) == 1 else self.add("Concat", pieces, name, axis=0)
+
+    def cut(self, value: str, sizes: dict[str, int]) -> list[str]:
+        """Cut a value along its first axis into named parts; no node where there is one."""
+        if len(sizes) == 1:
             return [value]
-        names = [self.prefix + output for output in outputs]
-        self.nodes.append(helper.make_node("Split", [value], names, name=f"make_{names[0]}", axis=axis))
+        names = [self.prefix + output for output in sizes]
+        inputs = [value, self.integers(list(sizes.values()))]
+        self.nodes.append(helper.make_node("Split", inputs, names, name=f"make_{names[0]}", axis=0))
         return names
 
-    def add_scan(
-        self, states: Sequence[str], scanned: Sequence[str], ends: Sequence[str], output: str, body: Any
-    ) -> str:
-        """Add a loop over the first axis of ``scanned``; gives back the name of its one output by sample."""
-        outputs = [self.prefix + name for name in (*ends, output)]
-        inputs = [*states, *scanned]
-        self.nodes.append(
-            helper.make_node(
-                "Scan", inputs, outputs, name=f"{self.prefix}loop", body=body, num_scan_inputs=len(scanned)
-            )
-        )
-        return outputs[-1]
-
-    def value(self, name: str, shape: Sequence[int | str], doc: str = "", dtype: DTypeLike | None = None) -> Any:
+    def value(self, name: str, shape: Sequence[int | str] | None, doc: str = "", dtype: DTypeLike | None = None) -> Any:
         """Describe an input or output of the graph."""
         kind = helper.np_dtype_to_tensor_dtype(np.dtype(dtype or self.dtype))
-        return helper.make_tensor_value_info(self.prefix + name, kind, list(shape), doc_string=doc)
+        return helper.make_tensor_value_info(
+            self.prefix + name, kind, None if shape is None else list(shape), doc_string=doc
+        )
 
     def graph(self, name: str, inputs: Sequence[Any], outputs: Sequence[Any]) -> Any:
         """Close the graph."""

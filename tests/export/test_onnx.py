@@ -11,7 +11,8 @@ import pytest
 
 from sysid.export import Kind, Surrogate
 from sysid.export.onnx_exporter import OnnxExporter
-from sysid.models import ARX, NARX, ARXModel, Mapping
+from sysid.models import ARX, NARX, ARXModel, Cascade, Mapping, VectorNARX
+from tests.export.cascades import wired_narx, wired_vector
 
 
 def written(exporter, surrogate, folder):
@@ -55,10 +56,49 @@ def test_file_alone_says_what_goes_in_and_out(narx, declared, tmp_path):
         assert proto.graph.output[2].doc_string.startswith("the sum of: 1: an input is outside its declared range")
 
 
-def test_a_cascade_is_one_scan_a_model_in_one_file(cascade, tmp_path):
-    _, proto = written(OnnxExporter(), cascade, tmp_path)[Kind.SEQUENCE]
-    onnx.checker.check_model(proto, full_check=True)
-    assert operators(proto.graph)["Scan"] == 3
+def test_a_cascade_is_one_loop_and_one_that_keeps_numbers_that_are_none_apart(cascade, circle, tmp_path):
+    for surrogate in (cascade, circle):
+        _, proto = written(OnnxExporter(), surrogate, tmp_path)[Kind.SEQUENCE]
+        onnx.checker.check_model(proto, full_check=True)
+        assert operators(proto.graph)["Scan"] == 2
+
+
+def side_by_side(count):
+    """Networks that do not read each other, each with an input of its own, of one output or two by turns."""
+    return Cascade(
+        models=tuple(
+            wired_narx(f"U{i} -> Y{i}", NARX(input_delays="0:1", output_delays=[1, 2], neurons=3, gated=i % 3 == 0), i)
+            if i % 2
+            else wired_vector(f"U{i} -> Y{i}+Z{i}", VectorNARX(input_delays=1, output_delays=[[1], [2]], neurons=2), i)
+            for i in range(count)
+        )
+    )
+
+
+def test_models_that_do_not_wait_for_each_other_share_their_nodes(tmp_path):
+    def executed(count):
+        _, proto = written(OnnxExporter(), Surrogate.of(side_by_side(count)), tmp_path)[Kind.STEP]
+        return len(proto.graph.node)
+
+    assert executed(12) <= executed(4) + 2
+
+
+@pytest.mark.parametrize("name", ["ONNX, step", "ONNX, sequence", "ONNX float32, step", "ONNX float32, sequence"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_number_that_is_none_reaches_nobody_who_does_not_read_it(*, name, value, rows, opened, inputs, tmp_path):
+    surrogate = Surrogate.of(side_by_side(3))
+    u = inputs(30, 3).astype(np.float32).astype(np.float64)
+    expected = surrogate.simulate(u)
+    u[10, 1] = value
+    exported = opened(rows[name], surrogate, tmp_path)
+    run = exported.run(u[:, np.newaxis], surrogate.at_rest(u[0])[np.newaxis])
+    assert [port.name for port in surrogate.outputs] == ["Y0", "Z0", "Y1", "Y2", "Z2"]
+    np.testing.assert_allclose(
+        run.output[:, 0, [0, 1, 3, 4]], expected[:, [0, 1, 3, 4]], rtol=0, atol=rows[name].tolerance
+    )
+    assert (run.flags[10:, 0] != 0).all() or np.isfinite(run.output[:, 0, 2]).all()
+    if np.isnan(value):
+        np.testing.assert_array_equal(np.isnan(run.output[:, 0, 2]), np.isnan(surrogate.simulate(u)[:, 2]))
 
 
 def test_float32_stays_near_over_a_long_run(*, narx, declared, opened, rows, inputs, tmp_path):
