@@ -13,10 +13,12 @@ from sysid.errors import TraceError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_search import AbstractProblem
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
@@ -169,6 +171,15 @@ class _Problem(AbstractProblem):
     def likely_delays(self, least: int, most: int) -> list[list[int]]:
         """By correlation; see the base class."""
         return likely(self.experiments, self.orders.poles, most, least)
+
+    def told(self, end: End) -> tuple[str, ...]:
+        """Whether errors hang together; see the base class."""
+        separated = end.provider.separated(end.theta)
+        if separated is None or separated.mirrored:
+            return ()
+        ends = np.cumsum([len(record.target) for record in end.provider.records])
+        errors = [one[:, np.newaxis] for one in np.split(separated.residual, ends[:-1])]
+        return slow_poles.notes(0.0, [len(one) for one in errors], errors)  # the search has told of slow poles itself
 
     def unbounded(self) -> _Problem:
         """With inputs as they are: the offset of an input adds up in an integrator, and no constant undoes it."""

@@ -110,6 +110,17 @@ class AbstractProblem(ABC):
         """
         return [[least]] * len(self.orders.poles)
 
+    def told(self, end: End) -> tuple[str, ...]:  # noqa: ARG002 - points of a spectrum have no order in time
+        """What a reader should know of the errors at an end.
+
+        Args:
+            end: The end.
+
+        Returns:
+            Notes.
+        """
+        return ()
+
     def with_orders(self, orders: TransferFunction) -> Self:
         """The same data for another structure.
 
@@ -190,6 +201,7 @@ class AbstractProblem(ABC):
                 f"Dead times in samples: {', '.join(map(str, end.delays))}.",
                 *(told if reached.problem is self else ()),
                 *end.notes,
+                *self.told(end),
                 of_stability(model),
             ),
         )

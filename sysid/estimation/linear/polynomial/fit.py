@@ -16,6 +16,7 @@ from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start
@@ -100,6 +101,7 @@ def fit_polynomial(
         at = errors.linearise(solution.theta)
         system = errors.chart.system(solution.theta)
         variance = float(errors.covariance(system)[0, 0])
+        told, lengths = None if orders.noise else errors.errors(system), [len(one) for one in errors.segments]
     model = PolynomialModel(
         orders=orders,
         theta=solution.theta,
@@ -121,7 +123,7 @@ def fit_polynomial(
         },
         train_time_s=time.perf_counter() - began,
         uncertainty=_uncertainty(model, at, errors.n_samples, variance * unit),
-        notes=(_stability(model),),
+        notes=(*slow_poles.notes(model.pole_radius, lengths, told), _stability(model)),
     )
 
 
@@ -137,8 +139,28 @@ def _search(
         whitening=np.eye(1),
         stable=stable and not orders.drifts,
     )
-    short = replace(training, max_iterations=min(SHORT, training.max_iterations))
     starts = [theta for theta in _starts(pieces, orders) if np.isfinite(theta).all()]
+    if not errors.stable or training.stable is not None:
+        return errors, _minimum(errors, starts, training)
+    lengths = [len(segment) for segment in errors.segments]
+    bounded = replace(errors, largest=slow_poles.largest_pole(lengths))
+    inside = _minimum(bounded, starts, training)
+    system = errors.chart.system(inside.theta)
+    if not slow_poles.unseen(system.radius, lengths):
+        return bounded, inside
+    beyond = _minimum(errors, [inside.theta, *starts], training)
+    better = slow_poles.significantly_better(
+        errors.errors(errors.chart.system(beyond.theta)),
+        errors.errors(system),
+        parameters=orders.n_parameters,
+        scale=float(np.mean([np.mean(segment.outputs**2) for segment in segments])),
+    )
+    return (errors, beyond) if better else (bounded, inside)
+
+
+def _minimum(errors: PredictionErrors, starts: Sequence[Array], training: PolynomialTraining) -> Solution:
+    """Short runs from the best starts, and a long one from the best of their ends."""
+    short = replace(training, max_iterations=min(SHORT, training.max_iterations))
     ranked = sorted((loss, at) for at, theta in enumerate(starts) if np.isfinite(loss := errors.loss(theta)))
     found: list[tuple[float, int, Solution]] = []
     for _, at in ranked[:TRIED]:
@@ -146,14 +168,13 @@ def _search(
         found.append((solution.at.loss, at, solution))
     if not found:
         raise FitDivergedError(
-            f"no start of {orders.label} gives a finite prediction",
+            "no start gives a finite prediction",
             remedy="lower the orders, or fit an ARX model or a state space first to see what the records ask for",
         )
     best = min(found, key=lambda entry: entry[:2])[2]
     if training.max_iterations <= SHORT:
-        return errors, best
-    engine = LevenbergMarquardt(termination=_limits(training), evidence_after=None)
-    return errors, engine.resume(errors, best.state)
+        return best
+    return LevenbergMarquardt(termination=_limits(training), evidence_after=None).resume(errors, best.state)
 
 
 def _run(errors: PredictionErrors, theta: Array, training: PolynomialTraining) -> Solution:

@@ -178,7 +178,7 @@ def _result(
         },
         train_time_s=time.perf_counter() - began,
         uncertainty=None if by_subspace else state_space_uncertainty(model, found),
-        notes=(*_notes(found, orders), _stability(model)),
+        notes=(*_notes(found, orders), *found.notes, _stability(model)),
     )
 
 

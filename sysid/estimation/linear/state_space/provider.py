@@ -59,12 +59,14 @@ class PredictionErrors(AbstractProvider):
         segments: The records, in scaled numbers; where the noise is modelled, without gaps.
         whitening: What errors of one sample are multiplied with, shape ``(n_outputs, n_outputs)``.
         stable: Whether poles outside the unit circle are refused.
+        largest: Magnitude from which they are then.
     """
 
     chart: AbstractChart
     segments: Sequence[Segment]
     whitening: Array
     stable: bool
+    largest: float = EDGE
     n_samples: int = field(init=False)
     _last: dict[bytes, tuple[Run, ...]] = field(init=False, repr=False, default_factory=dict)
 
@@ -97,7 +99,7 @@ class PredictionErrors(AbstractProvider):
         with_noise = bool(system.K.any())
         if with_noise and not spectral_radius(system.predictor) < 1.0:
             return False
-        return system.radius < EDGE if self.stable else system.radius < _LOST
+        return system.radius < self.largest if self.stable else system.radius < _LOST
 
     def linearise(self, theta: Array) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
@@ -154,13 +156,19 @@ class PredictionErrors(AbstractProvider):
 
     def covariance(self, system: Innovations) -> Array:
         """Covariance of the errors that count."""
-        total, count = np.zeros((system.n_outputs, system.n_outputs)), 0
-        for segment in self.segments:
-            counted = segment.root_weights > 0.0
-            r = (self.run(system, segment).residual * segment.root_weights[:, np.newaxis])[counted]
+        count = sum(int(np.count_nonzero(segment.root_weights)) for segment in self.segments)
+        total = np.zeros((system.n_outputs, system.n_outputs))
+        for r in self.errors(system):
             total += r.T @ r
-            count += int(counted.sum())
         return total / max(count, 1)
+
+    def errors(self, system: Innovations) -> list[Array]:
+        """Errors of each record, those that do not count as zero."""
+        found = []
+        for segment in self.segments:
+            residual = self.run(system, segment).residual * segment.root_weights[:, np.newaxis]
+            found.append(np.where(segment.root_weights[:, np.newaxis] > 0.0, residual, 0.0))
+        return found
 
     def _weighted(self, residual: Array, segment: Segment) -> Array:
         return np.asarray((residual @ self.whitening.T) * segment.root_weights[:, np.newaxis])

@@ -21,12 +21,13 @@ from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import ENOUGH, Subspace
-from sysid.estimation.linear.subspace.system import stabilised
+from sysid.estimation.linear.subspace.system import EDGE, stabilised
 from sysid.estimation.result import Status
 from sysid.models import LinearStateSpace
 from sysid.models.innovations import Innovations
@@ -102,6 +103,7 @@ class Found:
         covariance: Of the innovations, in scaled numbers.
         weighting: The subspace method that it began with.
         singular_values: Canonical correlations of past and future.
+        notes: What a reader should know of slow poles.
     """
 
     system: Innovations
@@ -113,6 +115,7 @@ class Found:
     covariance: Array
     weighting: Weighting
     singular_values: Array
+    notes: tuple[str, ...] = ()
 
 
 def search(segments: Sequence[Segment], orders: LinearStateSpace, training: StateSpaceTraining) -> Found:
@@ -140,11 +143,31 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         )
         stable = not orders.noise if training.stable is None else training.stable
         problem = _Problem(segments=whole, orders=orders, stable=stable)
-        start, weighting = problem.start(subspace, training.weighting)
         iterations = training.max_iterations if training.method == METHODS[0] else 0
-        sizes = subspace.singular_values()
-        found = problem.refined(start, iterations, training.max_time_s - (time.perf_counter() - began))
-    return replace(found, weighting=weighting, singular_values=sizes)
+
+        def found_in(one: _Problem) -> Found:
+            start, weighting = one.start(subspace, training.weighting)
+            found = one.refined(start, iterations, training.max_time_s - (time.perf_counter() - began))
+            return replace(found, weighting=weighting)
+
+        bounded = replace(problem, largest=slow_poles.largest_pole(problem.lengths))
+        if not stable or training.stable is not None:
+            found = found_in(problem)
+        else:
+            found = found_in(bounded)
+            if slow_poles.unseen(found.system.radius, problem.lengths):
+                found = _better(found, found_in(problem), problem)
+        errors = None if orders.noise else problem.around_errors(found.system)
+    told = slow_poles.notes(found.system.radius, problem.lengths, errors)
+    return replace(found, singular_values=subspace.singular_values(), notes=told)
+
+
+def _better(inside: Found, beyond: Found, problem: _Problem) -> Found:
+    """What was found with poles up to the edge of stability, if it is better than chance has it."""
+    errors, than = (problem.around_errors(one.system) for one in (beyond, inside))
+    scale = float(np.mean([np.mean(segment.outputs**2) for segment in problem.segments]))
+    size = beyond.chart.n_parameters
+    return beyond if slow_poles.significantly_better(errors, than, parameters=size, scale=scale) else inside
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,6 +177,16 @@ class _Problem:
     segments: Sequence[Segment]
     orders: LinearStateSpace
     stable: bool
+    largest: float = EDGE
+
+    @property
+    def lengths(self) -> list[int]:
+        """Samples of each record."""
+        return [len(segment) for segment in self.segments]
+
+    def around_errors(self, system: Innovations) -> list[Array]:
+        """Errors of each record."""
+        return self.errors(self.linear(system), np.eye(system.n_outputs)).errors(system)
 
     def start(self, subspace: Subspace, weighting: str) -> tuple[Innovations, Weighting]:
         """The subspace estimate with the least prediction error, its ``B``, ``D`` and constant fitted to that."""
@@ -184,7 +217,7 @@ class _Problem:
     def _with_inputs(self, system: Innovations) -> tuple[float, Innovations] | None:
         """The loss and the system with the ``B``, ``D`` and constant that fit best; twice, for rounding."""
         if self.stable:
-            system = stabilised(system)
+            system = stabilised(system, self.largest)
         if not self.orders.intercept:
             system = replace(system, constant=np.zeros(system.n_outputs))
         system = system.balanced()
@@ -204,7 +237,9 @@ class _Problem:
 
     def errors(self, chart: Chart, whitening: Array) -> PredictionErrors:
         """The least-squares problem over a chart."""
-        return PredictionErrors(chart=chart, segments=self.segments, whitening=whitening, stable=self.stable)
+        return PredictionErrors(
+            chart=chart, segments=self.segments, whitening=whitening, stable=self.stable, largest=self.largest
+        )
 
     def around(self, system: Innovations) -> Chart:
         """All that changes a system."""

@@ -67,21 +67,23 @@ def _by_riccati(A: Array, C: Array, Q: Array, R: Array, S: Array) -> Array:
     return K if spectral_radius(A - K @ C) < 1.0 else np.zeros_like(K)  # there is next to no noise to tell it from
 
 
-def stabilised(system: Innovations) -> Innovations:
+def stabilised(system: Innovations, largest: float = EDGE) -> Innovations:
     """The same system with every pole outside the unit circle mirrored into it.
 
     Args:
         system: The system.
+        largest: Magnitude that no pole may reach.
 
     Returns:
         The system as it is where it is stable; otherwise with the output map kept and ``B`` to be fitted again.
     """
-    if system.radius < EDGE:
+    if system.radius < largest:
         return system
+    inside = min(INSIDE, 2.0 * largest - 1.0)
     T, Z = linalg.schur(system.A, output="complex")
     poles = np.diag(T)
     size = np.maximum(np.abs(poles), np.finfo(np.float64).tiny)
-    mirrored = np.where(size > INSIDE, poles / size * np.minimum(1.0 / np.maximum(size, 1.0), INSIDE), poles)
+    mirrored = np.where(size > inside, poles / size * np.minimum(1.0 / np.maximum(size, 1.0), inside), poles)
     T = T - np.diag(poles) + np.diag(mirrored)
     A = np.real(Z @ T @ Z.conj().T)
     return Innovations(A=A, B=system.B, C=system.C, D=system.D, K=system.K, constant=system.constant)

@@ -1,0 +1,82 @@
+"""A drift is not taken for a plant that integrates in silence, and a plant that integrates is found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from sysid.estimation import fit_polynomial, fit_state_space, fit_transfer_function
+from sysid.estimation.linear import slow_poles
+from sysid.estimation.result import FitResult
+from sysid.models import OE, LinearStateSpace, Mapping, Start, StartKind, TransferFunction
+from sysid.traces import Trace
+from tests.estimation.linear_systems import steps, trace_of
+
+ONE, FREE = Mapping.parse("u1 -> y"), Start(kind=StartKind.ESTIMATED)
+N = 400
+
+
+def oe(trace: Trace, order: int) -> FitResult:
+    return fit_polynomial([trace], ONE, OE(nb=order, nf=order, nk=1), start=FREE)
+
+
+def ss(trace: Trace, order: int) -> FitResult:
+    return fit_state_space([trace], ONE, LinearStateSpace(states=order, noise=False), start=FREE)
+
+
+STRUCTURES = pytest.mark.parametrize("fit", [oe, ss])
+
+
+def drifting(seed: int) -> tuple[Trace, np.ndarray, np.ndarray]:
+    """A quick plant under a random walk; inputs and clean output go on for as long again."""
+    rng = np.random.default_rng(seed)
+    u = steps(2 * N, 1, rng, held=8)
+    clean = lfilter([0.0, 0.3], [1.0, -0.7], u[:, 0])
+    drift = np.cumsum(rng.standard_normal(N))
+    return trace_of(u[:N], clean[:N] + 0.5 * drift / drift.std()), u, clean
+
+
+@STRUCTURES
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_a_drift_is_told_and_bounds_the_free_run(fit: object, seed: int) -> None:
+    trace, u, clean = drifting(seed)
+    found = fit(trace, 3)  # type: ignore[operator]
+    assert any("hang together" in note for note in found.notes) or any("slowest pole" in note for note in found.notes)
+    assert found.model.pole_radius <= slow_poles.largest_pole([N])
+    # The level is lost to the drift, which has a range of about two; beyond it nothing grows.
+    assert np.abs(found.model.simulate(u)[N:] - clean[N:]).max() < 6.0 * np.ptp(trace["y"])
+
+
+@STRUCTURES
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_a_plant_that_integrates_is_found_and_told(fit: object, noise: float) -> None:
+    rng = np.random.default_rng(0)
+    u = steps(N, 1, rng, held=5)
+    y = lfilter([0.0, 0.1], [1.0, -1.0], u[:, 0]) + noise * rng.standard_normal(N)
+    found = fit(trace_of(u, y), 1)  # type: ignore[operator]
+    assert found.model.pole_radius > 1.0 - 2e-4
+    assert any("slowest pole" in note for note in found.notes)
+
+
+@STRUCTURES
+def test_a_quick_plant_with_white_noise_has_no_such_note(fit: object) -> None:
+    rng = np.random.default_rng(0)
+    u = steps(N, 1, rng, held=5)
+    y = lfilter([0.0, 0.3], [1.0, -0.7], u[:, 0]) + 0.1 * rng.standard_normal(N)
+    assert not [note for note in fit(trace_of(u, y), 1).notes if "slowest" in note or "together" in note]  # type: ignore[operator]
+
+
+def test_a_transfer_function_tells_errors_that_hang_together() -> None:
+    trace, _, _ = drifting(0)
+    found = fit_transfer_function([trace], ONE, TransferFunction(poles=(1,), zeros=(0,), delays=(1,)), start=FREE)
+    assert any("hang together" in note for note in found.notes)
+
+
+def test_errors_of_a_random_walk_say_as_little_as_few() -> None:
+    rng = np.random.default_rng(1)
+    walk = np.cumsum(rng.standard_normal((2000, 1)), axis=0)
+    white = rng.standard_normal((2000, 1))
+    better = {"parameters": 4, "scale": 1.0}
+    assert slow_poles.significantly_better([0.95 * white], [white], **better)
+    assert not slow_poles.significantly_better([0.95 * walk], [walk], **better)
