@@ -10,7 +10,7 @@ from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit, SystemFit
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
-from sysid.estimation.estimators import Options
+from sysid.estimation.estimator import Options
 from sysid.ingest import READERS, load_dataset, read_trace
 from sysid.models import AbstractStructure, Mapping, Start
 from sysid.traces import Role, TraceSet

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sysid.reporting.fit_tables import case_columns
 from sysid.reporting.parts import Part, Section
 from sysid.reporting.results import CaseRecord, Results
-from sysid.reporting.tables import Cell, Table, case_columns
+from sysid.reporting.tables import Cell, Table
 
 HOW = {
     "estimated": "The initial state of each free run is estimated on the first samples of its record, for each fit by "

@@ -14,6 +14,17 @@ from sysid.reporting.amplitude import amplitude_section
 from sysid.reporting.beginnings import beginnings_section, warning_points
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
+from sysid.reporting.fit_tables import (
+    accuracy_table,
+    case_columns,
+    data_table,
+    export_table,
+    quality_table,
+    ranking_table,
+    run_time_table,
+    scored_cases,
+    systems_table,
+)
 from sysid.reporting.judging.document import judgement_sections
 from sysid.reporting.numbers import number
 from sysid.reporting.orders_view import orders_section
@@ -25,21 +36,7 @@ from sysid.reporting.runtime_table import exported_run_times
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.state_table import state_section
 from sysid.reporting.sweep.section import sweep_points, sweep_sections
-from sysid.reporting.tables import (
-    DIVERGED,
-    Cell,
-    Table,
-    accuracy_table,
-    case_columns,
-    data_table,
-    export_table,
-    figure_cell,
-    quality_table,
-    ranking_table,
-    run_time_table,
-    scored_cases,
-    systems_table,
-)
+from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
 from sysid.reporting.training_view import training_parts, trust_sections
 from sysid.reporting.verdict import verdict
 from sysid.reporting.worst_instants import Instant, worst_instants

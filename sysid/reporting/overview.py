@@ -8,10 +8,10 @@ from typing import Final
 
 from sysid.reporting.figures.comparison_figure import Overlay, comparison_figure
 from sysid.reporting.figures.style import PALETTE
+from sysid.reporting.fit_tables import SCORED, case_columns
 from sysid.reporting.parts import Gallery, Part, Section, picture
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.signals import CaseSignals
-from sysid.reporting.tables import SCORED, case_columns
 
 MOST: Final = len(PALETTE)
 """Models in one picture: as many as have a colour of their own."""

@@ -9,6 +9,7 @@ from typing import Final
 
 from sysid.errors import ConfigError
 from sysid.names import markdown, markdown_cell, markdown_code
+from sysid.reporting.fit_tables import scored_cases
 from sysid.reporting.html import readable
 from sysid.reporting.kinds import read_run, run_document, run_scores
 from sysid.reporting.markdown import (
@@ -25,7 +26,6 @@ from sysid.reporting.parts import Document
 from sysid.reporting.records import RunResults
 from sysid.reporting.results import Results
 from sysid.reporting.scores import write_scores
-from sysid.reporting.tables import scored_cases
 
 LEFT_OUT: Final = ("fit-", "frequency-response", "residuals")
 """Beginnings of the anchors of sections that only the whole report has."""

@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sysid.reporting.figures.style import MARKERS, PALETTE, new_figure, styled
+from sysid.reporting.fit_tables import case_columns
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.results import AttemptRecord, CaseRecord, FitRecord, Results
-from sysid.reporting.tables import Cell, Table, case_columns, figure_cell
+from sysid.reporting.tables import Cell, Table, figure_cell
 
 ROWS = 30
 """Starts that a table names; the figure shows all."""

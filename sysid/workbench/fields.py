@@ -19,7 +19,8 @@ from sysid.estimation import (
     Training,
     TransferFunctionTraining,
 )
-from sysid.estimation.estimators import ESTIMATORS, Estimator, estimator_of
+from sysid.estimation.estimator import Estimator
+from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.export.exporters import EXPORTERS
 from sysid.models import AbstractStructure, Mapping, Start, StartKind, structure_from_dict
 from sysid.models.lags import LagSpec, parse_lags

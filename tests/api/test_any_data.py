@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import sysid
 from sysid.errors import UserError
 from sysid.estimation import Status
-from sysid.estimation.estimators import Options
+from sysid.estimation.estimator import Options
 from sysid.models import AbstractStructure
 from sysid.traces import Role
 

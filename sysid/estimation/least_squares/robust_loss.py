@@ -2,7 +2,7 @@ r"""What a trace counts in the loss where a few traces on which the free run is 
 
 A sum of squares is ruled by its largest terms. Where the free run loses its way on a few traces, their squares outweigh
 those of all others: training works on these few, learns them by heart, and pays with the many. With a
-soft margin :math:`m` a trace's mean squared residual :math:`S` over :math:`n` samples counts as
+scale :math:`m` a trace's mean squared residual :math:`S` over :math:`n` samples counts as
 
 .. math:: \tfrac12\, n\, m^2 \ln\bigl(1 + S / m^2\bigr),
 
@@ -15,7 +15,7 @@ Its gradient is that of the squares times :math:`w = 1 / (1 + S / m^2)`, and so 
 logarithm's own curvature is left out, which is negative (Triggs et al. 1999, "Bundle adjustment: a modern synthesis",
 section 4.3): the matrix stays positive, and the step a descent.
 
-Limits: the noise that the evidence infers is that of this loss, smaller than that of the residuals. A margin far below
+Limits: the noise that the evidence infers is that of this loss, smaller than that of the residuals. A scale far below
 the errors of most traces makes the weights compete: what is best already gains most.
 """
 
@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def counted(residual: NDArray[np.float64], margin: float, samples: int) -> tuple[float, NDArray[np.float64]]:
+def counted(residual: NDArray[np.float64], scale: float, samples: int) -> tuple[float, NDArray[np.float64]]:
     """What the residuals of one trace count.
 
     Args:
         residual: Residuals over the errors that count as one, shape ``(n_rows, n_targets)``; zero in rows that do not
             count.
-        margin: Root mean square of a target's residuals from which on they count by its logarithm; infinity for plain
+        scale: Root mean square of a target's residuals from which on they count by its logarithm; infinity for plain
             squares.
         samples: Rows that count, ``n``.
 
@@ -40,12 +40,12 @@ def counted(residual: NDArray[np.float64], margin: float, samples: int) -> tuple
         Gauss-Newton matrix, shape ``(n_targets,)``.
 
     Example:
-        >>> loss, weights = counted(np.full((50, 1), 2.0), margin=2.0, samples=50)
+        >>> loss, weights = counted(np.full((50, 1), 2.0), scale=2.0, samples=50)
         >>> round(loss, 2), weights.tolist()
         (69.31, [0.5])
     """
     squares = np.sum(residual**2, axis=0)
-    if np.isinf(margin):
+    if np.isinf(scale):
         return 0.5 * float(np.sum(squares)), np.ones(len(squares))
-    within = max(samples, 1) * margin**2
+    within = max(samples, 1) * scale**2
     return 0.5 * float(np.sum(within * np.log1p(squares / within))), 1.0 / (1.0 + squares / within)

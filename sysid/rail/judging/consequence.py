@@ -27,7 +27,7 @@ from sysid.rail.dynamics.brake import ReferenceBrake
 from sysid.rail.dynamics.drive import Run
 from sysid.rail.dynamics.train import Train, read_train
 from sysid.rail.judging.consequence_figures import consequence_document
-from sysid.rail.judging.judge import MakeBrake, difference, error_rung
+from sysid.rail.judging.judge import MakeBrake, difference, error_sensitivity
 from sysid.rail.judging.port import Part, brake_of
 from sysid.rail.judging.scenario_catalogue import all_scenarios
 from sysid.rail.judging.scenarios import Consequence, Scenario
@@ -156,9 +156,11 @@ class TrainJudge:
         """
         scene = _Scene.of(options)
         judged = {subject: {name: results[f"{subject}: {name}"] for name in scene.chosen} for subject in subjects}
-        ladders = {kind: [results[f"{kind} of {size:g} psi"] for size in options.errors] for kind in ("bias", "noise")}
+        sensitivities = {
+            kind: [results[f"{kind} of {size:g} psi"] for size in options.errors] for kind in ("bias", "noise")
+        }
         return consequence_document(
-            train=scene.train.name, speed=options.speed, limit=options.limit, judged=judged, ladders=ladders
+            train=scene.train.name, speed=options.speed, limit=options.limit, judged=judged, sensitivities=sensitivities
         )
 
 
@@ -277,11 +279,11 @@ class _Erring:
 
     def __call__(self) -> dict[str, Any]:
         chosen = {name: self.scene.scenario(name) for name in self.names}
-        rung = error_rung(chosen, reference=self.scene.brake, size=self.size, biased=self.biased)
+        one = error_sensitivity(chosen, reference=self.scene.brake, size=self.size, biased=self.biased)
         return {
-            "size_psi": rung.size,
-            "mse_psi2": rung.mse,
-            "distance": rung.distance,
-            "time": rung.time,
-            "force": rung.force,
+            "size_psi": one.size,
+            "mse_psi2": one.mse,
+            "distance": one.distance,
+            "time": one.time,
+            "force": one.force,
         }

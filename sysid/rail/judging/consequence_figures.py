@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sysid.rail.judging.judge import Rung, tolerable_mse
+from sysid.rail.judging.judge import ErrorSensitivity, tolerable_mse
 
 Results = Mapping[str, Mapping[str, Any]]
 """By scenario: a difference with its speed traces, or why there is none."""
@@ -54,7 +54,7 @@ def consequence_document(
     speed: float,
     limit: float,
     judged: Mapping[str, Results],
-    ladders: Mapping[str, Sequence[Mapping[str, float]]],
+    sensitivities: Mapping[str, Sequence[Mapping[str, float]]],
 ) -> dict[str, Any]:
     """All figures.
 
@@ -63,7 +63,7 @@ def consequence_document(
         speed: At the beginning of a stop in km/h.
         limit: Relative consequence in percent that is asked for.
         judged: Results by subject and scenario.
-        ladders: Artificial errors by kind, rising.
+        sensitivities: Artificial errors by kind, rising.
 
     Returns:
         JSON values, as a report of judgements reads them.
@@ -96,7 +96,7 @@ def consequence_document(
         "subjects": {
             subject: {name: _scene(result) for name, result in results.items()} for subject, results in judged.items()
         },
-        "sensitivity": [_sensitivity(kind, rows, limit) for kind, rows in ladders.items()],
+        "sensitivity": [_sensitivity(kind, rows, limit) for kind, rows in sensitivities.items()],
     }
 
 
@@ -126,8 +126,10 @@ def _curve(trace: Mapping[str, list[float]]) -> dict[str, list[float]]:
 
 
 def _sensitivity(kind: str, rows: Sequence[Mapping[str, float]], limit: float) -> dict[str, Any]:
-    rungs = [
-        Rung(size=row["size_psi"], mse=row["mse_psi2"], distance=row["distance"], time=row["time"], force=row["force"])
+    series = [
+        ErrorSensitivity(
+            size=row["size_psi"], mse=row["mse_psi2"], distance=row["distance"], time=row["time"], force=row["force"]
+        )
         for row in rows
     ]
     return {
@@ -136,14 +138,14 @@ def _sensitivity(kind: str, rows: Sequence[Mapping[str, float]], limit: float) -
         "unit": "psi",
         "steps": [
             {
-                "size": rung.size,
-                "error": rung.mse,
-                "differences": {key: 100.0 * float(getattr(rung, _figure(key))) for key in LIMITED},
+                "size": one.size,
+                "error": one.mse,
+                "differences": {key: 100.0 * float(getattr(one, _figure(key))) for key in LIMITED},
             }
-            for rung in rungs
+            for one in series
         ],
         "tolerances": [
-            _tolerance(key, tolerable_mse(rungs, figure=_figure(key), limit=limit / 100.0)) for key in LIMITED
+            _tolerance(key, tolerable_mse(series, figure=_figure(key), limit=limit / 100.0)) for key in LIMITED
         ],
     }
 
@@ -154,5 +156,5 @@ def _tolerance(key: str, mse: float) -> dict[str, Any]:
 
 
 def _figure(key: str) -> str:
-    """What a rung calls a relative difference."""
+    """What a sensitivity calls a relative difference."""
     return key.removesuffix("_percent")

@@ -123,8 +123,8 @@ class ErringBrake(AbstractBrake):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rung:
-    """What an error of one size does, in the worst of some scenarios.
+class ErrorSensitivity:
+    """What an artificial error of one size does, in the worst of some scenarios.
 
     Args:
         size: Of the error in psi.
@@ -141,9 +141,9 @@ class Rung:
     force: float
 
 
-def error_rung(
+def error_sensitivity(
     scenarios: Mapping[str, Scenario], *, reference: MakeBrake, size: float, biased: bool = True, seed: int = 0
-) -> Rung:
+) -> ErrorSensitivity:
     """Run scenarios with a brake that errs by so much.
 
     Args:
@@ -161,7 +161,7 @@ def error_rung(
     """
     error = {"bias": size} if biased else {"noise": size}
     comparison = compare(scenarios, reference=reference, other=lambda: ErringBrake(reference(), **error, seed=seed))
-    return Rung(
+    return ErrorSensitivity(
         size=size,
         mse=float(np.mean([difference.mse for difference in comparison.differences.values()])),
         distance=comparison.worst("distance"),
@@ -170,30 +170,30 @@ def error_rung(
     )
 
 
-def tolerable_mse(ladder: Sequence[Rung], *, figure: str = "distance", limit: float = 0.01) -> float:
+def tolerable_mse(series: Sequence[ErrorSensitivity], *, figure: str = "distance", limit: float = 0.01) -> float:
     """At what mean square error a consequence passes a limit.
 
     Args:
-        ladder: Rungs with rising errors.
+        series: By rising error.
         figure: ``distance``, ``time`` or ``force``.
         limit: Of its relative difference.
 
     Returns:
-        In psi2, between the last rung up to which all are within the limit and the next, in proportion on logarithmic
-        scales; NaN if the first rung is beyond it, infinite if none is.
+        In psi2, between the last error up to which all are within the limit and the next, in proportion on logarithmic
+        scales; NaN if the first is beyond it, infinite if none is.
 
     Example:
-        >>> rungs = [Rung(size=s, mse=s * s, distance=0.002 * s, time=0.0, force=0.0) for s in (1.0, 10.0)]
-        >>> tolerable_mse(rungs), tolerable_mse(rungs, figure="time")
+        >>> series = [ErrorSensitivity(size=s, mse=s * s, distance=0.002 * s, time=0.0, force=0.0) for s in (1.0, 10.0)]
+        >>> tolerable_mse(series), tolerable_mse(series, figure="time")
         (25.0, inf)
     """
-    worst = [float(getattr(rung, figure)) for rung in ladder]
+    worst = [float(getattr(one, figure)) for one in series]
     beyond = next((k for k, value in enumerate(worst) if value > limit), None)
     if beyond is None:
         return float("inf")
     if beyond == 0:
         return float("nan")
-    (low, high), (a, b) = worst[beyond - 1 : beyond + 1], (ladder[beyond - 1].mse, ladder[beyond].mse)
+    (low, high), (a, b) = worst[beyond - 1 : beyond + 1], (series[beyond - 1].mse, series[beyond].mse)
     if low <= 0.0:
         return a
     share = np.log(limit / low) / np.log(high / low)

@@ -23,8 +23,8 @@ from sysid.workbench.auto.table import table_of_front
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data
+from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
 from sysid.workbench.fits.outputs import FitModel, models_of
-from sysid.workbench.fits.run import FitSteps, GivenFit
 from sysid.workbench.fits.table import table_of_fits
 from sysid.workbench.runner import events
 from sysid.workbench.runner.program import Closing, Program, carry_out

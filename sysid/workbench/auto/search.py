@@ -19,7 +19,7 @@ from sysid.workbench.auto.trials import Trials
 from sysid.workbench.auto.words import Choice, choose, sentence
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
-from sysid.workbench.fits.run import GivenFit
+from sysid.workbench.fits.fit_steps import GivenFit
 from sysid.workbench.runner import events
 from sysid.workbench.runner.run import Run
 from sysid.workbench.sweep.checks import Checks

@@ -19,8 +19,9 @@ from pydantic import (
 
 from sysid.content import content_folders, nearest_file, nearest_name
 from sysid.errors import ConfigError
-from sysid.estimation.estimators import Options, estimator_of
+from sysid.estimation.estimator import Options
 from sysid.estimation.estimators import check as check_request
+from sysid.estimation.estimators import estimator_of
 from sysid.models import Start, StartKind
 from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig

@@ -15,7 +15,7 @@ from sysid.estimation.estimators import estimator_of, with_stability
 from sysid.estimation.networks.choosing import VETTED
 from sysid.reporting.sweep_record import Trial
 from sysid.traces import Role
-from sysid.workbench.fits.run import GivenFit
+from sysid.workbench.fits.fit_steps import GivenFit
 from sysid.workbench.runner.steps import Work
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.driver import Driver

@@ -13,7 +13,8 @@ from pydantic import BaseModel
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training
-from sysid.estimation.estimators import ESTIMATORS, Estimator
+from sysid.estimation.estimator import Estimator
+from sysid.estimation.estimators import ESTIMATORS
 from sysid.models import AbstractStructure
 from sysid.models.ranges import WORD, AbstractRange, declared_ranges, parse_range
 from sysid.workbench.fields import StructureField, given_options, options_of

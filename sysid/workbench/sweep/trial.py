@@ -14,7 +14,8 @@ from threadpoolctl import threadpool_limits
 
 from sysid.errors import SysidError
 from sysid.estimation import FitProgress, FitResult, StabilityOptions, Training, estimators
-from sysid.estimation.estimators import ESTIMATORS, Estimator, Options, estimator_of
+from sysid.estimation.estimator import Estimator, Options
+from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch
 from sysid.models import AbstractModel, Start, beginning

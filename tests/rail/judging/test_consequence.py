@@ -93,7 +93,7 @@ def test_how_large_an_error_may_be_is_told_apart(consequences: tuple[float, ...]
         {"size_psi": size, "mse_psi2": size**2, "distance": percent / 100.0, "time": 0.0, "force": 0.0}
         for size, percent in zip((1.0, 10.0), consequences, strict=True)
     ]
-    document = consequence_document(train="t", speed=80.0, limit=1.0, judged={}, ladders={"bias": rows})
+    document = consequence_document(train="t", speed=80.0, limit=1.0, judged={}, sensitivities={"bias": rows})
     found = {one["quantity"]: one for one in document["sensitivity"][0]["tolerances"]}
     assert found["distance_percent"]["reached"] == reached
     assert found["time_percent"]["reached"] == "within"

@@ -17,7 +17,14 @@ from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train, heavy_haul
 from sysid.rail.dynamics.vehicle import Davis, Rigging, Shoe, Vehicle
 from sysid.rail.end_of_train.tail_unit import TwoEndedBrake
-from sysid.rail.judging.judge import ErringBrake, Rung, compare, cylinder_mse, error_rung, tolerable_mse
+from sysid.rail.judging.judge import (
+    ErringBrake,
+    ErrorSensitivity,
+    compare,
+    cylinder_mse,
+    error_sensitivity,
+    tolerable_mse,
+)
 from sysid.rail.judging.scenario_catalogue import standard_scenarios
 from sysid.rail.judging.scenarios import Consequence, Scenario, consequence
 from sysid.units import PSI_IN_PA
@@ -156,18 +163,18 @@ def test_noise_has_the_spread_asked_for_and_comes_from_its_seed() -> None:
 
 
 def test_the_tolerable_error_is_where_the_consequence_passes_the_limit() -> None:
-    ladder = [error_rung(TWO, reference=reference, size=size) for size in (0.1, 0.4, 1.6, 6.4)]
-    worst = [rung.distance for rung in ladder]
+    series = [error_sensitivity(TWO, reference=reference, size=size) for size in (0.1, 0.4, 1.6, 6.4)]
+    worst = [one.distance for one in series]
     assert worst == sorted(worst)
     assert worst[0] < 0.01 < worst[-1]
-    found = tolerable_mse(ladder)
-    assert max(r.mse for r in ladder if r.distance <= 0.01) <= found <= min(r.mse for r in ladder if r.distance > 0.01)
+    found = tolerable_mse(series)
+    assert max(r.mse for r in series if r.distance <= 0.01) <= found <= min(r.mse for r in series if r.distance > 0.01)
 
 
 def test_where_no_error_or_every_error_is_tolerable_that_is_said() -> None:
-    rung = Rung(size=1.0, mse=1.0, distance=0.02, time=0.0, force=0.5)
-    assert math.isnan(tolerable_mse([rung]))
-    assert tolerable_mse([rung], figure="time") == math.inf
+    one = ErrorSensitivity(size=1.0, mse=1.0, distance=0.02, time=0.0, force=0.5)
+    assert math.isnan(tolerable_mse([one]))
+    assert tolerable_mse([one], figure="time") == math.inf
 
 
 def test_the_mean_square_error_is_over_the_braked_vehicles() -> None:

@@ -16,7 +16,8 @@ from sysid.reporting.assembly.tables import (
     stage_table,
     time_table,
 )
-from sysid.reporting.tables import Table, export_table
+from sysid.reporting.fit_tables import export_table
+from sysid.reporting.tables import Table
 
 
 def values(table: Table | None) -> list[list[Any]]:

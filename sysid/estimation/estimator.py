@@ -1,0 +1,242 @@
+"""One row of the table of estimators: how a kind of structure is fitted, what it takes, how its fits are checked."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from sysid.errors import ConfigError
+from sysid.estimation.equilibrium import equilibrium_notes
+from sysid.estimation.experiment import Experiment
+from sysid.estimation.linear.polynomial.fit import PolynomialTraining
+from sysid.estimation.linear.state_space.search import StateSpaceTraining
+from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.linear_posteriors import LinearPosterior
+from sysid.estimation.networks.joint import JointTraining
+from sysid.estimation.networks.posterior import calibrate
+from sysid.estimation.networks.training import Training
+from sysid.estimation.record_notes import acts_at_once, undetermined
+from sysid.estimation.result import FitResult
+from sysid.estimation.stability.check import (
+    AbstractStabilityCheck,
+    FreeRunCheck,
+    NoCheck,
+    StabilityOptions,
+)
+from sysid.models import (
+    AbstractStructure,
+    Mapping,
+    Start,
+)
+from sysid.traces import Trace
+
+Options = Training | JointTraining | TransferFunctionTraining | StateSpaceTraining | PolynomialTraining
+"""What some estimator takes."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimator:
+    """One row of the table.
+
+    Args:
+        structure: The class of the structures that it fits.
+        name: What people call them, with an article.
+        fit: Fits one: a function of traces, mapping, structure and, where there are options, those; and by name of
+            ``start``, ``rest_output`` and as many of ``selection``, ``initial``, ``vet``, ``resume``,
+            ``on_checkpoint`` and ``on_progress`` as it knows.
+        training: The class of its options; ``None`` where there is nothing to choose.
+        check_training: Refuses options of that class that do not apply.
+        initial: Refuses an initial fit that it cannot start from, from the two structures and the number of inputs;
+            ``None`` where it takes none.
+        begins: Where a fit begins that takes no initial one.
+        stability: How the stability of its fits is checked.
+        posterior: What its fits' covariance says of the output; ``None`` where the estimator gives a posterior itself.
+        no_posterior: Why a fit may have none.
+        joins: Whether its models can be members of a whole that are trained together.
+        of_residuals: What a reader of its residuals should know; empty for nothing.
+        starts: Starts of a network's fit that asks for none.
+    """
+
+    structure: type[AbstractStructure]
+    name: str
+    fit: Callable[..., FitResult]
+    training: type[Options] | None = None
+    check_training: Callable[[Any], None] = lambda _: None
+    initial: Callable[[AbstractStructure, AbstractStructure, int], None] | None = None
+    begins: str = ""
+    stability: type[AbstractStabilityCheck] = FreeRunCheck
+    posterior: LinearPosterior | None = None
+    no_posterior: str = ""
+    joins: bool = False
+    of_residuals: str = ""
+    starts: int = 1
+
+    @cached_property
+    def knows(self) -> frozenset[str]:
+        """Names of the arguments that its function takes."""
+        return frozenset(inspect.signature(self.fit).parameters)
+
+    @property
+    def linear(self) -> bool:
+        """Whether its models are linear: they have poles and frequency responses."""
+        return self.stability.by_poles
+
+    @property
+    def selects(self) -> bool:
+        """Whether selection traces have a say in the fit."""
+        return "selection" in self.knows
+
+    def chooses(self, training: Options | None) -> bool:
+        """Whether its fit chooses between several starts.
+
+        Args:
+            training: The options that are asked for.
+
+        Returns:
+            Whether it does.
+        """
+        return (getattr(training, "starts", None) or self.starts) > 1
+
+    @property
+    def resumes(self) -> bool:
+        """Whether it goes on from a checkpoint, so that it can be trained piece by piece."""
+        return "resume" in self.knows
+
+    @property
+    def runs(self) -> tuple[Callable[..., Any], type[AbstractStabilityCheck]]:
+        """The code that a fit depends on: of all rows only this one's."""
+        return (self.fit, self.stability)
+
+    @property
+    def kind(self) -> str:
+        """The structure's kind, as files name it."""
+        return self.structure.kind
+
+    def options(self, given: Dict[str, Any] | None, *, seed: int) -> Options | None:
+        """Its options from those that are given, by name.
+
+        Args:
+            given: The options; a seed among them counts.
+            seed: The seed where none is among them.
+
+        Returns:
+            The options; ``None`` where it takes none.
+
+        Raises:
+            ConfigError: If there are options where there is nothing to choose, or one does not apply.
+        """
+        if self.training is None:
+            if given is not None:
+                raise self.takes_none(given)
+            return None
+        options = self.training(**{"seed": seed, **(given or {})})
+        self.check_training(options)
+        return options
+
+    def check(
+        self, training: object, initial: AbstractStructure | None, structure: AbstractStructure, mapping: Mapping
+    ) -> None:
+        """Refuse what does not go together; see :func:`check`."""
+        structure.check_mapping(mapping)
+        if training is not None:
+            if self.training is None:
+                raise self.takes_none(training)
+            if not isinstance(training, self.training):
+                raise ConfigError(
+                    f"{self.name} takes other options",
+                    where="training",
+                    expected=self.training.__name__,
+                    got=type(training).__name__,
+                    remedy=f"give it a {self.training.__name__}, or leave training out",
+                )
+            self.check_training(training)
+        if initial is not None:
+            if self.initial is None:
+                raise ConfigError(
+                    f"{self.name} takes no initial fit",
+                    where="initial",
+                    expected=f"none: {self.begins}",
+                    got=initial.label,
+                    remedy="leave initial out",
+                )
+            self.initial(structure, initial, len(mapping.inputs))
+
+    def run(
+        self,
+        traces: Sequence[Trace],
+        mapping: Mapping,
+        structure: AbstractStructure,
+        training: Options | None,
+        stability: StabilityOptions | None,
+        **given: Any,
+    ) -> FitResult:
+        """Fit and check; see :func:`fit`.
+
+        Args:
+            traces: Estimation traces.
+            mapping: Which channels go in, which comes out.
+            structure: What is fitted.
+            training: Its options; ``None`` for the defaults.
+            stability: How the free run is checked; ``None`` checks nothing.
+            given: What else a fit may be given, by name.
+
+        Returns:
+            The fit.
+        """
+        options = self.options(None, seed=0) if training is None else training
+        checked = NoCheck() if stability is None else self.stability.of(stability, mapping, traces)
+        chosen = () if self.training is None else (options,)
+        known = {name: value for name, value in given.items() if name in self.knows}
+
+        def noted(*args: Any, **named: Any) -> FitResult:
+            """The fit with what its records say of how they begin, before what its check says."""
+            found = self.fit(*args, **named)
+            found = self.with_posterior(found, traces, named["start"], given.get("selection", ()))
+            told = () if found.posterior is not None else (f"No interval of the output: {self.no_posterior}.",)
+            off = equilibrium_notes(found.model, traces, named["start"])
+            late = acts_at_once(found.model, traces, named["start"])
+            warned = (*undetermined(traces, mapping), *late, *off)
+            return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
+
+        return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
+
+    def with_posterior(
+        self, fit: FitResult, traces: Sequence[Trace], start: Start, selection: Sequence[Trace]
+    ) -> FitResult:
+        """A fit with the posterior that follows from what its estimator knows of its parameters.
+
+        Args:
+            fit: The fit.
+            traces: Estimation traces.
+            start: What stands before each.
+            selection: Traces that widen its intervals to the errors on them.
+
+        Returns:
+            The fit; as it is where its estimator gives a posterior itself, or there is none.
+        """
+        found = None if self.posterior is None else self.posterior(fit, traces, start)
+        if found is None:
+            return fit
+        others = [Experiment.for_model(trace, fit.model, start) for trace in selection]
+        return replace(fit, posterior=calibrate(found, fit.model, others))
+
+    def takes_none(self, training: object) -> ConfigError:
+        """The refusal of options where there is nothing to choose.
+
+        Args:
+            training: What was given.
+
+        Returns:
+            The error.
+        """
+        return ConfigError(
+            f"{self.name} takes no training",
+            where="training",
+            expected="none: least squares has nothing to choose",
+            got=", ".join(training) or "an empty one" if isinstance(training, Dict) else type(training).__name__,
+            remedy="leave training out",
+        )
