@@ -23,6 +23,9 @@ MOST_SAMPLES = 20_000
 """Samples of a record that are looked at: more would not make the finding any surer."""
 LEAST_ERROR = 1e-2
 """Part of the output's standard deviation that the error must have to be worth an explanation."""
+MOST_TRACES = 20
+WORSE = 1.1
+"""Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt."""
 SHARE, SURE = 0.2, 1e-6
 """Part of the error that an input of the same sample must explain, and how improbable that is by chance."""
 
@@ -113,6 +116,41 @@ def acts_at_once(model: AbstractModel, traces: Sequence[Trace], start: Start) ->
                     f"{name} acts at once, which this model leaves out (give it the lag 0: nk: 0, delays: 0, "
                     f"input_delays from 0, feedthrough: true), or {name} is fed back from {target}."
                 )
+    return tuple(told)
+
+
+def worse_than_constant(model: AbstractModel, traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
+    """Whether a constant would have done better than the free run, over the very records that were fitted.
+
+    Args:
+        model: The fitted model.
+        traces: The records that it was fitted to; the first so many are looked at.
+        start: What stands before each.
+
+    Returns:
+        One sentence for each such output; none where it does not move.
+    """
+    measured, simulated = [], []
+    for trace in traces[:MOST_TRACES]:
+        inputs, output, usable = trace.columns(model.mapping.inputs), model.measured(trace), trace.usable_samples
+        begun = beginning(model, inputs, output, start, usable)
+        window = slice(begun.first, begun.first + MOST_SAMPLES)
+        free = model.simulate(inputs[window], begun.history)
+        measured.append(output[window][usable[window]].reshape(-1, len(model.mapping.outputs)))
+        simulated.append(free[usable[window]].reshape(-1, len(model.mapping.outputs)))
+    y, free = np.concatenate(measured), np.concatenate(simulated)
+    told = []
+    for i, name in enumerate(model.mapping.outputs):
+        if len(y) < LEAST_SAMPLES or _still(y[:, i]):
+            continue
+        with np.errstate(over="ignore", invalid="ignore"):
+            ratio = float(np.mean((free[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
+        if not ratio <= WORSE:
+            fit = f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %" if np.isfinite(ratio) else "it diverges"
+            told.append(
+                f"Over the records that were fitted the free run of {name} is worse than a constant ({fit}). Try other "
+                f"orders, a fit of the free run (loop: closed, noise: false, OE) or more iterations."
+            )
     return tuple(told)
 
 

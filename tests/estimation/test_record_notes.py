@@ -9,6 +9,8 @@ import pytest
 
 import sysid
 from sysid.errors import UserError
+from sysid.estimation.record_notes import worse_than_constant
+from sysid.models import Start
 
 N = 400
 STRUCTURES = [
@@ -87,3 +89,15 @@ def test_a_constant_output_is_told_and_no_number_overflows(structure: object, le
             assert "y" in str(refused)
             return
     assert "y never changes in these records: they say nothing of a response to any input." in fit.warnings
+
+
+def test_a_free_run_that_a_constant_beats_is_told() -> None:
+    u = _u()
+    y = _y(u, dead=1)
+    fit = _fit(u, y, sysid.ARX(na=1, nb=1, nk=1))
+    assert not [note for note in fit.warnings if "worse than a constant" in note]
+    (other_way,) = sysid.data((u, -y), sample_time=1.0)
+    (told,) = worse_than_constant(fit.model, [other_way], Start())
+    assert told.startswith("Over the records that were fitted the free run of y is worse than a constant")
+    (as_it_is,) = sysid.data((u, y), sample_time=1.0)
+    assert worse_than_constant(fit.model, [as_it_is], Start()) == ()
