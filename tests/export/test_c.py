@@ -120,22 +120,33 @@ def test_a_program_around_it_gets_what_the_model_gives(*, sources, inputs, name,
     np.testing.assert_allclose(rows[:, :-1], surrogate.simulate(u), rtol=0.0, atol=tolerance)
 
 
-def test_tanh_is_libms_within_a_few_units_in_the_last_place(sources, tmp_path):
+NUMBERS = {
+    "double": ([], "nextafter((double)fabsl(exact), 2.0) - (double)fabsl(exact)", 5.0),
+    "float": (["-D{P}_FLOAT"], "nextafterf((float)fabsl(exact), 2.0f) - (float)fabsl(exact)", 5.0),
+}
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_tanh_is_libms_within_a_few_units_in_the_last_place(*, sources, number, tmp_path):
     surrogate, folder = sources["NARX 4/4/20"]
+    flags, unit, most = NUMBERS[number]
+    smallest = 390 if number == "float" else 4000
     (tmp_path / "main.c").write_text(
         f"""
         #include "{folder}/{surrogate.identifier}.c"
         #include <stdio.h>
         int main(void)
         {{
-            double worst = 0.0, x;
+            double worst = 0.0;
+            real x;
             long i;
             for (i = 0; i < 2000000; i++) {{
-                x = i % 2 ? 1e-5 * (double)i - 10.0 : pow(10.0, -(double)(i % 4000) / 13.0) * (1.0 + (double)i * 4e-7);
-                if (x > 20.0) x = 20.0;
+                x = (real)(i % 2 ? 1e-5 * (double)i - 10.0
+                    : pow(10.0, -(double)(i % {smallest}) / 13.0) * (1.0 + (double)i * 4e-7));
+                if (x > R(20.0)) x = R(20.0);
                 {{
                     const long double exact = tanhl((long double)x);
-                    const double unit = nextafter((double)fabsl(exact), 2.0) - (double)fabsl(exact);
+                    const double unit = (double)({unit});
                     const double off = (double)(fabsl((long double)tanh_near(x) - exact) / unit);
                     if (off > worst) worst = off;
                 }}
@@ -145,13 +156,15 @@ def test_tanh_is_libms_within_a_few_units_in_the_last_place(sources, tmp_path):
         }}
         """
     )
-    subprocess.run(["gcc", "-std=c99", "-O2", "main.c", "-o", "run", "-lm"], cwd=tmp_path, check=True)
+    command = ["gcc", "-std=c99", "-O2", *(flag.format(P=surrogate.identifier.upper()) for flag in flags), "main.c"]
+    subprocess.run([*command, "-o", "run", "-lm"], cwd=tmp_path, check=True)
     worst, one, lost = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True).stdout.split()
-    assert 0.5 <= float(worst) <= 5.0
+    assert 0.5 <= float(worst) <= most
     assert (one, lost) == ("1", "1")
 
 
-def test_neurons_side_by_side_are_what_each_is_alone(sources, tmp_path):
+@pytest.mark.parametrize("number", NUMBERS)
+def test_neurons_side_by_side_are_what_each_is_alone(*, sources, number, tmp_path):
     surrogate, folder = sources["NARX 4/4/20"]
     (tmp_path / "main.c").write_text(
         f"""
@@ -162,16 +175,16 @@ def test_neurons_side_by_side_are_what_each_is_alone(sources, tmp_path):
         #endif
         int main(void)
         {{
-            double layer[7];
+            real layer[7];
             long i, different = 0;
             int k;
             for (i = 0; i < 100000; i++) {{
-                for (k = 0; k < 7; k++) layer[k] = (k - 3.3) * 1e-4 * (double)i;
-                layer[i % 7] = i % 3 ? 1e-300 : NAN;
+                for (k = 0; k < 7; k++) layer[k] = (real)((k - 3.3) * 1e-4 * (double)i);
+                layer[i % 7] = (real)(i % 3 ? 1e-30 : NAN);
                 activate(layer, 7);
                 for (k = 0; k < 7; k++) {{
-                    double x = k == i % 7 ? (i % 3 ? 1e-300 : NAN) : (k - 3.3) * 1e-4 * (double)i;
-                    x = x > 20.0 ? 20.0 : x < -20.0 ? -20.0 : x;
+                    real x = (real)(k == i % 7 ? (i % 3 ? 1e-30 : NAN) : (k - 3.3) * 1e-4 * (double)i);
+                    x = x > R(20.0) ? R(20.0) : x < R(-20.0) ? R(-20.0) : x;
                     x = tanh_near(x);
                     different += x == x ? layer[k] != x : layer[k] == layer[k];
                 }}
@@ -181,7 +194,8 @@ def test_neurons_side_by_side_are_what_each_is_alone(sources, tmp_path):
         }}
         """
     )
-    subprocess.run(["gcc", "-std=c99", "-O2", "main.c", "-o", "run", "-lm"], cwd=tmp_path, check=True)
+    flags = [flag.format(P=surrogate.identifier.upper()) for flag in NUMBERS[number][0]]
+    subprocess.run(["gcc", "-std=c99", "-O2", *flags, "main.c", "-o", "run", "-lm"], cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["0", "1"]
 
@@ -189,7 +203,7 @@ def test_neurons_side_by_side_are_what_each_is_alone(sources, tmp_path):
 def test_parameters_are_written_to_the_last_bit(sources):
     surrogate, folder = sources["NARX 4/4/20"]
     text = (folder / f"{surrogate.identifier}.c").read_text()
-    written = {float(number) for number in re.findall(r"R\(([^)]+)\)", text) if number[0] in "-0123456789"}
+    written = {float(number) for number in re.findall(r"R\(([-+.e0-9]+)\)", text)}
     form = LaggedForm.of(surrogate.stages[0].model)
     incremental = IncrementalForm.of(form)
     numbers = (incremental.hidden_weights, incremental.linear, form.hidden_bias, form.readout, form.constant)
