@@ -49,7 +49,7 @@ def _linear_enough(linearity: LinearityRecord) -> Section:
     if linearity.rows:
         rows = tuple(
             (
-                Cell(text=row.amplitude, header=True, below=", ".join(row.cases)),
+                Cell(text=f"{row.output}, {row.amplitude}".lstrip(", "), header=True, below=", ".join(row.cases)),
                 Cell(text=row.linear),
                 figure_cell(row.linear_fit),
                 Cell(text=row.network),

@@ -250,6 +250,7 @@ class AmplitudeRecord(Record):
     linear_fit: Number = Field(description="That free-run fit in percent.")
     network: str = Field(description="Name of the network with the highest mean fit over these cases.")
     network_fit: Number = Field(description="That free-run fit in percent.")
+    output: str = Field(default="", description="Which output it is about, where there are several.")
 
 
 class OrderRow(Record):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,10 @@ class Answer(enum.Enum):
     UNKNOWN = "No answer: it takes a linear model, a network, and cases that neither was chosen on."
 
 
+WORST_FIRST = (Answer.NETWORK, Answer.NEITHER, Answer.UNKNOWN, Answer.LINEAR)
+"""What the verdict on an output makes of the one on all."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class AmplitudeRow:
     """The best of both kinds at one amplitude.
@@ -58,6 +62,7 @@ class AmplitudeRow:
         linear_fit: That fit in percent.
         network: Name of the network with the highest mean fit over these cases.
         network_fit: That fit in percent.
+        output: Which output it is about, where there are several.
     """
 
     amplitude: Amplitude
@@ -66,6 +71,7 @@ class AmplitudeRow:
     linear_fit: float
     network: str
     network_fit: float
+    output: str = ""
 
     @property
     def good(self) -> bool:
@@ -86,7 +92,7 @@ class AmplitudeRow:
             "linear_fit": self.linear_fit,
             "network": self.network,
             "network_fit": self.network_fit,
-        }
+        } | ({"output": self.output} if self.output else {})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,16 +100,44 @@ class Linearity:
     """The verdict on a data set.
 
     Args:
-        rows: By amplitude, smallest first; amplitudes without a case are left out.
+        rows: By amplitude, smallest first, output by output; amplitudes without a case are left out.
         answer: The verdict.
+        by_output: The verdict on each output, where there are several.
     """
 
     rows: tuple[AmplitudeRow, ...]
     answer: Answer
+    by_output: Dict[str, Answer] = field(default_factory=dict)
+
+    @classmethod
+    def of_outputs(cls, each: Dict[str, Linearity]) -> Linearity:
+        """The verdict on several outputs: a linear model is enough for the whole where it is for each of them.
+
+        Args:
+            each: By output its verdict.
+
+        Returns:
+            The verdict; of one output the output's.
+        """
+        if len(each) == 1:
+            return next(iter(each.values()))
+        rows = tuple(replace(row, output=output) for output, one in each.items() for row in one.rows)
+        worst = min((one.answer for one in each.values()), key=WORST_FIRST.index, default=Answer.UNKNOWN)
+        return cls(rows=rows, answer=worst, by_output={output: one.answer for output, one in each.items()})
+
+    @property
+    def text(self) -> str:
+        """The verdict in words; of several outputs with those that each sentence is about."""
+        if not self.by_output:
+            return self.answer.value
+        about: dict[Answer, list[str]] = {}
+        for output, answer in self.by_output.items():
+            about.setdefault(answer, []).append(output)
+        return " ".join(f"{', '.join(about[answer])}: {answer.value}" for answer in WORST_FIRST if answer in about)
 
     def to_dict(self) -> dict[str, Any]:
         """The verdict as JSON values."""
-        return {"answer": self.answer.name, "text": self.answer.value, "rows": [row.to_dict() for row in self.rows]}
+        return {"answer": self.answer.name, "text": self.text, "rows": [row.to_dict() for row in self.rows]}
 
 
 def judge_linearity(linear: Dict[str, Evaluation], networks: Dict[str, Evaluation]) -> Linearity:

@@ -7,7 +7,7 @@ import pytest
 
 from sysid.traces import Role
 from sysid.validation import CaseResult, Evaluation, Figures
-from sysid.validation.linearity import Amplitude, Answer, judge_linearity
+from sysid.validation.linearity import Amplitude, Answer, Linearity, judge_linearity
 
 SPANS = {
     "EST": (60.0, Role.ESTIMATION),
@@ -73,3 +73,16 @@ def test_a_case_that_does_not_vary_has_no_say():
     )
     assert verdict.answer is Answer.LINEAR
     assert "STILL" not in {case for row in verdict.rows for case in row.cases}
+
+
+def test_of_several_outputs_each_has_its_verdict_and_the_whole_that_of_the_worst() -> None:
+    good, bad = evaluation(MIN=99.0, MID=99.0, FULL=99.0), evaluation(MIN=50.0, MID=50.0, FULL=50.0)
+    each = {
+        "y1": judge_linearity({"ARX, y1": good}, {"NARX, y1": good}),
+        "y2": judge_linearity({"ARX, y2": bad}, {"NARX, y2": good}),
+    }
+    verdict = Linearity.of_outputs(each)
+    assert verdict.answer is Answer.NETWORK
+    assert [row.output for row in verdict.rows] == ["y1"] * 3 + ["y2"] * 3
+    assert verdict.text == f"y2: {Answer.NETWORK.value} y1: {Answer.LINEAR.value}"
+    assert Linearity.of_outputs({"y1": each["y1"]}) == each["y1"]

@@ -175,6 +175,46 @@ class Checkpoints:
         self._saved = time.perf_counter()
 
 
+@dataclass(kw_only=True, eq=False)
+class _Part(Checkpoints):
+    """The checkpoints of one of several fits that are kept together: its runs under names of its own.
+
+    Args:
+        whole: Where they are kept.
+        name: What its runs are called after.
+    """
+
+    whole: Checkpoints
+    name: str
+
+    @property
+    def earlier_s(self) -> float:
+        """Seconds that earlier sessions have spent on the runs of this fit."""
+        own = [name for name in self.whole.kept.get("runs", {}) if name.startswith(self._named(""))]
+        return sum(self.whole.spent_s(name) for name in own)
+
+    def minimise(
+        self, name: str, engine: LevenbergMarquardt, provider: AbstractProvider, theta: Any, prior: Prior
+    ) -> Solution:
+        """As the whole does, under its own name."""
+        return self.whole.minimise(self._named(name), engine, provider, theta, prior)
+
+    def resume(self, name: str, engine: LevenbergMarquardt, provider: AbstractProvider, state: State) -> Solution:
+        """As the whole does, under its own name."""
+        return self.whole.resume(self._named(name), engine, provider, state)
+
+    def spent_s(self, name: str) -> float:
+        """As the whole says."""
+        return self.whole.spent_s(self._named(name))
+
+    def flush(self) -> None:
+        """Save where everything stands now."""
+        self.whole.flush()
+
+    def _named(self, name: str) -> str:
+        return f"{self.name}: {name}"
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Watch:
     """Whom a fit tells of its iterations, and where its checkpoints go: passed as ``on_progress``.
@@ -206,3 +246,18 @@ def checkpoints_of(on_progress: Callable[[Any], None]) -> Checkpoints:
         Its checkpoints; such as keep nothing for any other function.
     """
     return on_progress.checkpoints if isinstance(on_progress, Watch) else Checkpoints()
+
+
+def part_of(on_progress: Callable[[Any], None], name: str) -> Callable[[Any], None]:
+    """Whom one of several fits tells, where all of them are kept together.
+
+    Args:
+        on_progress: Whom all of them tell: a :class:`Watch`, or any other function.
+        name: What tells this fit from the others.
+
+    Returns:
+        A watch whose checkpoints are this fit's own; any other function as it is.
+    """
+    if not isinstance(on_progress, Watch):
+        return on_progress
+    return replace(on_progress, checkpoints=_Part(whole=on_progress.checkpoints, name=name))

@@ -9,7 +9,7 @@ from sysid.errors import TraceError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import estimator_of
 from sysid.traces import Role
-from sysid.validation import analyse_residuals, judge_linearity
+from sysid.validation import Linearity, analyse_residuals, judge_linearity
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.events import FitReady
@@ -53,18 +53,26 @@ def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:
         fits: The fits that are ready.
 
     Returns:
-        The verdict as JSON values; ``None`` unless there are linear models and networks that may be compared, and one
-        output.
+        The verdict as JSON values, of several outputs on each; ``None`` unless there are linear models and networks
+        that may be compared.
     """
-    if len({ready.pipeline.mapping for ready in fits}) > 1:
-        return None
-    usable = [ready for ready in fits if ready.fit.status.comparable]
+    usable: dict[str, list[FitReady]] = {}
+    for ready in fits:
+        if ready.fit.status.comparable:
+            usable.setdefault(ready.output, []).append(ready)
+    each = {output: _judged(some) for output, some in usable.items()}
+    found = {output: one for output, one in each.items() if one is not None}
+    return Linearity.of_outputs(found).to_dict() if found else None
+
+
+def _judged(fits: Sequence[FitReady]) -> Linearity | None:
+    """The verdict on one output, where there are models of both kinds."""
     linear, networks = (
         {
             ready.config.name: ready.evaluation
-            for ready in usable
+            for ready in fits
             if estimator_of(ready.fit.model.structure).linear is asked
         }
         for asked in (True, False)
     )
-    return judge_linearity(linear, networks).to_dict() if linear and networks else None
+    return judge_linearity(linear, networks) if linear and networks else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 from rich.text import Text
 
-from sysid.reporting.results import FitRecord, Results
+from sysid.reporting.results import FitRecord, Results, SystemRecord
 
 
 def table_of_fits(results: Results) -> Table:
@@ -20,7 +20,10 @@ def table_of_fits(results: Results) -> Table:
     units = {fit.unit for fit in results.fits}
     unit = f"{units.pop()}²" if len(units) == 1 else "each output's unit, squared"
     # Shown in one power of ten, as publications print them, so that columns compare at a glance.
-    table = Table(title=f"Free run, mean squared error in {unit}", title_justify="left", header_style="bold")
+    title = f"Free run, mean squared error in {unit}" + (
+        "; of a whole, its outputs' mean fit" if results.systems else ""
+    )
+    table = Table(title=title, title_justify="left", header_style="bold")
     table.add_column("fit")
     table.add_column("structure")
     table.add_column("loop")
@@ -30,10 +33,21 @@ def table_of_fits(results: Results) -> Table:
     if results.selection:
         table.add_column("selection", justify="right")
     table.add_column("training", justify="right")
+    whole_after = {list(one.fits.values())[-1]: one for one in results.systems}
     for fit in results.fits:
         best = results.chosen(fit)
         table.add_row(*_row(fit, cases, selection=bool(results.selection)), style="bold" if best else None)
+        whole = whole_after.get(fit.name)
+        if whole is not None:
+            row = _whole(whole, fit, cases, selection=bool(results.selection))
+            table.add_row(*row, style="bold" if best else None, end_section=True)
     return table
+
+
+def _whole(whole: SystemRecord, last: FitRecord, cases: list[str], *, selection: bool) -> list[str]:
+    figures = [f"{whole.cases[case].mean_fit:.2f} %" for case in cases]
+    chosen = [""] if selection else []
+    return [whole.name, whole.label, last.loop.value, *figures, *chosen, f"{whole.train_time_s:.1f} s"]
 
 
 def _row(fit: FitRecord, cases: list[str], *, selection: bool) -> list[str]:

@@ -17,7 +17,7 @@ from sysid.estimation import FitProgress, FitResult, StabilityOptions, Training,
 from sysid.estimation.estimator import Estimator, Options
 from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.estimation.least_squares.checkpoint import Checkpoint
-from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch
+from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, part_of
 from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
@@ -222,8 +222,7 @@ def train(
             stability=_checked(bench, estimator_of(model.fit.structure), training),
             resume=Checkpoint(fields=stood[number]["checkpoint"]) if stood and job.resume else None,
             on_checkpoint=kept.append,
-            # Where a training stands is kept under names that know of one model only.
-            on_progress=on_progress if len(models) == 1 else lambda _: None,
+            on_progress=on_progress if len(models) == 1 else part_of(on_progress, str(model.config.mapping)),
         )
         found.append((result, kept[-1] if kept else None))
     return found

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sysid.estimation import JointTraining, Training, fit_cascade, fit_narx, fit_neural_state_space
-from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, checkpoints_of
-from sysid.models import NARX, NeuralStateSpace
+from sysid.estimation import (
+    JointTraining,
+    Training,
+    fit_cascade,
+    fit_narx,
+    fit_neural_state_space,
+    fit_vector_neural_state_space,
+)
+from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, checkpoints_of, part_of
+from sysid.models import NARX, Mapping, NeuralStateSpace, VectorNeuralStateSpace
+from sysid.traces import Channel, Trace
 from tests.estimation.networks.test_joint_training import disturbed, measured
 from tests.estimation.tank import TANK, tank
 
@@ -28,6 +37,26 @@ def neural(told: Callable[[Any], None]) -> Any:
     training = Training(max_iterations=12, starts=2, workers=1)
     network = NeuralStateSpace(states=2, neurons=2)
     return fit_neural_state_space([tank(1)], TANK, network, training, selection=[tank(2)], on_progress=told)
+
+
+def beside(seed: int) -> Trace:
+    """The tank with a noisy gauge beside it."""
+    trace = tank(seed)
+    gauge = 2.0 * trace["level"] + 0.3 * np.random.default_rng(seed).standard_normal(len(trace))
+    channels = (*trace.channels, Channel(name="gauge", unit="V"))
+    return replace(trace, channels=channels, values=np.column_stack([trace.values, gauge]))
+
+
+def neural_of_two(told: Callable[[Any], None]) -> Any:
+    training = Training(max_iterations=12, starts=2, workers=1)
+    mapping = Mapping(inputs=("pump",), outputs=("level", "gauge"))
+    network = VectorNeuralStateSpace(states=2, neurons=2)
+    return fit_vector_neural_state_space([beside(1)], mapping, network, training, on_progress=told)
+
+
+def one_after_the_other(told: Callable[[Any], None]) -> Any:
+    narx(max_iterations=10)(part_of(told, "first"))
+    return narx(max_iterations=15)(part_of(told, "second"))
 
 
 def cascade(told: Callable[[Any], None]) -> Any:
@@ -47,6 +76,8 @@ FITS = {
     "open loop": narx(loop="open", starts=2, workers=1),
     "without evidence": narx(regularisation=0.0),
     "neural state space": neural,
+    "neural state space of two outputs": neural_of_two,
+    "two fits that are kept together": one_after_the_other,
     "cascade": cascade,
 }
 
@@ -99,3 +130,13 @@ def test_what_ended_is_not_done_again() -> None:
 
 def test_who_only_listens_keeps_nothing() -> None:
     assert checkpoints_of(print).save is None
+    assert part_of(print, "first") is print
+
+
+def test_a_part_has_its_own_time() -> None:
+    """Of fits that are kept together each tells what it took itself."""
+    kept = list[dict[str, Any]]()
+    one_after_the_other(Watch(report=lambda _: None, checkpoints=Checkpoints(save=kept.append, every_s=0.0)))
+    whole = Watch(report=lambda _: None, checkpoints=Checkpoints(kept=kept[-1]))
+    first, second = (checkpoints_of(part_of(whole, name)).earlier_s for name in ("first", "second"))
+    assert 0.0 < first < first + second <= checkpoints_of(whole).earlier_s

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from sysid.estimation.least_squares.checkpoints import Checkpoints
+from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, State
 from sysid.export import read_bundle
+from sysid.traces import Role, TraceSet
 from sysid.workbench.cli import run_cli
 from sysid.workbench.runner.store import RunFolder
 from sysid.workbench.sweep import trial
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.run import Swept, read_sweep_file, run_sweep
 from sysid.workbench.sweep.store import TrialStore
-from sysid.workbench.sweep.trial import Bench
+from sysid.workbench.sweep.trial import Bench, Job, forget_checkpoint
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
+from tests.estimation.least_squares.test_checkpoints import beside
 
 SWEEP = """\
 kind: sweep
@@ -106,3 +109,33 @@ def test_a_killed_sweep_does_no_iteration_and_no_trial_twice(
         assert read_bundle(workspace / f"out {label}").model.structure.label == label
     assert run_cli(["export", "tries", "--fit", "winner"]) == 2
     assert "did you mean sweep winner?" in capsys.readouterr().err
+
+
+def test_a_killed_trial_of_several_outputs_goes_on_with_the_model_it_was_at(tmp_path: Path) -> None:
+    """Of a structure of one output a trial trains one model an output; the first of them is not trained again."""
+    traces = TraceSet(name="tanks", traces=(beside(1),), roles={"tank 1": Role.ESTIMATION}, source="")
+    pipeline = {"name": "p", "data": "tanks", "mapping": "pump -> level+gauge", "fits": [FIT]}
+    bench = Bench(pipeline=pipeline, traces=traces, selection=(), folder=tmp_path)
+    job = Job(key="k" * 64, number=0, structure=FIT["structure"], training={"max_iterations": 6, "seed": 1})
+    told: list[list[Any]] = [[], [], []]
+
+    def watch(session: int, *, fall: int = 10**6) -> Watch:
+        def report(entry: Any) -> None:
+            told[session].append(entry.iteration)
+            if len(told[session]) == fall:
+                raise KilledError
+
+        kept = trial._watch(bench, job).checkpoints
+        kept.every_s = 0.0
+        return Watch(report=report, checkpoints=kept)
+
+    expected = [fit.model.to_dict() for fit, _ in trial.train(replace(bench, folder=None), job, None, watch(0))]
+    forget_checkpoint(bench, job.key)
+    with pytest.raises(KilledError):
+        trial.train(bench, job, None, watch(1, fall=len(told[0]) - 2))
+    assert [fit.model.to_dict() for fit, _ in trial.train(bench, job, None, watch(2))] == expected
+    assert [*told[1], *told[2]] == told[0]
+    assert len(told[2]) == 2
+
+
+FIT = {"name": "NARX", "structure": {"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": 2}}
