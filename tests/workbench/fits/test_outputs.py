@@ -18,6 +18,7 @@ from sysid.reporting.results import Results, read_results
 from sysid.workbench.fits.config import Pipeline, parse_pipeline
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.fits.table import table_of_fits
 from sysid.workbench.runner import events
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.run import Sweep, run_sweep
@@ -113,6 +114,18 @@ def test_the_whole_is_told_beside_its_outputs(results: Results) -> None:
     assert arx.n_parameters == sum(fits[name].n_parameters or 0 for name in arx.fits.values())
     both = [fits[name].cases["run-3"].free_run.nrmse_fit for name in arx.fits.values()]
     assert arx.cases["run-3"].mean_fit == pytest.approx(np.mean(both))
+
+
+def test_the_screen_has_the_whole_below_its_outputs(results: Results) -> None:
+    cells = list(table_of_fits(results).columns[0].cells)
+    assert cells[:3] == ["ARX, level", "ARX, heat", "ARX"]
+    run_3 = list(table_of_fits(results).columns[3 + list(results.data.cases).index("run-3")].cells)
+    assert run_3[2] == f"{results.systems[0].cases['run-3'].mean_fit:.2f} %"
+
+
+def test_whether_linear_is_enough_is_said_of_each_output(results: Results) -> None:
+    assert results.linearity is not None
+    assert {row.output for row in results.linearity.rows} == {"level", "heat"}
 
 
 def test_a_structure_with_several_outputs_is_stored_once(place: Path, results: Results) -> None:
