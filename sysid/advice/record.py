@@ -18,7 +18,9 @@ from sysid.traces import Trace
 
 SEEN = 20_000
 """Samples that dynamics are judged by; of longer records the first ones."""
-LONGEST_RESPONSE = 128
+LONGEST_RESPONSE, LAGS_IN_ALL, LEAST_LAGS = 128, 192, 32
+"""Lags of a response at most, of all inputs together, and of one in any case: the price grows with their third power. A
+response that has not settled then is looked at more slowly."""
 SLOWER, FEWEST_BLOCKS = (4, 16, 64, 256), 200
 """How many times slower a record with a longer response is looked at, and how many samples that must leave."""
 
@@ -57,6 +59,8 @@ class Record:
     @cached_property
     def some(self) -> Record:
         """As much of it as dynamics are judged by, with the inputs that move."""
+        if self.moving == self.mapping.inputs and sum(map(len, self.traces)) <= SEEN:
+            return self
         left, kept = SEEN, []
         for trace in self.traces:
             if left > 0:
@@ -78,8 +82,11 @@ class Record:
             return "no input moves"
         if all(np.ptp(y) == 0.0 for y in self.values(self.mapping.output)):
             return "the output never changes"
+        if self.some is not self:
+            return self.some.impulse
+        longest = min(LONGEST_RESPONSE, max(LEAST_LAGS, LAGS_IN_ALL // len(self.moving)))
         try:
-            return estimate_impulse_response(self.some.traces, self.some.mapping, longest=LONGEST_RESPONSE)
+            return estimate_impulse_response(self.traces, self.mapping, longest=longest)
         except UserError as error:
             return error.what
 

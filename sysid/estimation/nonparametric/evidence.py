@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,11 @@ from scipy import linalg
 
 CHUNK = 2048
 """Rows that are taken into the factor at a time: memory does not grow with the record."""
+
+
+WELL_SCALED, LEFT = 1e8, 1e-4
+"""Largest entry of a matrix of products, and least part of the target that is left: with these, rounding (which is
+squared in products) changes the evidence by less than 1e-8 of itself."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,6 +45,11 @@ class Triangle:
     z: NDArray[np.float64]
     samples: int
 
+    @cached_property
+    def gram(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Products of the columns with each other, with the target, and of the target with itself."""
+        return self.R.T @ self.R, self.R.T @ self.z, float(self.z @ self.z)
+
     def columns(self, kept: NDArray[np.bool_]) -> Triangle:
         """The regression with some of its columns.
 
@@ -48,7 +59,10 @@ class Triangle:
         Returns:
             The regression.
         """
-        return Triangle(R=self.R[:, kept], z=self.z, samples=self.samples)
+        some = Triangle(R=self.R[:, kept], z=self.z, samples=self.samples)
+        both, target, size = self.gram
+        some.__dict__["gram"] = (both[np.ix_(kept, kept)], target[kept], size)
+        return some
 
 
 def triangle(blocks: Iterable[NDArray[np.float64]], *, free: int) -> Triangle:
@@ -127,12 +141,28 @@ def factored(data: Triangle, L: NDArray[np.float64]) -> Factored:
         The factor.
     """
     n = L.shape[1]
+    quick = _from_products(data, L)
+    if quick is not None:
+        return quick
     top = np.column_stack([data.R @ L, data.z])
     stacked = np.concatenate([top, np.eye(n, n + 1)])
     R = linalg.qr(stacked, mode="r", check_finite=False, overwrite_a=True)[0]
     # Of noise-free data the rest is rounding: it must not become an infinite reward.
     floor = np.finfo(np.float64).eps ** 2 * max(float(data.z @ data.z), np.finfo(np.float64).tiny)
     return Factored(R=R[:n, :n], z=R[:n, n], rest=max(float(np.sum(R[n:, n] ** 2)), floor), samples=data.samples)
+
+
+def _from_products(data: Triangle, L: NDArray[np.float64]) -> Factored | None:
+    """The same from products, at a third of the price; ``None`` where rounding would show in them."""
+    both, target, size = data.gram
+    M = L.T @ both @ L
+    if not np.diag(M).max(initial=0.0) < WELL_SCALED:
+        return None
+    M[np.diag_indices_from(M)] += 1.0
+    R = linalg.cholesky(M, overwrite_a=True, check_finite=False)
+    z = linalg.solve_triangular(R, L.T @ target, trans="T", check_finite=False)
+    rest = size - float(z @ z)
+    return Factored(R=R, z=z, rest=rest, samples=data.samples) if rest > LEFT * size else None
 
 
 def posterior(data: Triangle, L: NDArray[np.float64]) -> Posterior:

@@ -240,8 +240,9 @@ class _Search:
         whole = factored(data, L)
         mean = L @ linalg.solve_triangular(whole.R, whole.z, check_finite=False)
         w = data.R.T @ (data.z - data.R @ mean)
-        half = linalg.solve_triangular(whole.R, L.T, trans="T", check_finite=False) @ data.R.T
-        S = data.R.T @ data.R - (half @ data.R).T @ (half @ data.R)
+        both = data.gram[0]
+        half = linalg.solve_triangular(whole.R, L.T @ both, trans="T", check_finite=False)
+        S = both - half.T @ half
         G = 0.5 * (S - np.outer(w, w) * (data.samples / whole.rest))
         return -whole.log_evidence, self._gradient(prior, L, G)
 
