@@ -15,6 +15,7 @@ from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
 from sysid.ingest.description import DatasetDescription, read_description
 from sysid.ingest.generators import Generator, find_generator
 from sysid.ingest.options import FileOptions
+from sysid.ingest.places import checked_file, files_folder
 from sysid.ingest.reading import read_table
 from sysid.traces import Trace, TraceSet
 
@@ -137,7 +138,7 @@ def load_described(
         if generator is not None:
             traces.append(_generated(description, case, generator, store))
         else:
-            traces.append(_read(description, case, path.parent))
+            traces.append(_read(description, case, path))
     return TraceSet(
         name=description.name,
         traces=tuple(traces),
@@ -249,7 +250,8 @@ def _generated(description: DatasetDescription, case: str, generator: Generator,
     return finished
 
 
-def _read(description: DatasetDescription, case: str, folder: Path) -> Trace:
+def _read(description: DatasetDescription, case: str, path: Path) -> Trace:
+    folder = files_folder(description, path)
     source, wish = description.source, description.cases[case]
     files = wish.read_as(source.files or FileOptions())
     wanted = Wanted(
@@ -262,14 +264,14 @@ def _read(description: DatasetDescription, case: str, folder: Path) -> Trace:
     )
     try:
         return assemble(
-            read_table(folder / (wish.file or ""), files=files, repairs=source.repairs),
+            read_table(checked_file(source, wish.file or "", folder), files=files, repairs=source.repairs),
             wanted,
             files=files,
             grid=source.grid,
             repairs=source.repairs,
         )
     except SysidError as error:
-        error.add_note(f"reading case {case} of {folder / DESCRIPTION_FILE}")
+        error.add_note(f"reading case {case} of {path}")
         raise
 
 

@@ -79,6 +79,10 @@ class ChannelDescription(Options):
         )
 
 
+FOR_FILES = {"grid", "repairs", "folder_from", "sha256"}
+"""Fields of a source that only files have."""
+
+
 class SourceDescription(Options):
     """Where the samples come from: a generator, or files on disk.
 
@@ -88,6 +92,9 @@ class SourceDescription(Options):
         files: How the files are read.
         grid: How their samples come onto the grid.
         repairs: Which repairs are asked for.
+        folder_from: Environment variable that names the folder in which the files lie, where they are not to lie beside
+            the description: records that everybody fetches from their owner.
+        sha256: By file, what its content has to be.
     """
 
     generator: str | None = None
@@ -95,6 +102,8 @@ class SourceDescription(Options):
     files: FileOptions | None = None
     grid: GridOptions = GridOptions()
     repairs: RepairOptions = RepairOptions()
+    folder_from: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
+    sha256: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _one_kind(self) -> SourceDescription:
@@ -105,11 +114,11 @@ class SourceDescription(Options):
                 got=", ".join(sorted(self.model_fields_set)) or "nothing",
                 remedy="give one of them; files: {} reads files that say everything themselves",
             )
-        strangers = sorted(self.model_fields_set & ({"grid", "repairs"} if self.generator else {"options"}))
+        strangers = sorted(self.model_fields_set & (FOR_FILES if self.generator else {"options"}))
         if strangers:
             raise FieldError(
                 f"source.{strangers[0]} means nothing here",
-                expected="options with a generator; grid and repairs with files",
+                expected=f"options with a generator; {', '.join(sorted(FOR_FILES))} with files",
                 got=f"{strangers[0]} with {'a generator' if self.generator else 'files'}",
                 remedy=f"remove {strangers[0]}",
             )

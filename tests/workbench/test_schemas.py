@@ -16,7 +16,7 @@ from sysid.workbench.workspace import TEMPLATE
 from sysid.yaml_files import parse_yaml, read_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
-PIPELINES = sorted([*ROOT.glob("pipelines/*.yaml"), *TEMPLATE.glob("pipelines/*.yaml")])
+PIPELINES = sorted([*ROOT.glob("pipelines/**/*.yaml"), *TEMPLATE.glob("pipelines/*.yaml")])
 DATASETS = sorted([*ROOT.glob("datasets/*/dataset.yaml"), *TEMPLATE.glob("datasets/*/dataset.yaml")])
 
 BAD_PIPELINES = {

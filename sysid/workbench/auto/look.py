@@ -17,6 +17,8 @@ from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.parts import ends_held_out
 from sysid.workbench.fits.data import Data
 
+NOISE = 0.02
+"""Share of its largest value by which a channel of one sign may be beyond nought."""
 ARX_TRIED = 3
 """Of the shortlist of an order search."""
 
@@ -70,10 +72,16 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         n_inputs=len(mapping.inputs),
         n_outputs=len(mapping.outputs),
         orders=_orders(data, mapping, start),
-        never_negative=all(float(one[name].min()) >= 0.0 for one in data.estimation for name in mapping.outputs),
+        never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(one.structure for one in advice[0].suggestions) if len(advice) == 1 else (),
         cautions=tuple(_cautions(advice)),
     )
+
+
+def _never_negative(traces: Sequence[Trace], name: str) -> bool:
+    """Whether a channel has one sign, but for what its noise may do about nought."""
+    least, most = min(float(one[name].min()) for one in traces), max(float(one[name].max()) for one in traces)
+    return most > 0.0 and least >= -NOISE * most
 
 
 def _set(data: Data, estimation: Sequence[Trace], selection: Sequence[Trace]) -> TraceSet:

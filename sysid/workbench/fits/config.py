@@ -238,7 +238,7 @@ def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
     """The file of a pipeline.
 
     Args:
-        name_or_path: A built-in or workspace pipeline's name, or a YAML file.
+        name_or_path: A built-in or workspace pipeline's name, in a folder as ``benchmarks/silverbox``; or a YAML file.
         workspace: The user's workspace; ``None`` is the current folder.
 
     Returns:
@@ -247,10 +247,12 @@ def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
     Raises:
         ConfigError: If there is none.
     """
-    given = Path(name_or_path)
+    given, folders = Path(name_or_path), content_folders("pipelines", workspace=workspace)
+    built_in = [folder / f"{name_or_path}.yaml" for folder in folders if not given.is_absolute()]
     if given.suffix in {".yaml", ".yml"} or len(given.parts) > 1:
-        if given.is_file():
-            return given
+        found = next((file for file in (given, *built_in) if file.is_file()), None)
+        if found is not None:
+            return found
         beside = nearest_file(given, {".yaml", ".yml"})
         raise ConfigError(
             "there is no such pipeline file",
@@ -258,7 +260,7 @@ def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
             got=name_or_path,
             remedy=f"did you mean {beside}?" if beside else "check the path",
         )
-    groups = [sorted(folder.glob("*.yaml")) for folder in content_folders("pipelines", workspace=workspace)]
+    groups = [sorted(folder.glob("*.yaml")) for folder in folders]
     known: dict[str, Path] = {}  # one's own first
     for file in (file for group in groups for file in group):
         known.setdefault(file.stem, file)

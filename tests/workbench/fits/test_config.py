@@ -196,3 +196,8 @@ def test_ones_own_pipelines_are_named_first(workspace: Path) -> None:
 def test_the_file_that_was_meant_is_named(workspace: Path) -> None:
     with pytest.raises(ConfigError, match=r"did you mean pipelines/first.yaml"):
         find_pipeline("pipelines/frist.yaml")
+
+
+def test_a_pipeline_in_a_folder_is_found_by_both_names() -> None:
+    found = find_pipeline("benchmarks/silverbox")
+    assert (found.parent.name, found.name) == ("benchmarks", "silverbox.yaml")

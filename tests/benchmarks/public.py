@@ -1,0 +1,106 @@
+"""Public benchmarks by the pipelines of this project: seeds 0, 1 and 2, the median and the spread.
+
+    SYSID_DATA=<folder> python -m tests.benchmarks public [--only=cascaded-tanks,hair-dryer] [--seeds=0,1,2]
+
+Every `pipelines/benchmarks/*.yaml` whose record lies in the folder is run as `sysid run` runs it, once for each seed;
+a record that is not there is left out, and that is told. Nothing of a test record chooses anything: each row says by
+which rule its model was chosen, and what was declared beyond the record. Rows of experts beside them are those of
+`public_neural` and `linear_public`.
+
+Published: Champneys et al., "Baseline results for selected nonlinear system identification benchmarks",
+arXiv 2405.10779, and its references.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+from sysid.content import content_folders
+from sysid.errors import SysidError
+from sysid.ingest.dataset import find_dataset
+from sysid.ingest.description import read_description
+from sysid.reporting.results import Results
+from sysid.workbench.auto.run import Searched
+from sysid.workbench.kinds import RunRequest, kind_of, kinds
+from sysid.workbench.runner.program import carry_out
+from sysid.yaml_files import read_yaml, yaml_text
+from tests.benchmarks._findings import found, read
+
+SOURCE = "Champneys et al. 2024 and its references"
+ROWS: dict[str, dict[str, tuple[str, float, str]]] = {
+    "cascaded-tanks": {"test": ("V", 1.0, "neural 0.306 to 0.396, grey box 0.191 (n = 5)")},
+    "coupled-drives": {
+        "test 1": ("ticks/s", 1.0, "best 0.096 (n = 4)"),
+        "test 2": ("ticks/s", 1.0, "best 0.074 (n = 4)"),
+    },
+    "silverbox": {
+        "multisine test": ("mV", 1e3, "best 0.301"),
+        "arrow": ("mV", 1e3, "best 0.26 (polynomial state space), 0.60"),
+        "arrow without extrapolation": ("mV", 1e3, "best 0.259"),
+    },
+    "hair-dryer": {"test": ("", 1.0, "")},
+}
+"""By pipeline and case: the unit, what it is of ours, and published figures."""
+
+
+def option(name: str, default: list[str]) -> list[str]:
+    given = [argument.split("=")[1].split(",") for argument in sys.argv if argument.startswith(f"--{name}=")]
+    return given[0] if given else default
+
+
+def once(file: Path, seed: int, scratch: Path) -> tuple[Results, str]:
+    """The pipeline run with a seed, without export and page, and the rule by which its model was chosen."""
+    pipeline = {**read_yaml(file), "seed": seed, "export": None}
+    again = scratch / file.name
+    again.write_text(yaml_text(pipeline), encoding="utf-8")
+    request = RunRequest(path=again, typed=file.stem)
+    program = kinds()[kind_of(again)].load_program()(request)
+    ran: Any = carry_out(program, scratch / f"{file.stem}-{seed}", command=f"sysid run benchmarks/{file.stem}")
+    results = ran.results if isinstance(ran, Searched) else ran
+    return results, "" if results.best is None else results.best.chosen_by
+
+
+def benchmark(file: Path, seeds: list[int]) -> None:
+    """Run a pipeline for every seed, and say the median and the spread of each test case."""
+    data = read_description(find_dataset(str(read_yaml(file)["data"])))
+    for name, digest in data.source.sha256.items():
+        read(name, digest)
+    errors: dict[str, list[float]] = {case: [] for case in ROWS[file.stem]}
+    print(f"{data.name}: {read_yaml(file)['description']}")
+    with tempfile.TemporaryDirectory() as scratch:
+        for seed in seeds:
+            began, cpu = time.perf_counter(), time.process_time()
+            results, rule = once(file, seed, Path(scratch))
+            best = next(fit for fit in results.fits if fit.name == results.best_name)
+            for case, values in errors.items():
+                values.append(best.cases[case].free_run.mse ** 0.5)
+            took = f"{time.perf_counter() - began:.0f} s, {time.process_time() - cpu:.0f} s of this process"
+            print(f"  seed {seed}: {best.label}, {took}. {rule}")
+    for case, (unit, scale, published) in ROWS[file.stem].items():
+        values = [scale * value for value in errors[case]]
+        spread = f"seeds {', '.join(map(str, seeds))}: {', '.join(f'{value:.3g}' for value in values)}"
+        known = f"{published} ({SOURCE})" if published else ""
+        found(f"{data.name}, {case}", median(values), unit, published=known, note=f"median; {spread}; nothing declared")
+
+
+def main() -> None:
+    folder = next(one / "benchmarks" for one in content_folders("pipelines") if (one / "benchmarks").is_dir())
+    seeds = [int(seed) for seed in option("seeds", ["0", "1", "2"])]
+    for file in sorted(folder.glob("*.yaml")):
+        if file.stem in option("only", [file.stem]):
+            try:
+                benchmark(file, seeds)
+            except SysidError as error:
+                print(f"{file.stem} is left out: {error}")
+
+
+if __name__ == "__main__":
+    main()
