@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,8 @@ def arx_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Post
     Returns:
         The posterior; ``None`` where the free run grows without bound.
     """
-    model, known = fit.model, fit.uncertainty
-    if known is None or not isinstance(model, ARXModel) or model.pole_radius > 1.0 + GROWTH:
+    model, known = cast("ARXModel", fit.model), fit.uncertainty
+    if known is None or model.pole_radius > 1.0 + GROWTH:
         return None
     n = len(model.coefficients)
     root = _root(known.covariance)
@@ -58,8 +59,8 @@ def transfer_function_posterior(fit: FitResult, traces: Sequence[Trace], start: 
         The posterior; ``None`` where the fit has no covariance, or the free run grows without bound.
     """
     del traces, start
-    model, known = fit.model, fit.uncertainty
-    if known is None or not isinstance(model, TransferFunctionModel) or model.pole_radius > 1.0 + GROWTH:
+    model, known = cast("TransferFunctionModel", fit.model), fit.uncertainty
+    if known is None or model.pole_radius > 1.0 + GROWTH:
         return None
     root, names = _root(known.covariance), _polynomial_names(model)
     factor = np.zeros((len(names), root.shape[1]))

@@ -182,10 +182,10 @@ def export_bundle(
     writers = [exporter(name) for name in usual_formats(formats)]
     source = fit if isinstance(fit, Cascade) else fit.model
     known = dict(fits or {}) if isinstance(fit, Cascade) else {str(fit.model.mapping): fit}
-    start = Start() if start is None or isinstance(fit, Cascade) else start
+    start = Start() if start is None or source.single is None else start
     surrogate = _surrogate(source, traces, outputs)
     cases, sequences = parity_cases(surrogate, traces, start), random_cases(surrogate)
-    stability = None if isinstance(source, Cascade) else check_free_run(source, traces)
+    stability = None if source.single is None else check_free_run(source.single, traces)
     unit = ", ".join(dict.fromkeys(port.unit for port in surrogate.outputs))
     allowed = {"float64": tolerance, "float32": max(tolerance, tolerance_float32)}
     with _published(Path(folder)) as draft:
@@ -259,10 +259,9 @@ def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
 
 
 def _surrogate(source: AbstractModel | Cascade, traces: TraceSet, outputs: Sequence[str] | None) -> Surrogate:
-    models = source.models if isinstance(source, Cascade) else (source,)
-    for model in models:
+    for model in source.models:
         _check_finite(model)
-    inputs = Wiring.of(models).inputs
+    inputs = Wiring.of(source.models).inputs
     return Surrogate.of(source, declared_ranges(inputs, traces), first_inputs(inputs, traces), outputs)
 
 

@@ -12,7 +12,6 @@ from sysid.content import nearest_name
 from sysid.errors import ChannelError, ConfigError
 from sysid.export.bundle import Bundle
 from sysid.ingest import FileOptions, GridOptions, RawTable, RepairOptions, Wanted, assemble, read_table
-from sysid.models import Cascade
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
 
@@ -171,7 +170,7 @@ def _check_there(table: RawTable, wanted: list[Channel], options: InputOptions, 
 
 def _measured(bundle: Bundle, table: RawTable, options: InputOptions) -> Channel | None:
     """The output, where the file has values of it and one model alone is run."""
-    if not options.measured or isinstance(bundle.model, Cascade):
+    if not options.measured or bundle.model.single is None:
         return None
     output = channel_of(bundle.outputs[0])
     given = options.files.columns.get(output.name)

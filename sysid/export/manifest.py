@@ -20,7 +20,7 @@ from sysid.export.parity import Parity, ParityCase
 from sysid.export.stage import Port, Range, Stage
 from sysid.export.surrogate import Surrogate
 from sysid.extras import has
-from sysid.models import Cascade, Start
+from sysid.models import Start
 from sysid.traces import Role, Trace, TraceSet
 from sysid.units import Reference
 
@@ -84,7 +84,7 @@ def describe(
         JSON values; a number that is not finite is ``None``.
     """
     source, estimation = surrogate.source, traces.with_role(Role.ESTIMATION)
-    stored, single = source.to_dict(), not isinstance(source, Cascade)
+    stored, single = source.to_dict(), source.single is not None
     limits = {} if single else stored["limits"]
     stages = [_stage(stage, fits.get(str(stage.model.mapping))) for stage in surrogate.stages]
     manifest = {

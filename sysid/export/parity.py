@@ -17,7 +17,7 @@ from sysid.errors import ParityError
 from sysid.export.exporter import ExportedFile, Runner
 from sysid.export.exporters import exporter
 from sysid.export.surrogate import Surrogate
-from sysid.models import AbstractModel, Cascade, History, Start, beginning
+from sysid.models import AbstractModel, History, Start, beginning
 from sysid.traces import Trace, TraceSet
 
 RANDOM_SEQUENCES = 100
@@ -97,9 +97,10 @@ def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[
         ChannelError: If a trace lacks a channel.
         TraceError: If a trace is not longer than its measured start.
     """
-    if isinstance(surrogate.source, Cascade):
+    model = surrogate.source.single
+    if model is None:
         return tuple(_from_rest(surrogate, trace.name, surrogate.inputs_of(trace)) for trace in traces)
-    return tuple(_from_history(surrogate, surrogate.source, trace, start) for trace in traces)
+    return tuple(_from_history(surrogate, model, trace, start) for trace in traces)
 
 
 def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, start: Start) -> ParityCase:

@@ -16,7 +16,7 @@ from sysid.export.flags import MEANING, Flag, Held, expected_flags, limits_reach
 from sysid.export.inputs import channel_of, check_constants, with_constants
 from sysid.export.reading import read_bundle
 from sysid.export.surrogate import Surrogate
-from sysid.models import Cascade, Start, StartKind, beginning
+from sysid.models import Start, StartKind, beginning
 from sysid.traces import Channel, Trace
 from sysid.validation.metrics import Figures, figures
 
@@ -186,10 +186,10 @@ def _start(bundle: Bundle, given: Trace, targets: list[str], initial: float | No
             "the run cannot begin in two ways", where="initial", expected="initial, or a start from measured samples",
             got=f"initial {initial:g} and start {start.kind.value}", remedy="leave one of them out",
         )  # fmt: skip
-    known = not isinstance(bundle.model, Cascade) and targets[0] in given.channel_names
+    known = bundle.model.single is not None and targets[0] in given.channel_names
     if start is None or start.kind is StartKind.REST:
         return declared_start(bundle) if start is None and initial is None and known else Start()
-    if isinstance(bundle.model, Cascade):
+    if bundle.model.single is None:
         raise ConfigError(
             "several models begin at their declared levels", where="start", expected="rest", got=start.kind.value,
             remedy="leave start out, or give rest",
@@ -220,8 +220,8 @@ def _from_measured(
     bundle: Bundle, given: Trace, inputs: NDArray[np.float64], target: str, start: Start
 ) -> tuple[NDArray[np.float64], int]:
     """The run from measured samples on, behind what the model follows or was told in them; and how many they are."""
-    model = bundle.model
-    assert not isinstance(model, Cascade)  # noqa: S101 - refused before
+    model = bundle.model.single
+    assert model is not None  # noqa: S101 - refused before
     begun = beginning(model, inputs, given[target], start, given.usable_samples)
     run = model.simulate(inputs[begun.first :], begun.history)
     if begun.first:

@@ -21,7 +21,7 @@ from sysid.errors import ConfigError
 from sysid.export.lagged_form import lowered_form
 from sysid.export.layout import DelayLine, HiddenState
 from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
-from sysid.models import AbstractModel, Cascade, History
+from sysid.models import AbstractModel, Cascade
 from sysid.models.form import unheeded
 from sysid.models.wiring import Wiring
 from sysid.names import c_identifier, distinct, written_side
@@ -76,10 +76,7 @@ class Surrogate:
         Raises:
             ConfigError: If a model is of a kind that cannot be written, or an output is not computed.
         """
-        if isinstance(source, Cascade):
-            models, wiring, limits = source.models, source.wiring, source.limits
-        else:
-            models, wiring, limits = (source,), Wiring.of([source]), {}
+        wiring = Wiring.of(source.models)
         wiring = wiring if wiring.inputs else _ticking(wiring)
         ranges, starts = ranges or {}, starts or {}
         identifiers, levels = distinct(wiring.channels, c_identifier), _levels(source, wiring)
@@ -104,13 +101,13 @@ class Surrogate:
             inputs=inputs,
             computed=tuple(computed.values()),
             outputs=tuple(computed[name] for name in names),
-            stages=stages_of(models, wiring, limits, names),
+            stages=stages_of(source.models, wiring, source.limits, names),
         )
 
     @property
     def ticks(self) -> bool:
         """Whether nothing goes into the models, so that its one input says how long to run and is not read."""
-        return not (self.source.inputs if isinstance(self.source, Cascade) else self.source.mapping.inputs)
+        return not self.source.inputs
 
     def inputs_of(self, trace: Trace) -> NDArray[np.float64]:
         """What goes in over a trace.
@@ -278,12 +275,7 @@ class Surrogate:
         inputs = np.asarray(inputs, dtype=np.float64)
         rest = self.rest(inputs[0]) if rest is None else rest
         inputs = inputs[:, :0] if self.ticks else inputs
-        if isinstance(self.source, Cascade):
-            levels = dict(zip(self.source.outputs, map(float, rest), strict=True))
-            return self.source.simulate(inputs, rest=levels).values[:, inputs.shape[1] :]
-        resting = rest if self.source.structure.several_outputs else float(rest[0])
-        run = self.source.simulate(inputs, History.at_rest(inputs=inputs[0], output=resting))
-        return run.reshape(len(inputs), -1)
+        return self.source.run_from(inputs, rest)
 
     def run_from(self, inputs: NDArray[np.float64], initial: Dict[str, float]) -> NDArray[np.float64]:
         """Free run from other outputs than the declared levels.
@@ -345,7 +337,6 @@ def _known_names(names: Sequence[str], computed: Dict[str, Port]) -> tuple[str, 
 def _levels(source: AbstractModel | Cascade, wiring: Wiring) -> dict[str, Level]:
     """Every channel's level; an input without a declared one stands at its own first sample."""
     levels: dict[str, Level] = {name: name for name in wiring.inputs}
-    models = source.models if isinstance(source, Cascade) else (source,)
-    for ends in (lowered_form(model).ends for model in models):
+    for ends in (lowered_form(model).ends for model in source.models):
         levels |= dict(zip(ends.outputs, ends.rest_outputs, strict=True))
-    return levels | dict(source.rest if isinstance(source, Cascade) else {})
+    return levels | dict(source.rest)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping as Dict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from sysid.models.lags import Lagged
 from sysid.models.mapping import Mapping
 from sysid.models.ratio import Ratio
 from sysid.traces import Trace
+
+if TYPE_CHECKING:
+    from sysid.models.cascade_program import Limit
 
 
 class AbstractStructure(ABC):
@@ -219,6 +222,49 @@ class AbstractModel(ABC):
             rest_outputs=(self.rest_output,),
             direct=self.recursion.reads_now(self.mapping.inputs),
         )
+
+    @property
+    def single(self) -> AbstractModel:
+        """Itself: where a cascade may stand too, what can be asked of a model alone is asked of this."""
+        return self
+
+    @property
+    def models(self) -> tuple[AbstractModel, ...]:
+        """Itself, as the members of a cascade."""
+        return (self,)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Channels that go in."""
+        return self.mapping.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Channels that come out."""
+        return self.mapping.outputs
+
+    @property
+    def rest(self) -> Dict[str, float | str]:
+        """Levels at rest that are declared beside the model's own, as a cascade has them: none."""
+        return {}
+
+    @property
+    def limits(self) -> Dict[str, Limit]:
+        """Limits of its outputs, as a cascade has them: none."""
+        return {}
+
+    def run_from(self, inputs: NDArray[np.float64], rest: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Free run from rest at some outputs, as of a cascade.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+            rest: Each output before the first sample, in its unit, shape ``(n_outputs,)``.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``, in their units.
+        """
+        resting = rest if self.structure.several_outputs else float(rest[0])
+        return self.simulate(inputs, History.at_rest(inputs=inputs[0], output=resting)).reshape(len(inputs), -1)
 
     def measured(self, trace: Trace) -> NDArray[np.float64]:
         """What a trace has of its outputs.

@@ -77,6 +77,11 @@ class Cascade:
                 (*wiring.inputs, *wiring.outputs[:i]),
             )
 
+    @property
+    def single(self) -> None:
+        """Not one model alone; see :attr:`sysid.models.AbstractModel.single`."""
+        return
+
     @cached_property
     def wiring(self) -> Wiring:
         """What reads what; the members' own order."""
@@ -232,6 +237,11 @@ class Cascade:
         values, held = self.empty(len(inputs))
         self.run(inputs, rest, values, held)
         return self.wrapped(values, held)
+
+    def run_from(self, inputs: NDArray[np.float64], rest: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Free run from rest at some outputs; see :meth:`sysid.models.AbstractModel.run_from`."""
+        levels = dict(zip(self.outputs, map(float, rest), strict=True))
+        return self.simulate(inputs, rest=levels).values[:, inputs.shape[1] :]
 
     def simulate_trace(self, trace: Trace, *, rest: Dict[str, Level] | None = None) -> CascadeRun:
         """Free run over a trace's inputs; its other channels are not read.

@@ -34,6 +34,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,8 +125,8 @@ def selected(
     Returns:
         The ensemble and those whom its picks count; ``None`` where no second pick helps.
     """
-    usable = [c for c in candidates if c.solution.status.usable and isinstance(c.model, NARXModel)]
-    models = [c.model for c in usable if isinstance(c.model, NARXModel)]
+    usable = [c for c in candidates if c.solution.status.usable]
+    models = [cast("NARXModel", c.model) for c in usable]  # other networks refuse ensembles before they are trained
     if not usable:
         return None
     training = multistart.training

@@ -264,12 +264,9 @@ def _initial_parameters(
     if initial is None:
         return None
     check_initial(template.network, initial.model.structure, len(template.mapping.inputs))
-    if isinstance(initial.model, NARXModel) and _same(initial.model, template):
-        return initial.model.theta
+    form = initial.model.recursion
+    if initial.model.structure == template.network and form.scaling == template.scaling:
+        return form.numbers
     centre = np.linalg.solve(to_plain, layout.centre())
     fresh = to_plain @ layout.draw(np.random.default_rng(seed), np.asarray(centre, dtype=np.float64))
-    return grown(cast("Recursion", initial.model.recursion), template.recursion, fresh)
-
-
-def _same(model: NARXModel, template: NARXModel) -> bool:
-    return model.network == template.network and model.scaling == template.scaling
+    return grown(cast("Recursion", form), template.recursion, fresh)

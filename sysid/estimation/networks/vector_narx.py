@@ -124,7 +124,7 @@ def _posterior(
 ) -> Posterior | None:
     """Of the network's weights; none of a start that was kept as it was given."""
     model = fit.model.models[0]
-    if fit.solution is None or not isinstance(model, VectorNARXModel):
+    if fit.solution is None:
         return None
     runs, others = ([Experiment.for_model(trace, model, start) for trace in some] for some in (traces, selection))
     found = laplace(fit.solution.state, model, layout.to_plain, runs, copies=1)
