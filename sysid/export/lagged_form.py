@@ -73,7 +73,7 @@ class LaggedForm:
                 "this kind of model cannot be exported",
                 expected="a model over lagged inputs and outputs (ARX, NARX), or a state space, linear or neural",
                 got=model.structure.label,
-                remedy="fit one of these to what this model puts out, and export that",
+                remedy="write export: null in the pipeline, or fit one of these to what it puts out, and export that",
             )
         ends = Ends.of(model)
         m, k, n = len(ends.outputs), columns.neurons, columns.lags.n_regressors

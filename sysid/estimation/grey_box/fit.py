@@ -14,6 +14,7 @@ from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.grey_box.findings import Findings, with_evidence
 from sysid.estimation.grey_box.layout import EquationLayout
 from sysid.estimation.grey_box.preparing import (
+    ACCURACY,
     ROUNDS,
     SHARPER,
     WINDOW,
@@ -31,7 +32,7 @@ from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquard
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
-from sysid.estimation.networks.choosing import Choice, choose
+from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training
@@ -60,6 +61,9 @@ FIRST_SUBSTEPS = 8
 
 SAME = 1e-4
 """By how much the loss of exact switches may differ from that of soft ones and be the same."""
+
+SHARE_OF_ERROR, FINEST = 0.03, 1e-8
+"""What a step may add to the errors that remain, as a share of them; and the least that is asked of it."""
 
 STEP_ROUNDS = 2
 """Times that a fit goes on with shorter steps because its parameters turned out to need them."""
@@ -123,11 +127,12 @@ def fit_grey_box(
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
     )
-    candidates = [_settled(one, ready.provider) for one in starts.run(multistart)]
-    choice = choose(candidates, training.choose_by, vet)
+    # The latest first: of a start that converged, the last look at it is chosen, and not one that saw the same.
+    candidates = [_settled(one, ready.provider) for one in reversed(starts.run(multistart))]
+    choice = choose(candidates, _chosen_by(training, ready), vet)
     done = _finished(ready, choice.chosen, training, stopped=multistart.stop.is_set())
     candidates = [done.candidate if one is choice.chosen else one for one in candidates]
-    choice = Choice(chosen=done.candidate, stable=choice.stable)
+    choice = replace(choice, chosen=done.candidate)
     records = [(e.inputs, e.history) for e in experiments]
     status = multistart_status(done.candidate, candidates, records, interrupted=multistart.stop.is_set())
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
@@ -165,6 +170,13 @@ class _Done:
         found = self.candidate.model
         assert isinstance(found, GreyBoxModel)  # noqa: S101 - the template's class
         return found
+
+
+def _chosen_by(training: Training, ready: _Ready) -> str:
+    """What chooses: without networks there is nothing that evidence would hold small, and the least error is best."""
+    if training.choose_by == "selection" and not ready.template.lowered.nets:
+        return "loss"
+    return training.choose_by
 
 
 def check_training(training: Training) -> None:
@@ -295,7 +307,7 @@ def _finished(ready: _Ready, chosen: starts.Candidate, training: Training, *, st
     exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
     if ready.template.grey.substeps is None and not stopped:
         for _ in range(STEP_ROUNDS):
-            stepping = substeps_for(exact, solution.theta)
+            stepping = substeps_for(exact, solution.theta, _accuracy(solution, exact))
             if stepping.substeps <= provider.form.substeps or np.isnan(stepping.change):
                 stepping = replace(stepping, substeps=provider.form.substeps)
                 break
@@ -313,6 +325,12 @@ def _finished(ready: _Ready, chosen: starts.Candidate, training: Training, *, st
     )
     candidate = _settled(replace(chosen, solution=solution, model=model), provider)
     return _Done(candidate=candidate, provider=provider, stepping=stepping, softened=softened)
+
+
+def _accuracy(solution: Solution, provider: EquationProvider) -> float:
+    """How exact a step has to be so that what the records leave is not the step's doing."""
+    left = (2.0 * solution.at.loss / max(provider.n_samples, 1)) ** 0.5
+    return float(np.clip(SHARE_OF_ERROR * left, FINEST, ACCURACY))
 
 
 def _sharpened(
@@ -348,8 +366,12 @@ def _gone_on(provider: EquationProvider, solution: Solution, training: Training)
         evidence_after=5 if training.regularisation is None else None,
     )  # fmt: skip
     found = engine.minimise(provider, solution.theta, solution.state.prior)
-    whole = (*solution.curve, *found.curve[1:])
-    return replace(found, state=replace(found.state, curve=whole))
+    done, spent = solution.state.iteration, solution.curve[-1].elapsed_s
+    further = [
+        replace(one, iteration=done + one.iteration, elapsed_s=spent + one.elapsed_s) for one in found.curve[1:]
+    ]
+    state = replace(found.state, curve=(*solution.curve, *further), iteration=done + found.state.iteration)
+    return replace(found, state=state)
 
 
 def _told(found: FitResult, done: _Done, data: tuple[Sequence[Trace], Sequence[Trace], Start]) -> FitResult:

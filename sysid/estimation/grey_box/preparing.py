@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 WINDOW = 50
 """Samples on which the states before a record are looked for."""
 
-ACCURACY = 1e-6
-"""How much half the step may change a free run, over the output's scale: far below what any noise hides."""
+ACCURACY = 1e-4
+"""How much half the step may change a free run, over the output's scale, before it is known what the records leave."""
 
 MOST_SUBSTEPS = 256
 
@@ -40,39 +40,42 @@ class Stepping:
     Args:
         substeps: From sample to sample.
         change: What twice as many change of the free run, over the output's scale; not a number where the run is none.
+        accuracy: What they may change.
     """
 
     substeps: int
     change: float
+    accuracy: float = ACCURACY
 
     @property
     def enough(self) -> bool:
         """Whether more would change nothing."""
-        return self.change <= ACCURACY
+        return self.change <= self.accuracy
 
 
-def substeps_for(provider: EquationProvider, theta: Array) -> Stepping:
+def substeps_for(provider: EquationProvider, theta: Array, accuracy: float = ACCURACY) -> Stepping:
     """As few Runge-Kutta steps as the records need at some parameters.
 
     Args:
         provider: The records.
         theta: What is trained.
+        accuracy: How much twice as many may change the free run, over the output's scale.
 
     Returns:
         The steps; the most accurate that were tried where none is enough.
     """
     form = provider.at(theta)
     if form.lowered.n_continuous == 0:
-        return Stepping(substeps=1, change=0.0)
+        return Stepping(substeps=1, change=0.0, accuracy=accuracy)
     before: list[Array] | None = None
-    best = Stepping(substeps=1, change=float("nan"))
+    best = Stepping(substeps=1, change=float("nan"), accuracy=accuracy)
     n = 1
     while n <= 2 * MOST_SUBSTEPS:
         runs = _runs(provider, theta, replace(form, substeps=n))
         if before is not None:
             change = max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(runs, before, strict=True))
             if np.isfinite(change):
-                best = Stepping(substeps=n // 2, change=change)
+                best = Stepping(substeps=n // 2, change=change, accuracy=accuracy)
             if best.enough:
                 break
         before, n = runs, 2 * n

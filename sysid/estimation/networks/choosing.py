@@ -15,14 +15,15 @@ def rank(candidate: Candidate, choose_by: str) -> tuple[bool, float]:
 
     Args:
         candidate: The candidate.
-        choose_by: ``selection`` or ``evidence``; without selection traces the evidence, without evidence the loss.
+        choose_by: ``selection`` or ``evidence``; without selection traces the evidence, without evidence the loss. Or
+            ``loss``, which comes after selection traces too, and before the evidence.
 
     Returns:
         The key.
     """
-    if choose_by == "selection" and np.isfinite(candidate.score):
+    if choose_by != "evidence" and np.isfinite(candidate.score):
         value = candidate.score
-    elif candidate.solution.evidence is not None:
+    elif choose_by != "loss" and candidate.solution.evidence is not None:
         value = -candidate.log_evidence
     else:
         value = candidate.loss
@@ -40,10 +41,12 @@ class Choice:
     Args:
         chosen: The candidate.
         stable: Of each candidate, whether its free run was found stable; ``None`` where it was not looked at.
+        by: As for :func:`rank`.
     """
 
     chosen: Candidate
     stable: tuple[bool | None, ...]
+    by: str
 
 
 def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Network], bool] | None = None) -> Choice:
@@ -65,4 +68,4 @@ def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Netwo
             if found[i]:
                 break
     chosen = next((i for i, stable in found.items() if stable), order[0])
-    return Choice(chosen=candidates[chosen], stable=tuple(found.get(i) for i in range(len(candidates))))
+    return Choice(chosen=candidates[chosen], stable=tuple(found.get(i) for i in range(len(candidates))), by=choose_by)

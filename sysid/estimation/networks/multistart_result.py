@@ -113,8 +113,8 @@ def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[A
 def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
     notes = []
     if training.n_starts > 1:
-        by_selection = training.choose_by == "selection" and np.isfinite(choice.chosen.score)
-        by_evidence = choice.chosen.solution.evidence is not None
+        by_selection = choice.by != "evidence" and np.isfinite(choice.chosen.score)
+        by_evidence = choice.by != "loss" and choice.chosen.solution.evidence is not None
         how = "the largest evidence" if by_evidence else "the least error on the estimation traces"
         how = "the least error on the selection traces (geometric mean)" if by_selection else how
         notes.append(f"Chosen by {how} among {training.n_starts} starts looked at {len(candidates)} times.")
