@@ -39,6 +39,10 @@ BEST = "best"
 WEIGHTINGS = (BEST, *(one.value for one in Weighting))
 LONG = 100_000
 """Samples beyond which one solution is enough: rounding is far below the noise there."""
+NESTED, LOWER = 200_000, 15
+"""Samples times squared states up to which systems of fewer states are fitted first, and steps of those."""
+POLES, LITTLE, CLEARLY = (0.0, 0.5, 0.9, 0.97, -0.5), 0.1, 1e-6
+"""Poles that a further state may begin with, how strongly it is driven and read, and a gain that is one."""
 CHARTS = 6
 """Charts that are laid at most."""
 
@@ -146,9 +150,7 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         iterations = training.max_iterations if training.method == METHODS[0] else 0
 
         def found_in(one: _Problem) -> Found:
-            start, weighting = one.start(subspace, training.weighting)
-            found = one.refined(start, iterations, training.max_time_s - (time.perf_counter() - began))
-            return replace(found, weighting=weighting)
+            return one.best(subspace, training.weighting, iterations, began + training.max_time_s)
 
         bounded = replace(problem, largest=slow_poles.largest_pole(problem.lengths))
         if not stable or training.stable is not None:
@@ -187,6 +189,39 @@ class _Problem:
     def around_errors(self, system: Innovations) -> list[Array]:
         """Errors of each record."""
         return self.errors(self.linear(system), np.eye(system.n_outputs)).errors(system)
+
+    def best(self, subspace: Subspace, weighting: str, iterations: int, until: float) -> Found:
+        """From the subspace estimate; and from one state less where that, with another state, is better already.
+
+        Args:
+            subspace: The decomposition that estimates of all orders are taken from.
+            weighting: Of the estimate.
+            iterations: Steps at most.
+            until: When the time is up, by the clock that counts seconds.
+
+        Returns:
+            What was found: over these records never worse than with fewer states.
+        """
+        start, one = self.start(subspace, weighting)
+        found = replace(self.refined(start, iterations, until - time.perf_counter()), weighting=one)
+        if not iterations or self.orders.states == 1 or sum(self.lengths) * self.orders.states**2 > NESTED:
+            return found
+        fewer = replace(self, orders=replace(self.orders, states=self.orders.states - 1))
+        try:
+            lower = fewer.best(subspace, weighting, min(iterations, LOWER), until)
+        except FitDivergedError:
+            return found
+        wider = self._widened(lower.system)
+        if wider is None or wider[0] >= _size(found.covariance) - CLEARLY:
+            return found
+        other = self.refined(wider[1], iterations, until - time.perf_counter())
+        better = _size(other.covariance) < _size(found.covariance)
+        return replace(other, weighting=lower.weighting) if better else found
+
+    def _widened(self, system: Innovations) -> tuple[float, Innovations] | None:
+        """A system with one more state, of the pole that helps most; and its loss."""
+        found = [fitted for pole in POLES if (fitted := self._with_inputs(_with_state(system, pole))) is not None]
+        return min(found, key=lambda entry: entry[0], default=None)
 
     def start(self, subspace: Subspace, weighting: str) -> tuple[Innovations, Weighting]:
         """The subspace estimate with the least prediction error, its ``B``, ``D`` and constant fitted to that."""
@@ -233,7 +268,7 @@ class _Problem:
         covariance = errors.covariance(system)
         if not np.isfinite(covariance).all():
             return None
-        return float(np.linalg.slogdet(covariance + 1e-30 * np.eye(len(covariance)))[1]), system
+        return _size(covariance), system
 
     def errors(self, chart: Chart, whitening: Array) -> PredictionErrors:
         """The least-squares problem over a chart."""
@@ -299,6 +334,23 @@ class _Problem:
         covariance = self.errors(self.linear(system), np.eye(p)).covariance(system)
         floor = 1e-20 * max(float(np.trace(covariance)), 1e-20) * np.eye(p)
         return np.asarray(linalg.inv(linalg.cholesky(covariance + floor, lower=True)))
+
+
+def _size(covariance: Array) -> float:
+    """Logarithm of the determinant of a covariance of errors."""
+    return float(np.linalg.slogdet(covariance + 1e-30 * np.eye(len(covariance)))[1])
+
+
+def _with_state(system: Innovations, pole: float) -> Innovations:
+    """The same system beside a state of its own that every input drives a little, and every output reads."""
+    n, m, p = system.n_state, system.n_inputs, system.n_outputs
+    return replace(
+        system,
+        A=linalg.block_diag(system.A, [[pole]]),
+        B=np.vstack([system.B, np.full((1, m), LITTLE)]),
+        C=np.hstack([system.C, np.full((p, 1), LITTLE)]),
+        K=np.vstack([system.K, np.zeros((1, p))]) if n else np.zeros((1, p)),
+    )
 
 
 def flat_prior(n: int) -> Prior:
