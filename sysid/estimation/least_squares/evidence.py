@@ -136,7 +136,8 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
         correlation_time=tau,
     )
     tiny = np.finfo(np.float64).tiny
-    alphas = np.clip(gammas / np.maximum(2.0 * energies, tiny), *ALPHA_BOUNDS)
+    with np.errstate(over="ignore"):  # weights that stand at their centre: what overflows is bounded
+        alphas = np.clip(gammas / np.maximum(2.0 * energies, tiny), *ALPHA_BOUNDS)
     alphas = np.where([group.known for group in prior.groups], prior.alphas, alphas)
     left = max(independent - float(gammas.sum()), 1.0)
     beta = min(left / max(2.0 * at.loss, tiny * left), BETA_LIMIT)

@@ -12,6 +12,7 @@ from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
 from sysid.estimation.networks.neural_state_space import STARTS
 from sysid.models import (
+    History,
     Mapping,
     NeuralForm,
     NeuralStateSpace,
@@ -320,3 +321,15 @@ def test_the_selection_traces_weigh_each_output_by_its_range():
     errors -= trace.columns(["y", "z"])[begun.first :]
     each = np.mean((errors / np.array(fit.model.scaling.output_scale)) ** 2, axis=0)
     assert score == pytest.approx(np.exp(np.mean(np.log(each))))
+
+
+@pytest.mark.parametrize("still", [(3, 4), (3,)], ids=["both", "one"])
+def test_outputs_that_never_move_have_a_fit(still):
+    trace = coupled(0, n=60)
+    values = trace.values.copy()
+    values[:, [column - 1 for column in still]] = 2.0
+    network, training = VectorNeuralStateSpace(states=2, neurons=2), Training(max_iterations=25, starts=2)
+    fit = fit_vector_neural_state_space([replace(trace, values=values)], BOTH, network, training, start=FREE)
+    run = fit.model.simulate(trace.columns(["u", "w"]), History.at_rest(inputs=[0.0, 0.0], output=values[0, 2:]))
+    for column in still:
+        np.testing.assert_allclose(run[:, column - 3], 2.0, atol=1e-3)
