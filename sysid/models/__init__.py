@@ -14,7 +14,7 @@ from sysid.models.grey_box import GreyBox, InitialState, Parameter
 from sysid.models.grey_box_model import GreyBoxModel
 from sysid.models.history import History, Start, StartKind
 from sysid.models.innovations import Innovations
-from sysid.models.interpolation import Line
+from sysid.models.interpolation import Interpolation
 from sysid.models.lags import Lagged, Lags
 from sysid.models.linear_state_space import (
     LinearStateSpace,
@@ -64,10 +64,10 @@ __all__ = [
     "History",
     "InitialState",
     "Innovations",
+    "Interpolation",
     "Lagged",
     "Lags",
     "Limit",
-    "Line",
     "LinearStateSpace",
     "LinearStateSpaceModel",
     "Mapping",

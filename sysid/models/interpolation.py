@@ -30,7 +30,7 @@ from sysid.traces import Trace
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Line:
+class Interpolation:
     """A cascade at knots along a line, and another at every position.
 
     Args:
@@ -49,7 +49,8 @@ class Line:
         ...     return ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([gain, 0.0]), intercept=0.0,
         ...         mapping=Mapping.parse(text), sample_time=0.1, input_units=("psi",), output_unit="psi",
         ...         rest_output=0.0)
-        >>> line = Line(along=Cascade(models=(model("u -> p1", 1.0), model("u -> p9", 5.0))), knots={"p1": 1, "p9": 9},
+        >>> along = Cascade(models=(model("u -> p1", 1.0), model("u -> p9", 5.0)))
+        >>> line = Interpolation(along=along, knots={"p1": 1, "p9": 9},
         ...     at_place=Cascade(models=(model("p -> c", 2.0),)), channel="p")
         >>> line.simulate(np.ones((3, 1)), [1, 5, 9])["c"][:, -1].tolist()
         [2.0, 6.0, 10.0]
@@ -60,7 +61,9 @@ class Line:
     at_place: Cascade
     channel: str
 
-    kind = "Line"
+    kind = "Interpolation"
+    OLD_KIND = "Line"
+    """As runs of earlier versions stored it; it is read."""
 
     def __post_init__(self) -> None:
         knots = {name: float(position) for name, position in self.knots.items()}
@@ -201,7 +204,7 @@ class Line:
         }
 
     @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> Line:
+    def from_dict(cls, fields: Dict[str, Any]) -> Interpolation:
         """The line that :meth:`to_dict` wrote.
 
         Args:
@@ -215,7 +218,7 @@ class Line:
         """
         wanted = ("along", "knots", "at_place", "channel")
         missing = [name for name in wanted if name not in fields]
-        if fields.get("structure", {}).get("kind") != cls.kind or missing:
+        if fields.get("structure", {}).get("kind") not in {cls.kind, cls.OLD_KIND} or missing:
             raise ConfigError(
                 "not a stored line",
                 expected=f"the kind {cls.kind} and {', '.join(wanted)}",

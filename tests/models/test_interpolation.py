@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
 from sysid.errors import ChannelError, ConfigError, TraceError
-from sysid.models import Cascade, Limit, Line, Mapping
+from sysid.models import Cascade, Interpolation, Limit, Mapping
 from sysid.traces import Channel, Trace
 from tests.models.cascades import network
 
@@ -32,8 +32,8 @@ def valve(text: str = "BP -> AR") -> Cascade:
     return Cascade(models=models, limits={"BC": Limit(low=0.0)})
 
 
-def line() -> Line:
-    return Line(along=along(), knots=KNOTS, at_place=valve(), channel="BP")
+def line() -> Interpolation:
+    return Interpolation(along=along(), knots=KNOTS, at_place=valve(), channel="BP")
 
 
 def handle(n: int = 200) -> np.ndarray:
@@ -70,7 +70,7 @@ def test_many_positions_run_in_lockstep_as_few_do_alone():
 
 
 def test_what_stands_at_a_position_may_read_an_input_of_the_whole():
-    reads = Line(along=along(), knots=KNOTS, at_place=valve("BP+STP -> AR"), channel="BP")
+    reads = Interpolation(along=along(), knots=KNOTS, at_place=valve("BP+STP -> AR"), channel="BP")
     alone = along().simulate(handle())
     expected = valve("BP+STP -> AR").simulate(np.column_stack([alone["BP25"], handle()]))
     assert_allclose(reads.simulate(handle(), [25.0])["BC"][0], expected["BC"], atol=1e-9)
@@ -85,12 +85,14 @@ def test_a_trace_of_another_sample_time_is_refused():
 
 
 def test_it_is_stored_and_read_again():
-    again = Line.from_dict(line().to_dict())
+    again = Interpolation.from_dict(line().to_dict())
     assert again.outputs == line().outputs == ("BP", "AR", "BC")
     assert again.n_parameters == line().n_parameters
     assert_allclose(again.simulate(handle(), [7.0])["BC"], line().simulate(handle(), [7.0])["BC"], rtol=0, atol=0)
+    earlier = line().to_dict() | {"structure": {"kind": "Line"}}
+    assert Interpolation.from_dict(earlier).knots == line().knots
     with pytest.raises(ConfigError, match="not a stored line"):
-        Line.from_dict(along().to_dict())
+        Interpolation.from_dict(along().to_dict())
 
 
 @pytest.mark.parametrize("positions", [[0.0], [51.0], [np.nan], [], [5.0, 60.0]], ids=str)

@@ -49,7 +49,8 @@ def placed(parts: Sequence[Part], consist: Consist) -> Stage:
     Raises:
         ConfigError: If several models of one mapping do not say where they stand, or differ in their structure.
     """
-    return Stage(models=tuple(part.model for part in nearest(parts, consist) if isinstance(part.model, AbstractModel)))
+    singles = (part.model.single for part in nearest(parts, consist))
+    return Stage(models=tuple(model for model in singles if model is not None))
 
 
 def nearest(parts: Sequence[Part], consist: Consist) -> list[Part]:
@@ -137,7 +138,7 @@ def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
     Raises:
         ConfigError: If the models do not add up to a brake.
     """
-    wholes = [part.model for part in parts if isinstance(part.model, Cascade)]
+    wholes = [part.model for part in parts if part.model.single is None]
     if wholes and all(COMMAND in whole.inputs for whole in wholes):
         return _of_cascades(parts, consist)
     parts = [member for part in parts for member in _members(part)]
@@ -159,14 +160,15 @@ def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
 
 
 def _mapping(part: Part) -> Mapping:
-    if isinstance(part.model, Cascade):
+    model = part.model.single
+    if model is None:
         raise ConfigError(
             "a cascade has no single mapping",
             where="parts",
             expected="models, or cascades alone",
             got=f"{', '.join(part.model.inputs)} -> {', '.join(part.model.outputs)} among other parts",
         )
-    return part.model.mapping
+    return model.mapping
 
 
 def _of_cascades(parts: Sequence[Part], consist: Consist) -> MakeBrake:
@@ -190,7 +192,7 @@ def _of_cascades(parts: Sequence[Part], consist: Consist) -> MakeBrake:
 
 def _members(part: Part) -> list[Part]:
     """The part itself, or the members of a cascade that stands on the reference's pipe."""
-    if not isinstance(part.model, Cascade):
+    if part.model.single is not None:
         return [part]
     members = [model for model in part.model.models if len(model.mapping.outputs) == 1]
     if part.model.limits or len(members) < len(part.model.models):

@@ -31,7 +31,7 @@ def rounds_table(rounds: Sequence[RoundRecord]) -> Table:
         [
             [
                 one.name,
-                f"{_few(one.trained)}{', everywhere' if one.all_instances else ''}",
+                f"{_few(one.trained)}{', in all instances' if one.all_instances else ''}",
                 _few(one.measured),
                 one.traces, one.iterations, one.train_time_s, one.loss, one.selection_before, one.selection_after,
                 one.status.replace("_", " ").lower(),

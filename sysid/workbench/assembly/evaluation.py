@@ -21,7 +21,12 @@ from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.ablation import ablations_of
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.data import AssemblyData
-from sysid.workbench.assembly.interpolation import InterpolationScores, StoredInterpolation, line_of, score_line
+from sysid.workbench.assembly.interpolation import (
+    InterpolationScores,
+    StoredInterpolation,
+    interpolation_of,
+    score_interpolation,
+)
 from sysid.workbench.assembly.member_scores import score_candidates
 from sysid.workbench.assembly.record import Outcome, assembly_results, write_signals
 from sysid.workbench.runner import events
@@ -197,11 +202,11 @@ class Evaluating:
         asked = self.context.config.interpolation
         if asked is None:
             return None
-        line, cases = line_of(asked, whole), self.context.load(asked.data)
+        line, cases = interpolation_of(asked, whole), self.context.load(asked.data)
         write_json(self.context.store.path / LINE, StoredInterpolation.of(asked, line, next(iter(cases))).to_dict())
         return self.context.compute(
             INTERPOLATION,
-            lambda _: score_line(asked, line, cases),
+            lambda _: score_interpolation(asked, line, cases),
             outcome=lambda scores: f"all positions of the longest case in {max(scores.timing.values()):.3g} s",
         )
 

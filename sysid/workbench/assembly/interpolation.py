@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.models import Cascade, Line
+from sysid.models import Cascade, Interpolation
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference
 from sysid.workbench.assembly.proof_config import InterpolationConfig
@@ -48,12 +48,12 @@ class StoredInterpolation:
         outputs: Channels that are had at every position.
     """
 
-    line: Line
+    line: Interpolation
     inputs: tuple[Channel, ...]
     outputs: tuple[Channel, ...]
 
     @classmethod
-    def of(cls, asked: InterpolationConfig, line: Line, case: Trace) -> StoredInterpolation:
+    def of(cls, asked: InterpolationConfig, line: Interpolation, case: Trace) -> StoredInterpolation:
         """A line with the channels of a trace.
 
         Args:
@@ -93,7 +93,7 @@ class StoredInterpolation:
         Raises:
             ConfigError: If it is no line, or a field is missing.
         """
-        line, channels = Line.from_dict(fields), fields.get("channels", {})
+        line, channels = Interpolation.from_dict(fields), fields.get("channels", {})
         sides = {
             side: tuple(
                 Channel(name=one["name"], unit=one["unit"], reference=Reference(one["reference"]))
@@ -111,7 +111,7 @@ class StoredInterpolation:
         return cls(line=line, **sides)
 
 
-def line_of(asked: InterpolationConfig, whole: Cascade) -> Line:
+def interpolation_of(asked: InterpolationConfig, whole: Cascade) -> Interpolation:
     """The line of an assembly: what the knots need runs along it, what the outputs need stands at every position.
 
     Args:
@@ -134,7 +134,7 @@ def line_of(asked: InterpolationConfig, whole: Cascade) -> Line:
             got=f"{', '.join(asked.outputs)} from {', '.join(there.inputs)}",
             remedy="name the channel that the positions read, and outputs of members that stand there",
         )
-    return Line(along=whole.upstream_of(asked.knots), knots=asked.knots, at_place=there, channel=asked.channel)
+    return Interpolation(along=whole.upstream_of(asked.knots), knots=asked.knots, at_place=there, channel=asked.channel)
 
 
 def positions_of(case: Trace, output: str) -> dict[float, str]:
@@ -152,7 +152,7 @@ def positions_of(case: Trace, output: str) -> dict[float, str]:
     return dict(sorted(found.items()))
 
 
-def score_line(asked: InterpolationConfig, line: Line, cases: TraceSet) -> InterpolationScores:
+def score_interpolation(asked: InterpolationConfig, line: Interpolation, cases: TraceSet) -> InterpolationScores:
     """Score a line at the positions of a data set.
 
     Args:

@@ -97,15 +97,15 @@ def network_time(
         input_subsets=(),
         max_time_s=CALIBRATION_LIMIT_S,
     )
-    moments: list[tuple[str, float]] = []
+    stamps: list[tuple[str, float]] = []
     began = time.perf_counter()
-    fit(few, lambda entry: moments.append((entry.stage, time.perf_counter())))
+    fit(few, lambda entry: stamps.append((entry.stage, time.perf_counter())))
     total = time.perf_counter() - began
     # What is trained last is the free run, or one step ahead; what comes before it has stages of its own.
-    last = moments[-1][0] if moments else ""
-    each = {main: _median([when for stage, when in moments if (stage == last) is main]) for main in (True, False)}
+    last = stamps[-1][0] if stamps else ""
+    each = {main: _median([when for stage, when in stamps if (stage == last) is main]) for main in (True, False)}
     iteration, earlier = (each[True] or total) / share, each[False] or 0.0
-    around = max(total - sum((each[stage == last] or 0.0) for stage, _ in moments), 0.0)
+    around = max(total - sum((each[stage == last] or 0.0) for stage, _ in stamps), 0.0)
     iterations, side_by_side = (
         planned_iterations(training),
         min(training.workers, training.n_starts, os.cpu_count() or 1),
@@ -117,9 +117,9 @@ def network_time(
     return Estimate(seconds=seconds, basis=f"at most: {duration(around)}{ahead}, then {trained}")
 
 
-def _median(moments: Sequence[float]) -> float | None:
+def _median(stamps: Sequence[float]) -> float | None:
     """Seconds from one moment to the next; ``None`` of fewer than two."""
-    taken = [after - before for before, after in itertools.pairwise(moments)]
+    taken = [after - before for before, after in itertools.pairwise(stamps)]
     return statistics.median(taken) if taken else None
 
 

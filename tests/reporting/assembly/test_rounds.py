@@ -24,7 +24,7 @@ def test_a_row_has_the_figures_of_its_round(results: AssemblyResults) -> None:
     ("changes", "column", "said"),
     [
         ({"name": "2.1 of active learning"}, 0, "2.1 of active learning"),
-        ({"trained": ["AR", "BC"], "all_instances": True}, 1, "AR, BC, everywhere"),
+        ({"trained": ["AR", "BC"], "all_instances": True}, 1, "AR, BC, in all instances"),
         ({"measured": ["BP", "AR", "ER"]}, 2, "BP, AR, ER"),
         ({"measured": ["BP", "AR", "ER", "VO"]}, 2, "4 outputs"),
         ({"loss": float("nan")}, 6, ""),

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from sysid.composite.members import assembled
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Role, Trace, TraceSet
-from sysid.workbench.assembly.interpolation import line_of, positions_of, score_line
+from sysid.workbench.assembly.interpolation import interpolation_of, positions_of, score_interpolation
 from sysid.workbench.assembly.proof_config import InterpolationConfig
 from tests.composite.composites import models, pipe, trace
 from tests.workbench.assembly.test_config import TWO_PLACES, config
@@ -25,7 +25,7 @@ def whole():
 
 def positions(n: int = 120) -> TraceSet:
     """The whole's own line as the reference, at three positions, with half a unit added at position 4."""
-    line = line_of(ASKED, whole())
+    line = interpolation_of(ASKED, whole())
     traces = {}
     for seed, name in enumerate(("A", "B")):
         handle = trace(n=n, seed=seed)["STP"]
@@ -38,7 +38,7 @@ def positions(n: int = 120) -> TraceSet:
 
 
 def test_what_the_knots_need_runs_along_and_what_the_outputs_need_stands_at_a_place():
-    line = line_of(ASKED, whole())
+    line = interpolation_of(ASKED, whole())
     assert set(line.along.outputs) == {"BP", "BP9"}
     assert line.at_place.outputs == ("AR",)
     assert set(line.at_place.inputs) == {"BP", "STP"}
@@ -51,8 +51,8 @@ def test_positions_are_the_numbers_behind_an_output():
 
 
 def test_each_position_is_scored_by_itself():
-    line, cases = line_of(ASKED, whole()), positions()
-    scores = score_line(ASKED, line, cases)
+    line, cases = interpolation_of(ASKED, whole()), positions()
+    scores = score_interpolation(ASKED, line, cases)
     assert scores.positions["AR"].tolist() == [1.0, 4.0, 9.0]
     assert scores.seen["AR"].tolist() == [True, False, True]
     for case in ("A", "B"):
@@ -60,11 +60,11 @@ def test_each_position_is_scored_by_itself():
 
 
 def test_data_without_positions_are_refused():
-    line = line_of(ASKED, whole())
+    line = interpolation_of(ASKED, whole())
     cases = positions()
     bare = replace(cases, traces=tuple(replace(t, channels=t.channels[:1], values=t.values[:, :1]) for t in cases))
     with pytest.raises(ConfigError, match="no position of the line"):
-        score_line(ASKED, line, bare)
+        score_interpolation(ASKED, line, bare)
 
 
 @pytest.mark.parametrize(
@@ -82,4 +82,4 @@ def test_a_line_that_cannot_be_is_refused(line, match):
 
 def test_outputs_that_do_not_follow_from_the_channel_are_refused():
     with pytest.raises(ConfigError, match="cannot be had at a position"):
-        line_of(ASKED.model_copy(update={"channel": "BP9"}), whole())
+        interpolation_of(ASKED.model_copy(update={"channel": "BP9"}), whole())
