@@ -11,13 +11,14 @@ from __future__ import annotations
 import os
 import sys
 import time
+from dataclasses import replace
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from sysid.estimation import Training
+from sysid.estimation import JointTraining, Training
 from sysid.estimation.estimators import fit
 from sysid.models import (
     ARX,
@@ -28,22 +29,30 @@ from sysid.models import (
     Start,
     StartKind,
     TransferFunction,
+    VectorNARX,
+    VectorNeuralStateSpace,
 )
-from sysid.traces import Role, Trace
-from sysid.validation.evaluate import evaluate_case
+from sysid.traces import Channel, Role, Trace
+from sysid.validation.evaluate import case_results
 from tests.benchmarks._findings import found
 from tests.estimation.linear_systems import trace_of
 
 SAMPLES = 300
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
-MAPPING = Mapping.parse("u1 -> y")
+MAPPING, BOTH = Mapping.parse("u1 -> y"), Mapping.parse("u1 -> y+z")
 QUICK = Training(starts=1, max_iterations=60)
-STRUCTURES: dict[str, tuple[AbstractStructure, Training | None, bool]] = {
+STRUCTURES: dict[str, tuple[AbstractStructure, Training | JointTraining | None, bool]] = {
     "ARX": (ARX(na=2, nb=(1,), nk=(1,)), None, True),
     "TF": (TransferFunction(poles=(2,), zeros=(0,), delays=(1,)), None, False),
     "continuous TF": (TransferFunction(poles=(2,), zeros=(1,), delays=(0,), domain="continuous"), None, False),
     "NARX": (NARX(input_delays=1, output_delays=2, neurons=1), QUICK, True),
     "NSS": (NeuralStateSpace(states=2, neurons=1), QUICK, False),
+    "NSS of two outputs": (VectorNeuralStateSpace(states=2, neurons=1), QUICK, False),
+    "NARX of two outputs": (
+        VectorNARX(input_delays=1, output_delays=2, neurons=1),
+        JointTraining(max_iterations=60),
+        True,
+    ),
 }
 """Structure, training, and whether its noise is in the equation."""
 
@@ -60,7 +69,11 @@ def record(rng: np.random.Generator, *, inside: bool) -> Trace:
     y[:2] = rng.uniform(-1.0, 1.0)
     for k in range(2, SAMPLES):
         y[k] = 1.5 * y[k - 1] - 0.56 * y[k - 2] + 0.06 * u[k - 1] + (e[k] if inside else 0.0)
-    return trace_of(u[:, None], y if inside else y + e)
+    both = trace_of(u[:, None], y if inside else y + e)
+    # A second output beside it, which only structures of several outputs are asked for.
+    z = 2.0 * y - np.append(0.0, y[:-1]) + 0.05 * rng.standard_normal(SAMPLES)
+    channels = (*both.channels, Channel(name="z", unit="1"))
+    return replace(both, channels=channels, values=np.column_stack([both.values, z]))
 
 
 def shares(name: str, records: int) -> dict[str, list[float]]:
@@ -75,13 +88,15 @@ def shares(name: str, records: int) -> dict[str, list[float]]:
     for seed in range(records):
         rng = np.random.default_rng([seed, len(name)])
         estimation, other = record(rng, inside=inside), record(rng, inside=inside)
-        fitted = fit([estimation], MAPPING, structure, training, start=ESTIMATED, stability=None)
+        mapping = BOTH if structure.several_outputs else MAPPING
+        fitted = fit([estimation], mapping, structure, training, start=ESTIMATED, stability=None)
         if fitted.posterior is None:
             continue
-        case = evaluate_case(fitted.model, other, Role.VALIDATION, ESTIMATED, 1, posterior=fitted.posterior)
-        if case.intervals is not None:
-            held["free run"].append(case.intervals.free_run.share)
-            held["one step ahead"].append(case.intervals.one_step.share)
+        cases = case_results(fitted.model, other, Role.VALIDATION, ESTIMATED, 1, posterior=fitted.posterior)
+        for case in cases.values():
+            if case.intervals is not None:
+                held["free run"].append(case.intervals.free_run.share)
+                held["one step ahead"].append(case.intervals.one_step.share)
     return held
 
 
@@ -93,7 +108,7 @@ def main() -> None:
         began = time.process_time()
         for run, held in shares(name, records).items():
             if held and np.isfinite(held).all():
-                note = f"{len(held)} of {records} records, {(time.process_time() - began) / records:.2f} s each"
+                note = f"{len(held)} outputs of {records} records, {(time.process_time() - began) / records:.2f} s each"
                 found(f"{name}: samples within the 95 % interval, {run}", 100.0 * float(np.mean(held)), "%", note=note)
 
 
