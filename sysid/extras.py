@@ -27,6 +27,7 @@ EXTRAS = {
     "sklearn": "sklearn",
     "distributed": "dask",
     "psycopg": "postgres",
+    "ziglang": "fmu-cross",
 }
 """Our extra by the name that is imported."""
 

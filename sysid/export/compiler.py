@@ -6,14 +6,18 @@ import os
 import shlex
 import shutil
 import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from sysid.errors import ConfigError, SysidError
+from sysid.extras import has
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic")
 """What the exported source is clean under."""
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
+ZIG = (sys.executable, "-m", "ziglang", "cc")
+"""Clang with the headers and libraries of every machine, from PyPI."""
 
 
 class CompilerError(SysidError):
@@ -34,6 +38,8 @@ def compiler() -> list[str]:
     for command in found:
         if shutil.which(command[0]):
             return command
+    if not chosen and has("ziglang"):
+        return [*ZIG, *CROSS]
     raise ConfigError(
         "the formats c, fmi2 and fmi3 need a C compiler, which is not there",
         expected=" or ".join(command[0] for command in found),
@@ -42,7 +48,13 @@ def compiler() -> list[str]:
     )
 
 
-def build_library(sources: Sequence[str], folder: Path, output: str, flags: Sequence[str] = ()) -> None:
+CROSS = ("-s", "-fno-sanitize=undefined")
+"""For other machines: without what only a debugger reads, and without the checks that this compiler builds in."""
+
+
+def build_library(
+    sources: Sequence[str], folder: Path, output: str, flags: Sequence[str] = (), *, target: str | None = None
+) -> None:
     """Build a shared library; the same bytes wherever the folder lies.
 
     Args:
@@ -50,12 +62,14 @@ def build_library(sources: Sequence[str], folder: Path, output: str, flags: Sequ
         folder: Where they lie, and where the library goes.
         output: Its file name.
         flags: More flags of the compiler.
+        target: A machine that it is built for, by the compiler of the extra ``fmu-cross``; this one by default.
 
     Raises:
         ConfigError: If there is no compiler.
         CompilerError: If it reports an error.
     """
-    command = [*compiler(), *FLAGS, *flags, "-o", output, *sources, "-lm"]
+    chosen = compiler() if target is None else [*ZIG, "-target", target, *CROSS]
+    command = [*chosen, *FLAGS, *flags, "-o", output, *sources, "-lm"]
     done = subprocess.run(  # noqa: S603 - the compiler of this machine on files that we wrote
         command, cwd=folder, capture_output=True, text=True, check=False
     )

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import platform
-import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping as Dict
@@ -15,12 +13,12 @@ from typing import Any
 import numpy as np
 
 import sysid
-from sysid.errors import ConfigError
 from sysid.export.archive import write_archive
 from sysid.export.c_source import c_files
-from sysid.export.compiler import WARNINGS, build_library
+from sysid.export.compiler import WARNINGS
 from sysid.export.flags import MEANING
 from sysid.export.fmi_units import unit_definitions
+from sysid.export.fmu_platforms import build_binaries, left_out, own_platform
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import c_real, render
 from sysid.names import distinct, xml_name
@@ -30,36 +28,10 @@ HEADERS = {
     3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
 }
 """The standard's own headers (2-clause BSD licence, which stands in them)."""
-SYSTEMS = {"linux": ("linux", "so"), "darwin": ("darwin", "dylib"), "win32": ("win", "dll")}
-MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
-
-
-def platform_folder(version: int) -> tuple[str, str]:
-    """Where the binary of this machine lies in an FMU.
-
-    Args:
-        version: 2 or 3.
-
-    Returns:
-        The folder under ``binaries``, and the ending of the file.
-
-    Raises:
-        ConfigError: If the standard has no name for this machine.
-    """
-    system, ending = SYSTEMS.get(sys.platform, ("", ""))
-    machine = MACHINES.get(platform.machine().lower(), "")
-    if system and machine and (version == 3 or machine == "x86_64"):
-        return (f"{machine}-{'windows' if system == 'win' else system}" if version == 3 else f"{system}64"), ending
-    raise ConfigError(
-        f"FMI {version}.0 has no name for this kind of machine",
-        expected="Linux, macOS or Windows on x86_64; FMI 3.0 on aarch64 too",
-        got=f"{sys.platform} on {platform.machine()}",
-        remedy=f"leave the format fmi{version} out",
-    )
 
 
 def write_fmu(surrogate: Surrogate, version: int, path: Path) -> dict[str, Any]:
-    """Write an FMU for co-simulation, with its sources and with a binary for this machine.
+    """Write an FMU for co-simulation, with its sources and with binaries for the machines that can be built for here.
 
     Args:
         surrogate: What to write.
@@ -72,17 +44,18 @@ def write_fmu(surrogate: Surrogate, version: int, path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: If there is no compiler, or no name for this machine.
     """
-    folder, ending = platform_folder(version)
     prefix = surrogate.identifier
     variables = fmu_variables(surrogate)
     texts, guid = _texts(surrogate, version, variables)
     content = {name: text.encode() for name, text in texts.items()}
-    content[f"binaries/{folder}/{prefix}.{ending}"] = _binary(content, prefix, version, f"{prefix}.{ending}")
+    binaries = _binaries(content, prefix, version)
+    content |= {f"binaries/{place}": data for place, data in binaries.items()}
     write_archive(path, content)
     return {
         "fmi": f"{version}.0",
         "model_identifier": prefix,
-        "platforms": [folder],
+        "platforms": sorted({place.partition("/")[0] for place in binaries}),
+        "platforms_left_out": left_out(version),
         "sources": True,
         "guid": guid,
         "output_offset": "after doStep(t, h) the outputs are those of the sample whose inputs were set at t",
@@ -176,7 +149,7 @@ def _texts(surrogate: Surrogate, version: int, variables: list[dict[str, Any]]) 
     return texts, guid
 
 
-def _binary(content: Dict[str, bytes], prefix: str, version: int, name: str) -> bytes:
+def _binaries(content: Dict[str, bytes], prefix: str, version: int) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as workplace:
         folder = Path(workplace)
         for path, data in content.items():
@@ -184,8 +157,7 @@ def _binary(content: Dict[str, bytes], prefix: str, version: int, name: str) -> 
                 (folder / Path(path).name).write_bytes(data)
         # Two FMUs in one process must not see each other's functions: only those of FMI are visible.
         flags = ("-fvisibility=hidden", *WARNINGS)
-        build_library([f"{prefix}.c", f"fmi{version}.c"], folder, name, flags)
-        return (folder / name).read_bytes()
+        return build_binaries(version, prefix, [f"{prefix}.c", f"fmi{version}.c"], folder, flags)
 
 
 def unpack_binary(path: Path, version: int, target: Path) -> Path:
@@ -199,9 +171,9 @@ def unpack_binary(path: Path, version: int, target: Path) -> Path:
     Returns:
         The file.
     """
-    folder, ending = platform_folder(version)
+    own = own_platform(version)
     with zipfile.ZipFile(path) as archive:
-        (member,) = [name for name in archive.namelist() if name.startswith(f"binaries/{folder}/")]
-        library = target / f"model.{ending}"
+        (member,) = [name for name in archive.namelist() if name.startswith(f"binaries/{own.folder(version)}/")]
+        library = target / f"model.{own.ending}"
         library.write_bytes(archive.read(member))
     return library

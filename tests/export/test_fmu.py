@@ -15,7 +15,8 @@ from fmpy.validation import validate_fmu
 from sysid.errors import ConfigError
 from sysid.export import EXPORTERS, Flag, Surrogate, expected_flags
 from sysid.export.fmi_units import unit_definitions
-from sysid.export.fmu import HEADERS, fmu_variables, platform_folder
+from sysid.export.fmu import HEADERS, fmu_variables
+from sysid.export.fmu_platforms import own_platform
 
 VERSIONS = {"fmi2": FMU2Slave, "fmi3": FMU3Slave}
 
@@ -284,4 +285,4 @@ def test_units_in_the_words_of_fmi(unit, base):
 def test_a_machine_without_a_name_in_the_standard_is_told(monkeypatch):
     monkeypatch.setattr("platform.machine", lambda: "sparc")
     with pytest.raises(ConfigError, match=r"(?s)no name for this kind of machine.*sparc"):
-        platform_folder(2)
+        own_platform(2)
