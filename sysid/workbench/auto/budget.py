@@ -17,6 +17,8 @@ REFIT = 0.2
 """Share of the time that is kept for the last fit."""
 TRIAL = 0.15
 """Share of the time that one trial may take."""
+FINAL = 0.15
+"""Share of either that is kept for trying the best once more."""
 
 
 def price(point: Point, folds: int = 1) -> int:
@@ -48,6 +50,7 @@ class Budget:
         side_by_side: Trials that run at the same time.
         folds: Times that a point is trained.
         spent: Iterations so far.
+        kept: Share that is not spent yet.
     """
 
     wall_s: float | None
@@ -57,6 +60,7 @@ class Budget:
     side_by_side: int = 1
     folds: int = 1
     spent: int = 0
+    kept: float = FINAL
     _rates: dict[str, float] = field(default_factory=dict)
     _open: list[Point] = field(default_factory=list)
 
@@ -119,8 +123,8 @@ class Budget:
 
     def _fits(self, iterations: int, seconds: float, *, paid: bool) -> bool:
         if self.iterations is not None:
-            return self.spent + iterations <= self.iterations
-        return paid or self.wall_s is None or self.clock() + seconds <= (1.0 - REFIT) * self.wall_s
+            return self.spent + iterations <= (1.0 - self.kept) * self.iterations
+        return paid or self.wall_s is None or self.clock() + seconds <= (1.0 - REFIT - self.kept) * self.wall_s
 
     def _seconds(self, point: Point) -> float:
         """How long a trial will take; of a kind that was not tried yet, at least something."""

@@ -61,12 +61,16 @@ def _transfer_functions(looked: Looked) -> list[Try]:
     ]
 
 
-def _neural(_: Looked) -> list[Try]:
+def _neural(looked: Looked) -> list[Try]:
     sizes = ((2, 8, None), (2, 8, 0.03), (2, 4, 1e-3), (3, 8, 0.03))
-    return [
+    found = [
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
         for n, k, r in sizes
     ]
+    if looked.never_negative:
+        signless = NeuralStateSpace(states=3, neurons=4, output="absolute")
+        found.append(Try(structure=signless, training={"regularisation": 1e-2}))
+    return found
 
 
 def _around_neural(one: Try, looked: Looked) -> list[Try]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from statistics import median_high
 from typing import Any
 
 from sysid.errors import ConfigError
@@ -19,10 +20,15 @@ from sysid.workbench.sweep.search_space import Point
 
 ROUND = 4
 """Trials of a round: the next round knows the results of all before it, whatever the number of workers."""
+RIVAL = 2.0
+"""Times the least error within which the best of another kind of network is followed too."""
 GAIN = 0.02
 """Part of the least error, as a root of a mean square, by which a round has to better it to count as a gain."""
 PATIENCE = 2
 """Rounds without a gain after which the search ends."""
+FINALISTS, AGAIN = 3, 2
+"""The best networks, and how often each is trained again from other starts before the choice: the least of many errors
+owes something to luck, and the chosen one is trained from other starts too."""
 ALIKE = 0.03
 """Part of the least error within which another one counts as no worse; of those the smallest is chosen."""
 
@@ -39,6 +45,8 @@ class Plan:
         error: What chooses, as a mean square; infinite for what cannot be used.
         training: Options that every network is trained with.
         families: What there is to try.
+        seed: Of the search.
+        again: How often the best are trained again; 0 where what was chosen is not.
         ended: Why it ended, once it has.
     """
 
@@ -47,11 +55,15 @@ class Plan:
     error: Callable[[Trial], float]
     training: Mapping[str, Any] = field(default_factory=dict)
     families: Sequence[Family] = field(default_factory=lambda: FAMILIES)
+    seed: int = 0
+    again: int = AGAIN
     ended: str = ""
     trials: list[Trial] = field(default_factory=list)
     _tries: list[Try] = field(default_factory=list)
-    _points: list[Point] = field(default_factory=list)
     _seen: set[str] = field(default_factory=set)
+    _repeats: dict[int, int] = field(default_factory=dict)
+    """By the number of a repeated point, the place of its trial."""
+    _told_again: list[int] = field(default_factory=list)
     _rounds: Iterator[list[Try]] | None = None
     _asked: int = 0
 
@@ -65,7 +77,6 @@ class Plan:
                 self.ended = "the budget is spent"
             by_number = {point.number: one for point, one in zip(points, tries, strict=True)}
             self._tries += [by_number[point.number] for point in taken]
-            self._points += taken
             if taken:
                 return taken
         self.ended = self.ended or "nothing that is left to try has a place in the search"
@@ -73,8 +84,13 @@ class Plan:
 
     def tell(self, trials: Sequence[Trial]) -> None:
         """The results of the last round, in its order."""
-        self.trials += trials
         self.budget.tell(trials)
+        repeated = [trial for trial in trials if trial.number in self._repeats]
+        self.trials += [trial for trial in trials if trial.number not in self._repeats]
+        for place in dict.fromkeys(self._repeats[trial.number] for trial in repeated):
+            own = [trial for trial in repeated if self._repeats[trial.number] == place]
+            self.trials[place] = with_repeats(self.trials[place], own)
+            self._told_again.append(place)
 
     def least(self, *, linear: bool | None = None) -> float:
         """The least error so far, as a mean square.
@@ -89,7 +105,39 @@ class Plan:
         errors = [self.error(t) for t in self.trials if t.structure["kind"] in kinds]
         return min(errors, default=math.inf)
 
+    @property
+    def n_again(self) -> int:
+        """Networks that were trained again."""
+        return len(self._told_again)
+
+    @property
+    def candidates(self) -> list[Trial]:
+        """What may be chosen: networks that were trained again, where some were, and linear models."""
+        kinds = {family.kind for family in self.families if family.linear}
+        again = set(self._told_again)
+        return [t for n, t in enumerate(self.trials) if n in again or not again or t.structure["kind"] in kinds]
+
     def _all_rounds(self) -> Iterator[list[Try]]:
+        yield from self._search()
+        self.budget.kept = 0.0
+        yield from self._finals()
+
+    def _finals(self) -> Iterator[list[Try]]:
+        """The best networks once more, from other starts."""
+        kinds = {family.kind for family in self.families if not family.linear}
+        places = [n for n, one in enumerate(self._tries[: len(self.trials)]) if one.structure.kind in kinds]
+        best = sorted(places, key=lambda n: self.error(self.trials[n]))[:FINALISTS]
+        finals: list[Try] = []
+        for place in best:
+            for k in range(self.again if math.isfinite(self.error(self.trials[place])) else 0):
+                one = self._tries[place]
+                seed = 1_000 * self.seed + 100 * (k + 1)
+                finals.append(replace(one, training={**one.training, "seed": seed}))
+                self._repeats[self._asked + len(finals)] = place
+        if finals:
+            yield finals
+
+    def _search(self) -> Iterator[list[Try]]:
         for linear in (True, False):
             wanted = suggested(self.looked, linear=linear)
             wanted += [one for family in self.families if family.linear is linear for one in family.first(self.looked)]
@@ -111,18 +159,21 @@ class Plan:
             yield new
 
     def _next(self) -> list[Try]:
-        """What stands next to the best networks, the best one's neighbours first."""
+        """What stands next to the best networks: half of it to the best of all, half to the best of another kind."""
         around = {family.kind: family.around for family in self.families if not family.linear}
-        ranked = sorted(
-            (pair for pair in zip(self.trials, self._tries, strict=True) if pair[1].structure.kind in around),
-            key=lambda pair: (self.error(pair[0]), pair[0].number),
-        )
+        pairs = [pair for pair in zip(self.trials, self._tries, strict=True) if pair[1].structure.kind in around]
+        ranked = sorted(pairs, key=lambda pair: (self.error(pair[0]), pair[0].number))
+        usable = [pair for pair in ranked if math.isfinite(self.error(pair[0]))]
+        leading = {kind: usable[0][1].structure.kind == kind for kind in around} if usable else {}
+        others = [
+            pair
+            for pair in usable
+            if not leading[pair[1].structure.kind] and self.error(pair[0]) < RIVAL**2 * self.error(usable[0][0])
+        ]
         found: list[Try] = []
-        for trial, one in ranked:
-            if math.isfinite(self.error(trial)):
-                found += self._new(around[one.structure.kind](one, self.looked), ROUND - len(found))
-            if len(found) >= ROUND:
-                break
+        for some, most in ((usable, ROUND - ROUND // 2 if others else ROUND), (others, ROUND), (usable, ROUND)):
+            for _, one in some:
+                found += self._new(around[one.structure.kind](one, self.looked), most - len(found))
         return found
 
     def _new(self, wanted: Sequence[Try], n: int) -> list[Try]:
@@ -152,3 +203,19 @@ class Plan:
         training = {**self.training, **one.training} if row.training is Training else dict(one.training)
         values = {"structure": one.structure.label, **one.training}
         return Point(number=self._asked, structure=one.structure, training=training, values=values)
+
+
+def with_repeats(trial: Trial, repeats: Sequence[Trial]) -> Trial:
+    """A trial whose error is the median of its own and those of others of the same point, the upper one of two.
+
+    Args:
+        trial: The trial.
+        repeats: The others; one that was dropped or cannot be used counts as without bound.
+
+    Returns:
+        The trial; not usable where the median is without bound.
+    """
+    errors = [trial.selection_free_run_mse, *(r.selection_free_run_mse if r.in_full else math.inf for r in repeats)]
+    middle = median_high(errors)
+    times = {name: getattr(trial, name) + sum(getattr(one, name) for one in repeats) for name in ("seconds", "cpu_s")}
+    return trial.model_copy(update={"selection_free_run_mse": middle, **times})

@@ -14,7 +14,7 @@ from sysid.workbench.auto.budget import TRIAL, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
-from sysid.workbench.auto.plan import Plan
+from sysid.workbench.auto.plan import AGAIN, Plan
 from sysid.workbench.auto.trials import Trials
 from sysid.workbench.auto.words import Choice, choose, sentence
 from sysid.workbench.fits.config import FitConfig
@@ -156,7 +156,10 @@ class Search:
             folds=len(self.parts.folds),
         )
         training = {**self.parts.training, **budget.limits(TRIAL / len(self.parts.folds))}
-        plan = Plan(looked=self.looked, budget=budget, error=error, training=training)
+        again = AGAIN if self.parts.partial else 0
+        plan = Plan(
+            looked=self.looked, budget=budget, error=error, training=training, seed=self.config.seed, again=again
+        )
         while points := plan.ask():
             plan.tell(trials.run(points))
         if not math.isfinite(plan.least()):
@@ -172,7 +175,7 @@ class Search:
     def _chosen(self, plan: Plan, trials: Trials, wall_s: float) -> Found:
         first = trials.drivers[0]
         checks = Checks(driver=first, bench=self.bench.fold(0))
-        choice = choose(plan.trials, error, checks.first_stable)
+        choice = choose(plan.candidates, error, checks.first_stable)
         shown = {FOUND: choice.chosen}
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear
@@ -190,7 +193,7 @@ class Search:
         outputs = self.config.mapping.outputs
         # Errors of several outputs count over their variances: in standard deviations.
         unit = self.bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
-        said = sentence(choice, plan.trials, unit=unit, ended=plan.ended, error=error)
+        said = sentence(choice, len(plan.trials), again=plan.n_again, unit=unit, ended=plan.ended, error=error)
         return SweepRecord(
             name=self.config.name,
             mapping=str(self.config.mapping),

@@ -53,12 +53,13 @@ def choose(
     return Choice(chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused)
 
 
-def sentence(choice: Choice, trials: Sequence[Trial], *, unit: str, ended: str, error: Error) -> str:
+def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: str, error: Error) -> str:
     """Why this one.
 
     Args:
         choice: What was chosen.
-        trials: All that was tried.
+        tried: How many were tried.
+        again: The best networks among them that were trained again from other starts; 0 for none.
         unit: Of the output.
         ended: Why the search ended.
         error: What chooses.
@@ -74,7 +75,8 @@ def sentence(choice: Choice, trials: Sequence[Trial], *, unit: str, ended: str, 
             f"{quantity(root, unit)} (root mean square) beside {quantity(math.sqrt(error(choice.least)), unit)} of "
             f"{choice.least.label}"
         )
-    parts = [f"{why}, of {len(trials)} tried"]
+    finals = f", the {again} best networks again from other starts" if again else ""
+    parts = [f"{why}, of {tried} tried{finals}"]
     if choice.linear is not None and choice.linear.number != choice.chosen.number:
         share = 1.0 - root / math.sqrt(error(choice.linear))
         parts.append(f"{share:.0%} less than the best linear model, {choice.linear.label}")

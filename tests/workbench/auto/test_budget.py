@@ -20,7 +20,7 @@ LINEAR = Point(number=1, structure=ARX(na=1, nb=(1,), nk=(1,)), training={}, val
 
 def budget(seconds: float | None = None, *, clock: list[float] | None = None, **given: object) -> Budget:
     now = clock or [0.0]
-    fields = {"wall_s": seconds, "iterations": None, "is_stored": lambda _: False, **given}
+    fields = {"wall_s": seconds, "iterations": None, "is_stored": lambda _: False, "kept": 0.0, **given}
     return Budget(clock=lambda: now[0], **fields)  # type: ignore[arg-type]
 
 
@@ -58,3 +58,10 @@ def test_iterations_know_no_time() -> None:
 
 def test_a_share_of_the_time_limits_a_training() -> None:
     assert budget(60.0).limits(0.5) == {"max_time_s": 30.0}
+
+
+def test_a_share_is_kept_until_it_is_let_go() -> None:
+    found = budget(None, iterations=100, kept=0.5)
+    assert found.take([point(1, 5)]) == []
+    found.kept = 0.0
+    assert len(found.take([point(1, 5)])) == 1

@@ -12,7 +12,7 @@ from sysid.models import ARX, NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import Budget, price
 from sysid.workbench.auto.look import Looked
-from sysid.workbench.auto.plan import PATIENCE, Plan
+from sysid.workbench.auto.plan import FINALISTS, PATIENCE, Plan, with_repeats
 from sysid.workbench.auto.search import error
 from sysid.workbench.sweep.search_space import Point
 
@@ -35,10 +35,13 @@ def trial(point: Point, mse: float) -> Trial:
     )
 
 
-def searched(worth: Worth, *, iterations: int = 10**9, looked: Looked = LOOKED) -> tuple[Plan, list[list[Point]]]:
+def searched(
+    worth: Worth, *, iterations: int = 10**9, looked: Looked = LOOKED, again: int = 0
+) -> tuple[Plan, list[list[Point]]]:
     """A search in which a point is worth what is said of it, without a fit."""
     budget = Budget(wall_s=None, iterations=iterations, clock=lambda: 0.0, is_stored=lambda _: False)
-    plan, rounds = Plan(looked=looked, budget=budget, error=error, training={"max_iterations": 50}), []
+    training = {"max_iterations": 50}
+    plan, rounds = Plan(looked=looked, budget=budget, error=error, training=training, again=again), []
     while points := plan.ask():
         rounds.append(points)
         plan.tell([trial(point, worth(point)) for point in points])
@@ -104,3 +107,42 @@ def test_the_same_results_give_the_same_search() -> None:
 def test_there_is_something_to_try_for_any_mapping(looked: Looked) -> None:
     _, rounds = searched(lambda _: 1.0, looked=looked)
     assert {linear(point) for one in rounds for point in one} == {True, False}
+
+
+def test_the_best_networks_are_trained_again_and_luck_does_not_choose() -> None:
+    lucky = []
+
+    def worth(point: Point) -> float:
+        """One network has a small error once, by its start; the others are what they are."""
+        if linear(point):
+            return 4.0
+        if not lucky:
+            lucky.append(str(point.structure))
+            return 0.01
+        return 9.0 if str(point.structure) == lucky[0] else 1.0
+
+    plan, rounds = searched(worth, again=2)
+    seeds = [point.training["seed"] for point in rounds[-1]]
+    assert len(seeds) == 2 * FINALISTS
+    assert len(set(seeds)) == 2
+    assert plan.n_again == FINALISTS
+    assert len(plan.trials) == sum(len(one) for one in rounds[:-1])
+    best = min(plan.candidates, key=error)
+    assert str(best.structure) not in lucky
+    assert error(best) == pytest.approx(1.0)
+
+
+def test_iterations_are_kept_for_that() -> None:
+    plan, rounds = searched(by_size, iterations=2000, again=2)
+    assert "seed" in rounds[-1][0].training
+    assert plan.n_again > 0
+    assert sum(price(point) for one in rounds for point in one) <= 2000
+
+
+def test_the_median_of_its_errors_is_what_a_point_is_worth() -> None:
+    point = Point(number=1, structure=NeuralStateSpace(states=2, neurons=3), training={}, values={})
+    lucky, good, lost = (trial(point, mse) for mse in (0.1, 1.0, math.inf))
+    assert error(with_repeats(lucky, [good, good])) == 1.0
+    assert error(with_repeats(lucky, [good, lost])) == 1.0
+    assert error(with_repeats(lucky, [good])) == 1.0
+    assert error(with_repeats(lucky, [lost, lost])) == math.inf

@@ -27,8 +27,8 @@ from tests.workbench.auto.conftest import data, record, traces
 
 pytestmark = pytest.mark.usefixtures("undrawn", "small")
 
-FEW = 248
-"""Iterations of two linear structures and two networks, four times each."""
+FEW = 560
+"""Iterations of two linear structures and two networks, four times each, and of one network again."""
 FIELDS: dict[str, Any] = {"kind": "auto", "name": "tries", "data": "rig", "mapping": "u -> y", "workers": 1}
 FIELDS |= {"export": None, "stability": {"count": 15}}
 
@@ -86,7 +86,7 @@ def test_the_chosen_one_is_fitted_once_more_to_all_of_the_record(first: tuple[Pa
 def test_the_screen_hears_how_much_is_left(first: tuple[Path, Searched]) -> None:
     shares = [one.fraction for one in TOLD if isinstance(one, StepProgress) and "iterations left" in one.detail]
     assert shares == sorted(shares)
-    assert shares[-1] > 0.9
+    assert shares[-1] > 0.8
 
 
 def test_no_trial_sees_a_case_that_only_scores(first: tuple[Path, Searched], known: Data, tmp_path: Path) -> None:

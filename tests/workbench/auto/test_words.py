@@ -57,6 +57,8 @@ def test_dropped_and_failed_trials_are_not_chosen() -> None:
 
 
 def test_the_sentence_says_what_against_what_and_why_it_ended() -> None:
-    said = sentence(choose(TRIALS, error, stable), TRIALS, unit="V", ended="the budget is spent", error=error)
-    for words in ("NSS 2/2", "NSS 2/3", "1.02\u00a0V", "4 tried", "49% less", "ARX [1; 1; 1]", "the budget is spent"):
+    found = choose(TRIALS, error, stable)
+    said = sentence(found, len(TRIALS), again=3, unit="V", ended="the budget is spent", error=error)
+    tried = "4 tried, the 3 best networks again"
+    for words in ("NSS 2/2", "NSS 2/3", "1.02\u00a0V", tried, "49% less", "ARX [1; 1; 1]", "the budget is spent"):
         assert words in said
