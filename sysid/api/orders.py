@@ -15,11 +15,13 @@ from sysid.api.fits import Fit
 from sysid.errors import ConfigError
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
+from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
 from sysid.extras import need
 from sysid.models import ARX, Mapping, Start
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.metrics import percent
 from sysid.validation.order_finalists import Finalist, run_finalists
+from sysid.validation.structure_search import ARX_KIND, MOST, Found, check_kinds, run_structures, score
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 LARGEST = 400_000
 """Candidates that a search without orders of its own tries at most: some seconds."""
 
+BY_SELECTION = "sorted by the free run over the selection traces"
 FINALISTS = 40
 """Candidates that are run freely."""
 
@@ -45,6 +48,8 @@ class OrderSearch:
         mapping: Inputs and output.
         traces: The data set.
         start: How each free run begins.
+        others: What became of other structures, where some were asked for.
+        states: Canonical correlations of past and future, where state spaces were.
     """
 
     losses: OrderLosses
@@ -54,6 +59,8 @@ class OrderSearch:
     mapping: Mapping
     traces: TraceSet
     start: Start
+    others: Found | None = None
+    states: StateOrders | None = None
 
     def best(self, criterion: str | None = None) -> ARX:
         """The structure to go on with.
@@ -81,14 +88,32 @@ class OrderSearch:
         return self.losses.best(known[criterion.lower()])
 
     @property
+    def contenders(self) -> tuple[Finalist, ...]:
+        """All structures in one table, best first: the best ARX models, and every other structure that was fitted."""
+        if self.others is None:
+            return self.finalists
+        known = {one.fit.model.structure.label: one for one in self.finalists}
+        by_bic = known.get(self.losses.best().label)
+        arx = [self.finalists[0], *([by_bic] if by_bic is not None else [])]
+        found = list({one.fit.model.structure.label: one for one in [*arx, *self.others.finalists]}.values())
+        if self.selects:
+            return tuple(sorted(found, key=lambda one: -one.mean_fit))
+        return tuple(sorted(found, key=lambda one: self.score(one, Criterion.BIC)))
+
+    @property
+    def selects(self) -> bool:
+        """Whether traces chose that nothing was fitted to."""
+        return self.chosen_by == BY_SELECTION
+
+    @property
     def fit(self) -> Fit:
-        """The fit of the first of the shortlist."""
-        return Fit.of(self.finalists[0].fit, self.traces, self.start)
+        """The fit of the first of all."""
+        return Fit.of(self.contenders[0].fit, self.traces, self.start)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader has to know: where the best stands at the end of what was tried."""
-        best, grid = self.best(), self.grid
+        best, grid = _orders(self.finalists[0]), self.grid
         at_end = [
             f"{name} = {found}"
             for name, found, largest in (
@@ -98,9 +123,14 @@ class OrderSearch:
             )
             if found == largest > 0
         ]
-        if not at_end:
-            return ()
-        return (f"The best stands at the end of what was tried ({', '.join(at_end)}): allow more.",)
+        arx = "The best" if self.others is None else "The best ARX model"
+        told = [f"{arx} stands at the end of what was tried ({', '.join(at_end)}): allow more."] if at_end else []
+        if self.others is not None:
+            first = self.contenders[0].fit.model.structure.label
+            at_largest = first in self.others.largest
+            told += [f"{first} has the largest order that was tried of its kind: allow more (most)."] * at_largest
+            told += self.others.notes
+        return tuple(told)
 
     def to_frame(self) -> pd.DataFrame:
         """The shortlist as a table, best first.
@@ -122,13 +152,13 @@ class OrderSearch:
                 "fit": one.mean_fit,
                 "stable": bool(np.isfinite(one.mean_fit)),
             }
-            for one in self.finalists
+            for one in self.contenders
         ]
         return pd.DataFrame(rows)
 
     def score(self, finalist: Finalist, criterion: Criterion) -> float:
-        """A criterion of one of the shortlist; smaller is better."""
-        return float(self.losses.score(criterion)[self._index(finalist)])
+        """A criterion of a structure; smaller is better."""
+        return score(finalist, self.losses.n_samples, criterion)
 
     def plot(self) -> Figure:
         """Loss against number of parameters, with what each criterion chooses.
@@ -150,7 +180,7 @@ class OrderSearch:
         lines = [
             f"{one.fit.model.structure.label:<24}{one.fit.model.n_parameters:>11}{one.one_step_mse:>14.4g}"
             f"{self.score(one, Criterion.BIC):>12.1f}{percent(one.mean_fit):>17}"
-            for one in self.finalists[:10]
+            for one in self.contenders[: 10 if self.others is None else None]
         ]
         return "\n".join([f"{len(self.losses):,} structures; {self.chosen_by}", head, *lines, *self.notes])
 
@@ -158,13 +188,6 @@ class OrderSearch:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
-
-    def _index(self, finalist: Finalist) -> int:
-        orders = _orders(finalist)
-        same = (
-            (self.losses.na == orders.na) & (self.losses.nb == orders.nb).all(1) & (self.losses.nk == orders.nk).all(1)
-        )
-        return int(np.flatnonzero(same)[0])
 
 
 def search_orders(
@@ -175,10 +198,15 @@ def search_orders(
     max_nb: int | None = None,
     max_nk: int | None = None,
     start: Start = ESTIMATED,
+    structures: Sequence[str] = (ARX_KIND,),
+    most: int = MOST,
     selection: Sequence[Trace] | None = None,
     workers: int = 2,
 ) -> OrderSearch:
     """Search the orders of an ARX model: the exact loss of every candidate, and the free run of the best of each size.
+
+    Other structures are fitted beside it where they are asked for, with orders from 1 on and the dead times of the ARX
+    model that BIC chooses, and stand in one table with the best ARX models.
 
     Args:
         traces: The data set; its selection traces choose where there are some.
@@ -188,6 +216,8 @@ def search_orders(
         max_nb: Largest number of past values of each input, likewise.
         max_nk: Largest dead time, likewise.
         start: How each free run begins.
+        structures: Kinds beside ARX: ``SS``, ``TF``, ``OE``, ``ARMAX``, ``BJ``.
+        most: Largest order of those.
         selection: Traces that choose, in place of those of the data set.
         workers: Threads.
 
@@ -225,15 +255,22 @@ def search_orders(
     found = run_finalists(
         losses, estimation, chosen, selection or estimation, count=FINALISTS, start=start, workers=workers
     ).ranked
+    kinds, others, states = [kind for kind in check_kinds(structures) if kind != ARX_KIND], None, None
+    if kinds:
+        others = run_structures(
+            kinds, estimation, chosen, selection or estimation, dead_times=losses.best().nk, start=start, most=most
+        )
+    if "SS" in kinds:
+        states = state_orders(estimation, chosen, most=most)
     if selection:
-        said = "sorted by the free run over the selection traces"
+        said = BY_SELECTION
     else:
-        bic = {losses.orders(i).label: float(losses.score(Criterion.BIC)[i]) for i in losses.shortlist(FINALISTS)}
-        found = tuple(sorted(found, key=lambda one: bic[one.fit.model.structure.label]))
+        found = tuple(sorted(found, key=lambda one: score(one, losses.n_samples, Criterion.BIC)))
         said = "sorted by BIC, for want of selection traces"
     return OrderSearch(
-        losses=losses, finalists=found, chosen_by=said, grid=grid, mapping=chosen, traces=traces, start=start
-    )
+        losses=losses, finalists=found, chosen_by=said, grid=grid, mapping=chosen, traces=traces, start=start,
+        others=others, states=states,
+    )  # fmt: skip
 
 
 def _grid(samples: int, inputs: int, asked: tuple[int | None, int | None, int | None]) -> OrderGrid:

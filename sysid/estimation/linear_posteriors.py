@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.networks.posterior import Noise, Posterior, remaining
+from sysid.estimation.networks.posterior import Noise, Posterior, free_run_errors, remaining
+from sysid.estimation.nonparametric.noise import persistence
 from sysid.estimation.result import FitResult
 from sysid.models import ARXModel, Start, TransferFunctionModel
 from sysid.traces import Trace
@@ -42,8 +43,9 @@ def arx_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Post
         factor[0] = root[n]
     runs = [Experiment.for_model(trace, model, start) for trace in traces]
     counted = sum(run.n_counted for run in runs)
-    share = counted / max(counted - len(root), 1)
-    noise = Noise(free_run=remaining(model, runs).free_run * share, one_step=known.noise_variance)
+    # What a free run leaves persists: as many parameters take more of it away than of white errors.
+    paid = min(len(root) * persistence(free_run_errors(model, runs)), 0.5 * counted)
+    noise = Noise(free_run=remaining(model, runs).free_run * counted / (counted - paid), one_step=known.noise_variance)
     return Posterior(factor=factor, noise=noise)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysid.reporting.figures.order_figure import OrderCurve, order_figure
+from sysid.reporting.figures.order_figure import OrderCurve, order_figure, states_figure
 from sysid.reporting.parts import Part, Section, picture
 from sysid.reporting.results import OrdersRecord, Results
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
@@ -22,7 +22,9 @@ def orders_section(results: Results) -> Section | None:
     parts: list[Part] = []
     for index, found in enumerate(results.orders):
         parts.append(f"{found.mapping}: {found.label}, {found.chosen_by}. {' '.join(found.notes)}".strip())
-        parts += [_picture(found, index), _table(found)]
+        parts += [_picture(found, index)]
+        parts += [_states(found, index)] if found.correlations else []
+        parts += [_table(found)]
     return Section(anchor="orders", title="Which orders the data ask for", parts=tuple(parts))
 
 
@@ -41,6 +43,14 @@ def _picture(found: OrdersRecord, index: int) -> Part:
     return picture(order_figure(curve, unit=found.unit), f"Orders of {found.mapping}", caption, f"orders-{index}")
 
 
+def _states(found: OrdersRecord, index: int) -> Part:
+    caption = (
+        f"{found.mapping}: canonical correlations of past and future. Each that stands out above the rest is a "
+        "state that the record shows."
+    )
+    return picture(states_figure(found.correlations), f"States of {found.mapping}", caption, f"states-{index}")
+
+
 def _table(found: OrdersRecord) -> Table:
     rows = tuple(
         (
@@ -54,7 +64,7 @@ def _table(found: OrdersRecord) -> Table:
         for row in found.rows
     )
     return Table(
-        caption=f"The best of each size in free run, {found.mapping}: {found.chosen_by}.",
+        caption=f"Structures in free run, {found.mapping}: {found.chosen_by}.",
         head=(
             ("structure", ""),
             ("parameters", ""),

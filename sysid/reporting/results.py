@@ -277,7 +277,7 @@ class OrderCurveRecord(Record):
 
 
 class OrdersRecord(Record):
-    """What a search over the orders of ARX models found for one output."""
+    """What a search over the orders of ARX models, and of other structures, found for one output."""
 
     mapping: str = Field(description="Written as in 'BP+AR -> BC'.")
     unit: str = Field(description="The output's unit.")
@@ -285,6 +285,7 @@ class OrdersRecord(Record):
     label: str = Field(description="The same in a few characters.")
     chosen_by: str = Field(description="By what it is the best.")
     notes: list[str] = Field(default=[], description="Such as that it stands at the end of what was tried.")
+    correlations: list[float] = Field(default=[], description="Canonical correlations of past and future, descending.")
     curve: OrderCurveRecord
     rows: list[OrderRow] = Field(description="The first structures, best first.")
 

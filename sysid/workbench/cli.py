@@ -219,17 +219,23 @@ def ingest(
 @app.command(epilog='Example: sysid orders dryer --mapping "heater -> temperature"')
 def orders(
     source: Annotated[str, typer.Argument(help="The name of a data set, or a file with traces.")],
+    *,
     mapping: Annotated[
         str | None, typer.Option(help="Inputs and output, as u1+u2 -> y; not needed for two channels.")
     ] = None,
     max_na: Annotated[int | None, typer.Option(min=0, help="Largest number of past outputs.")] = None,
     max_nb: Annotated[int | None, typer.Option(min=0, help="Largest number of past values of each input.")] = None,
     max_nk: Annotated[int | None, typer.Option(min=0, help="Largest dead time in samples.")] = None,
+    structures: Annotated[
+        str, typer.Option(help="Structures beside ARX: some of SS,TF,OE,ARMAX,BJ, with commas, or all.")
+    ] = "",
+    most: Annotated[int, typer.Option(min=1, max=20, help="Largest order of those.")] = 4,
 ) -> None:
-    """Which ARX orders do the data ask for? Every structure by its one-step loss, the best of each size in free run."""
+    """Which orders do the data ask for? Every ARX model by its one-step loss, the best of each size in free run."""
     from sysid.workbench.commands.orders import orders_command
 
-    orders_command(source, mapping=mapping, max_na=max_na, max_nb=max_nb, max_nk=max_nk)
+    ranges = {"max_na": max_na, "max_nb": max_nb, "max_nk": max_nk}
+    orders_command(source, mapping=mapping, ranges=ranges, structures=structures, most=most)
 
 
 @app.command(epilog='Example: sysid advise dryer --mapping "heater -> temperature"')

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import sysid
 from sysid.api.orders import LARGEST, OrderSearch, _grid
 from sysid.errors import ConfigError, TraceError
+from sysid.estimation.linear.order_search import Criterion
 
 
 def record(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -80,3 +82,48 @@ def test_what_cannot_be_searched_is_refused() -> None:
         sysid.search_orders(many, "u1+u2+u3+u4 -> y", max_nb=30, max_nk=30)
     with pytest.raises(ConfigError, match="no trace is for estimation"):
         sysid.search_orders(sysid.data([record(60)], sample_time=1.0, split=["test"]), "u -> y")
+
+
+@pytest.fixture(scope="module")
+def several() -> OrderSearch:
+    """A quick plant under output noise, so that structures without noise in the equation are right."""
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.choice([-1.0, 1.0], 80), 5)
+    y = lfilter([0.0, 0.0, 0.3], [1.0, -0.7], u) + 0.05 * rng.standard_normal(400)
+    traces = sysid.data((u, y), sample_time=1.0)
+    return sysid.search_orders(
+        traces, "u -> y", max_na=3, max_nb=3, max_nk=3, structures=["SS", "oe", "ARMAX", "BJ", "TF"], most=2
+    )
+
+
+def test_other_structures_stand_in_one_table_with_the_arx_models(several: OrderSearch) -> None:
+    frame = several.to_frame()
+    assert {label.split()[0] for label in frame["structure"]} == {"ARX", "SS", "OE", "ARMAX", "BJ", "TF"}
+    assert frame["BIC"].is_monotonic_increasing
+    assert frame["structure"].iloc[0] in {"TF [1; 0; 2]", "OE [1; 1; 2]"}
+    assert several.fit.model.structure.label == frame["structure"].iloc[0]
+    assert "SS 2" in str(several)
+
+
+def test_an_arx_model_has_the_same_figures_in_either_table(several: OrderSearch) -> None:
+    best = several.losses.best()
+    (row,) = (one for one in several.contenders if one.fit.model.structure == best)
+    assert several.score(row, Criterion.BIC) == pytest.approx(several.losses.score(Criterion.BIC).min())
+
+
+def test_state_spaces_bring_the_correlations_that_show_their_states(several: OrderSearch) -> None:
+    assert several.states is not None
+    # One pole, and one more state for the dead time of two samples.
+    _, second, third = several.states.correlations[:3]
+    assert second > 2.0 * third
+
+
+def test_a_structure_that_the_record_is_too_short_for_is_told() -> None:
+    traces = sysid.data(record(20), sample_time=1.0)
+    found = sysid.search_orders(traces, "u -> y", max_na=1, max_nb=1, max_nk=1, structures=["BJ"], most=4)
+    assert any(note.startswith("BJ ") and "fewer samples" in note for note in found.notes)
+
+
+def test_an_unknown_structure_is_refused_by_name() -> None:
+    with pytest.raises(ConfigError, match="no structure of this kind"):
+        sysid.search_orders(sysid.data(record(60), sample_time=1.0), "u -> y", structures=["NARMAX"])

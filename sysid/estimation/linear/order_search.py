@@ -36,6 +36,27 @@ class Criterion(enum.Enum):
     """Schwarz 1978, Rissanen's MDL: ``N ln V + p ln N``."""
 
 
+def weighed(mse: NDArray[np.float64], p: NDArray[np.int64], n: int, criterion: Criterion) -> NDArray[np.float64]:
+    """A criterion from errors and sizes; smaller is better.
+
+    Args:
+        mse: Mean squared one-step errors, shape ``(n_candidates,)``.
+        p: Numbers of parameters, likewise.
+        n: Samples that count.
+        criterion: Which.
+
+    Returns:
+        Shape ``(n_candidates,)``.
+    """
+    if criterion is Criterion.LOSS:
+        return mse
+    fit = n * np.log(np.maximum(mse, np.finfo(np.float64).tiny))
+    if criterion is Criterion.BIC:
+        return np.asarray(fit + p * np.log(n))
+    correction = 2.0 * p * (p + 1) / np.maximum(n - p - 1, 1) if criterion is Criterion.AICC else 0.0
+    return np.asarray(fit + 2.0 * p + correction)
+
+
 @dataclass(frozen=True, kw_only=True)
 class OrderGrid:
     """The candidates of a search: every combination of orders and dead times.
@@ -150,14 +171,7 @@ class OrderLosses:
         Returns:
             Shape ``(n_candidates,)``.
         """
-        if criterion is Criterion.LOSS:
-            return self.mse
-        n, p = self.n_samples, self.n_parameters
-        fit = n * np.log(np.maximum(self.mse, np.finfo(np.float64).tiny))
-        if criterion is Criterion.BIC:
-            return np.asarray(fit + p * np.log(n))
-        correction = 2.0 * p * (p + 1) / np.maximum(n - p - 1, 1) if criterion is Criterion.AICC else 0.0
-        return np.asarray(fit + 2.0 * p + correction)
+        return weighed(self.mse, self.n_parameters, self.n_samples, criterion)
 
     def best(self, criterion: Criterion = Criterion.BIC) -> ARX:
         """The candidate with the least criterion.

@@ -24,8 +24,10 @@ Jacobian in free run or one step ahead, and a measured output has the residuals'
 
 :math:`\sigma^2` is a figure of its own for each of the two: the mean squared residual on the estimation records, times
 :math:`N / (N - c\,\tau\gamma)` for the parameters that were fitted (of free-run residuals, :math:`\tau` at a time
-count as one). What a free run leaves is not noise but an error of the model, which depends on what the inputs do; the
-records that it was fitted to show the least of it. Where there are traces that trained nothing (``selection``),
+count as one). :math:`\tau` here, and in :math:`\beta`, is that of an autoregression of the residuals
+(:func:`~sysid.estimation.nonparametric.noise.persistence`) where that is longer than what training counted.
+What a free run leaves is not noise but an error of the model, which depends on what the inputs do; the records that
+it was fitted to show the least of it. Where there are traces that trained nothing (``selection``),
 :func:`calibrate` therefore compares the standardised errors there with what the Gaussian promises, and ``spread``
 widens the intervals by the ratio of their 95 % quantiles (a split conformal interval, Lei et al. 2018,
 "Distribution-free predictive inference for regression", section 5.2, applied to whole records).
@@ -48,9 +50,11 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.least_squares.evidence import SAMPLES_PER_PARAMETER
 from sysid.estimation.least_squares.levenberg_marquardt import State
 from sysid.estimation.networks.provider import RecursionProvider
-from sysid.estimation.result import Loop
+from sysid.estimation.nonparametric.noise import persistence
+from sysid.estimation.result import Evidence, Loop
 from sysid.models import AbstractModel, Recursion
 
 CALIBRATED_AT = 0.95
@@ -183,14 +187,46 @@ def laplace(
     if evidence is None:
         return None
     root = 1.0 / np.sqrt(state.prior.precision)
-    M = (state.prior.beta / copies) * state.at.gauss_newton * root[:, None] * root[None, :]
-    M[np.diag_indices_from(M)] += 1.0
     counted = len(model.mapping.outputs) * sum(e.n_counted for e in experiments)
-    paid = copies * stride * evidence.correlation_time * evidence.total_effective_parameters
+    slower = _slower(model, experiments, evidence, counted, stride)
+    M = (state.prior.beta / (copies * slower)) * state.at.gauss_newton * root[:, None] * root[None, :]
+    M[np.diag_indices_from(M)] += 1.0
+    paid = slower * copies * stride * evidence.correlation_time * evidence.total_effective_parameters
     left = max(1.0 - paid / counted, LEAST_NOISE_SHARE)
     errors = remaining(model, experiments)
     noise = Noise(free_run=errors.free_run / left, one_step=errors.one_step / left)
     return Posterior(factor=to_plain @ (root[:, None] * _inverse_root(M)), noise=noise)
+
+
+def _slower(
+    model: AbstractModel, experiments: Sequence[Experiment], evidence: Evidence, counted: int, stride: int
+) -> float:
+    """By how much the free run's errors persist longer than training took them to.
+
+    The evidence sums the autocorrelations of what a fit leaves, which has lost its slowest part to the fit; that is
+    steady enough to train by, and too short to say how well the parameters are known.
+    """
+    longest = counted / (SAMPLES_PER_PARAMETER * max(evidence.total_effective_parameters, 1.0))
+    found = min(persistence(free_run_errors(model, experiments)), longest)
+    return max(found / (stride * evidence.correlation_time), 1.0)
+
+
+def free_run_errors(model: AbstractModel, experiments: Sequence[Experiment]) -> list[NDArray[np.float64]]:
+    """Errors of the free run over some records, those that do not count as zero.
+
+    Args:
+        model: The model.
+        experiments: The records, each with the history that its run begins with.
+
+    Returns:
+        For each record and output shape ``(n_samples,)``.
+    """
+    found = []
+    for e in experiments:
+        left = (model.simulate(e.inputs, e.history) - e.output).reshape(len(e.output), -1)
+        counts = np.ones(len(left), dtype=bool) if e.weights is None else e.weights > 0.0
+        found += list(np.where(counts[:, np.newaxis], left, 0.0).T)
+    return found
 
 
 def remaining(model: AbstractModel, experiments: Sequence[Experiment]) -> Noise:

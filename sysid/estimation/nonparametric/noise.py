@@ -45,3 +45,40 @@ def whitener(residuals: Sequence[NDArray[np.float64]], most: int, *, exact: bool
     outside = np.abs(roots) >= 1.0
     roots[outside] = 0.999 / np.conj(roots[outside])
     return np.asarray(np.real(np.poly(roots)), dtype=np.float64)
+
+
+LONGEST_MEMORY = 12
+"""Order of an autoregression of errors, at most."""
+
+
+def persistence(residuals: Sequence[NDArray[np.float64]]) -> float:
+    r"""Integrated autocorrelation time of some errors in samples, from their autoregression.
+
+    :math:`\tau = S(0)/r(0)`, the spectrum at frequency 0 over the variance. A fit takes the slowest part of its errors
+    away, so that sums of the autocorrelations of what is left are too small, by half on a short record; a model of
+    the errors reads it from their recursion.
+
+    Args:
+        residuals: Of each record, shape ``(n_samples,)``.
+
+    Returns:
+        At least 1.
+
+    Example:
+        >>> noise = np.random.default_rng(0).standard_normal(2_000)
+        >>> from scipy.signal import lfilter
+        >>> slow = lfilter([1.0], [1.0, -0.8], noise)
+        >>> persistence([noise]) < 1.5, 7.0 < persistence([slow]) < 11.0
+        (True, True)
+    """
+    rows = sum(map(len, residuals))
+    finite = all(np.isfinite(e).all() for e in residuals)
+    a = whitener(residuals, min(LONGEST_MEMORY, rows // 20)) if finite else np.ones(1)
+    order = len(a) - 1
+    if order == 0:
+        return 1.0
+    driven = np.zeros((order, order))
+    driven[0, 0] = 1.0
+    variance = linalg.solve_discrete_lyapunov(linalg.companion(a), driven)[0, 0]
+    found = 1.0 / (float(a.sum()) ** 2 * float(variance))
+    return max(found, 1.0) if np.isfinite(found) else 1.0

@@ -86,3 +86,26 @@ def order_figure(curve: OrderCurve, *, unit: str, title: str = "One-step loss of
         axes.set_ylabel(f"mean squared one-step error [{unit}²]")
         axes.legend(loc="upper right")
         return figure
+
+
+def states_figure(correlations: Sequence[float], *, title: str = "States that the record shows") -> Figure:
+    """Canonical correlations of past and future, as bars: those that stand out are states.
+
+    Args:
+        correlations: Descending, from 0 to 1.
+        title: Stands above.
+
+    Returns:
+        The figure; nothing outside it was touched.
+    """
+    with styled():
+        figure = new_figure(7.6, 2.8)
+        axes = figure.subplots()
+        axes.set_title(title)
+        places = range(1, len(correlations) + 1)
+        axes.bar(places, correlations, color=PALETTE[0])
+        axes.set_xticks(places)
+        axes.set_ylim(0.0, 1.0)
+        axes.set_xlabel("state")
+        axes.set_ylabel("canonical correlation")
+        return figure

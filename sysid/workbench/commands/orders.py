@@ -1,21 +1,25 @@
-"""``sysid orders``: which ARX orders a data set asks for."""
+"""``sysid orders``: which orders a data set asks for, of ARX models and of other structures."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
+import yaml
 from rich.table import Table
 
 from sysid.api.fitting import load
 from sysid.api.looking import mapping_of
 from sysid.api.orders import OrderSearch, search_orders
 from sysid.estimation.linear.order_search import Criterion
+from sysid.models import AbstractStructure
 from sysid.names import slug
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.numbers import number
 from sysid.validation.metrics import percent
+from sysid.validation.structure_search import KINDS, MOST
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.store import write_bytes
@@ -25,23 +29,27 @@ ROWS = 15
 
 
 def orders_command(
-    source: str, *, mapping: str | None, max_na: int | None, max_nb: int | None, max_nk: int | None
+    source: str, *, mapping: str | None, ranges: dict[str, int | None], structures: str = "", most: int = MOST
 ) -> None:
     """Show which orders a data set asks for: a table on the screen, a picture beside.
 
     Args:
         source: A data set's name or path, or a file with traces.
         mapping: Inputs and output; needed where the data set has more than two channels.
-        max_na: Largest number of past outputs.
-        max_nb: Largest number of past values of each input.
-        max_nk: Largest dead time.
+        ranges: ``max_na``, ``max_nb`` and ``max_nk`` of the ARX models.
+        structures: Kinds beside ARX, with commas between; ``all`` for every one.
+        most: Largest order of those.
 
     Raises:
         UserError: If the data cannot be read, or the mapping is missing or wrong.
     """
     traces = load(source)
     chosen = mapping_of(traces, mapping)
-    found = search_orders(traces, chosen, max_na=max_na, max_nb=max_nb, max_nk=max_nk)
+    kinds = (
+        list(KINDS) if structures.strip().lower() == "all" else [k.strip() for k in structures.split(",") if k.strip()]
+    )
+    asked: dict[str, Any] = {**ranges, "structures": kinds, "most": most}
+    found = search_orders(traces, chosen, **asked)
     console().print(_table(found))
     for note in found.notes:
         console().print(f"note: {note}", soft_wrap=True)
@@ -50,18 +58,25 @@ def orders_command(
     picture = Path(f"{slug(traces.name)}.orders.svg")
     write_bytes(picture, drawing.encode())
     console().print(f"picture: {nearby(picture)}", soft_wrap=True)
-    best = found.best()
-    nb, nk = list(best.nb), list(best.nk)
-    console().print(f"in a pipeline: structure: {{kind: ARX, na: {best.na}, nb: {nb}, nk: {nk}}}", soft_wrap=True)
+    if found.states is not None:
+        sizes = ", ".join(f"{size:.3f}" for size in found.states.correlations[: most + 3])
+        console().print(f"canonical correlations of past and future: {sizes}: those that stand out are states")
+    console().print(f"in a pipeline: structure: {_written(found.fit.model.structure)}", soft_wrap=True)
+
+
+def _written(structure: AbstractStructure) -> str:
+    """A structure as a pipeline has it, in one line."""
+    own = {name: value for name, value in structure.to_dict().items() if value is not None}
+    return yaml.safe_dump(own, default_flow_style=True, sort_keys=False, width=1_000).strip()
 
 
 def _table(found: OrderSearch) -> Table:
-    title = f"{len(found.losses):,} structures of {found.mapping}, {found.chosen_by}"
+    title = f"{len(found.losses):,} ARX structures of {found.mapping}, {found.chosen_by}"
     table = Table(title=title, title_justify="left")
     table.add_column("structure")
     for head in ("parameters", f"one-step mse [{found.unit}²]", "AICc", "BIC", "free run, fit %"):
         table.add_column(head, justify="right")
-    for one in found.finalists[:ROWS]:
+    for one in found.contenders[: ROWS if found.others is None else None]:
         aicc, bic = (found.score(one, criterion) for criterion in (Criterion.AICC, Criterion.BIC))
         table.add_row(
             one.fit.model.structure.label,

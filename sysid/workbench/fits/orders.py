@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 
 from sysid.code_digest import code_digest
 from sysid.estimation.linear.order_search import Criterion
+from sysid.validation.structure_search import MOST
 from sysid.workbench.old_words import STRICT
 from sysid.workbench.runner.store import digest
 
@@ -26,14 +27,16 @@ FREE_RUN: Final = "free run"
 
 
 class OrdersConfig(BaseModel):
-    """A search over the orders of ARX models, told in the report; it decides nothing.
+    """A search over the orders of ARX models, and of other structures, told in the report; it decides nothing.
 
     Args:
         max_na: Largest number of past outputs; by default as many as record and inputs allow, ten at most.
         max_nb: Largest number of past values of each input, likewise.
         max_nk: Largest dead time, likewise.
         criterion: What names the best: the free run over the traces that choose, or one of ``AIC``, ``AICc``, ``BIC``
-            and ``loss``.
+            and ``loss``, which choose among the ARX models.
+        structures: Kinds beside ARX that are fitted with orders from 1 on: ``SS``, ``TF``, ``OE``, ``ARMAX``, ``BJ``.
+        most: Largest order of those.
     """
 
     model_config = STRICT
@@ -42,6 +45,8 @@ class OrdersConfig(BaseModel):
     max_nb: int | None = Field(default=None, ge=0)
     max_nk: int | None = Field(default=None, ge=0)
     criterion: Literal["free run", "AIC", "AICc", "BIC", "loss"] = FREE_RUN
+    structures: tuple[Literal["ARX", "SS", "TF", "OE", "ARMAX", "BJ"], ...] = ()
+    most: int = Field(default=MOST, ge=1, le=20)
 
 
 def orders_key(config: PipelineConfig, data: Data) -> str:
@@ -78,7 +83,7 @@ def search(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
     from sysid.api.orders import search_orders
 
     asked = config.orders or OrdersConfig()
-    ranges = {name: getattr(asked, name) for name in ("max_na", "max_nb", "max_nk")}
+    ranges = {name: getattr(asked, name) for name in ("max_na", "max_nb", "max_nk", "structures", "most")}
     criterion = None if asked.criterion == FREE_RUN else asked.criterion
     return [
         _record(
@@ -92,7 +97,7 @@ def search(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
 def _record(found: OrderSearch, criterion: str | None) -> dict[str, Any]:
     from sysid.reporting.figures.order_figure import OrderCurve
 
-    best = found.best(criterion)
+    best = found.fit.model.structure if criterion is None else found.best(criterion)
     return {
         "mapping": str(found.mapping),
         "unit": found.unit,
@@ -100,6 +105,7 @@ def _record(found: OrderSearch, criterion: str | None) -> dict[str, Any]:
         "label": best.label,
         "chosen_by": found.chosen_by if criterion is None else f"least {criterion}",
         "notes": list(found.notes),
+        "correlations": [] if found.states is None else found.states.correlations[: found.states.most + 3].tolist(),
         "curve": dataclasses.asdict(OrderCurve.of(found.losses)),
         "rows": [
             {
@@ -110,7 +116,7 @@ def _record(found: OrderSearch, criterion: str | None) -> dict[str, Any]:
                 "bic": found.score(one, Criterion.BIC),
                 "free_run_fit": one.mean_fit if math.isfinite(one.mean_fit) else None,
             }
-            for one in found.finalists[:ROWS]
+            for one in found.contenders[: ROWS if found.others is None else None]
         ],
     }
 

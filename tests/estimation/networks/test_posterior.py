@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.signal import lfilter
 
 from sysid.estimation import Evidence, Loop, Posterior, Training, fit_narx
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.damping.marquardt import MarquardtDamping
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import State
-from sysid.estimation.networks.posterior import Noise, calibrate, laplace
+from sysid.estimation.networks.posterior import Noise, calibrate, laplace, remaining
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.models import NARX, History, Mapping, NARXModel, Scaling, Start
 from sysid.testing import finite_difference_jacobian, simulate
@@ -35,6 +36,13 @@ def experiment(n: int = 60, seed: int = 5) -> Experiment:
     rng = np.random.default_rng(seed)
     history = History.at_rest(inputs=[0.2], output=0.0)
     return Experiment(inputs=rng.uniform(-2, 2, (n, 1)), output=rng.uniform(-2, 2, n), history=history)
+
+
+def noisy(memory: float = 0.0) -> Experiment:
+    """A record whose free run leaves errors that are white, or remember their last value."""
+    e = experiment()
+    noise = lfilter([1.0], [1.0, -memory], np.random.default_rng(2).standard_normal(len(e.output)))
+    return replace(e, output=model().simulate(e.inputs, e.history) + noise)
 
 
 def outputs(of: NARXModel, e: Experiment, loop: Loop):
@@ -79,7 +87,7 @@ def state(alpha: float, beta: float, gauss_newton: np.ndarray) -> State:
 @pytest.mark.parametrize("copies", [1, 3], ids=["each record once", "each record three times"])
 def test_the_covariance_is_the_inverse_of_the_curvature_in_the_basis_of_training(copies):
     J, P = RNG.standard_normal((40, 23)), np.eye(23) + 0.1 * RNG.standard_normal((23, 23))
-    found = laplace(state(0.7, 2.5, J.T @ J), model(), P, (experiment(),), copies=copies)
+    found = laplace(state(0.7, 2.5, J.T @ J), model(), P, (noisy(),), copies=copies)
     expected = P @ np.linalg.inv(2.5 / copies * J.T @ J + 0.7 * np.eye(23)) @ P.T
     assert_allclose(found.covariance, expected, rtol=1e-9, atol=1e-12)
 
@@ -93,12 +101,19 @@ def test_where_the_data_say_nothing_the_prior_stands():
 
 
 def test_the_noise_is_the_residual_with_the_parameters_paid_for():
-    found = laplace(state(1.0, 1.0, np.eye(23)), model(), np.eye(23), (experiment(),), copies=1)
-    e = experiment()
+    e = noisy()
+    found = laplace(state(1.0, 1.0, np.eye(23)), model(), np.eye(23), (e,), copies=1)
     free = np.mean((model().simulate(e.inputs, e.history) - e.output) ** 2)
     step = np.mean((model().predict(e.inputs, e.output, e.history) - e.output) ** 2)
     assert found.noise.free_run == pytest.approx(free * 60 / 55)
     assert found.noise.one_step == pytest.approx(step * 60 / 55)
+
+
+def test_errors_that_persist_say_less_than_training_counted_them_for():
+    white, slow = (laplace(state(1.0, 1.0, np.eye(23)), model(), np.eye(23), (noisy(m),), copies=1) for m in (0.0, 0.9))
+    assert np.trace(slow.covariance) > 1.2 * np.trace(white.covariance)
+    left = remaining(model(), (noisy(0.9),)).free_run
+    assert slow.noise.free_run > 1.2 * left  # the parameters are paid for with more samples each
 
 
 def test_without_evidence_there_is_no_posterior():

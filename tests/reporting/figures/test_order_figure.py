@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sysid.estimation.linear.order_search import OrderLosses
-from sysid.reporting.figures.order_figure import OrderCurve, order_figure
+from sysid.reporting.figures.order_figure import OrderCurve, order_figure, states_figure
 
 
 def losses() -> OrderLosses:
@@ -21,3 +21,8 @@ def test_the_best_of_each_size_and_the_choices_are_drawn() -> None:
     np.testing.assert_allclose(best, [[3, 1.0], [4, 0.5], [5, 0.495]])
     assert [line.get_xydata().tolist() for line in axes.lines[1:]] == [[[4, 0.5]]] * 3
     assert "psi²" in axes.get_ylabel()
+
+
+def test_a_bar_for_every_state_shows_its_correlation() -> None:
+    (axes,) = states_figure([0.99, 0.9, 0.2]).axes
+    assert [bar.get_height() for bar in axes.patches] == [0.99, 0.9, 0.2]

@@ -42,7 +42,7 @@ mapping: u+w -> level+heat
 start: rest
 rest: {heat: 1.0}
 stability: {count: 5}
-orders: {max_na: 2, max_nb: 2, max_nk: 1, criterion: BIC}
+orders: {max_na: 2, max_nb: 2, max_nk: 1, criterion: BIC, structures: [SS], most: 2}
 fits:
   - {name: ARX, structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}}
   - name: alone

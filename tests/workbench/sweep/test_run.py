@@ -201,3 +201,11 @@ def test_all_cases_choose_in_a_reproduction_and_a_sampler_tries_fewer_points(wor
     assert "all of them took part in the choice" in page
     assert "neither fitted to nor chosen on" not in page
     assert "stay unseen" not in page
+
+
+def test_the_states_of_a_state_space_are_swept_without_a_training(workspace: Path) -> None:
+    structure, after = SWEEP.split("structure:\n", maxsplit=1)[0], "export: null\nstability: {count: 5}\n"
+    found = run(workspace, structure + "structure: {kind: SS, states: {from: 1, to: 3}}\n" + after)
+    assert [trial.label for trial in found.record.trials] == ["SS 1", "SS 2", "SS 3"]
+    assert found.record.winning is not None
+    assert found.results.fits[0].label == found.record.winning.label
