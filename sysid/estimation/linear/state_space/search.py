@@ -39,8 +39,8 @@ BEST = "best"
 WEIGHTINGS = (BEST, *(one.value for one in Weighting))
 LONG = 100_000
 """Samples beyond which one solution is enough: rounding is far below the noise there."""
-NESTED, LOWER = 200_000, 15
-"""Samples times squared states up to which systems of fewer states are fitted first, and steps of those."""
+NESTED = 200_000
+"""Samples times squared states up to which systems of fewer states are fitted first."""
 POLES, LITTLE, CLEARLY = (0.0, 0.5, 0.9, 0.97, -0.5), 0.1, 1e-6
 """Poles that a further state may begin with, how strongly it is driven and read, and a gain that is one."""
 CHARTS = 6
@@ -208,7 +208,7 @@ class _Problem:
             return found
         fewer = replace(self, orders=replace(self.orders, states=self.orders.states - 1))
         try:
-            lower = fewer.best(subspace, weighting, min(iterations, LOWER), until)
+            lower = fewer.best(subspace, weighting, iterations, until)
         except FitDivergedError:
             return found
         wider = self._widened(lower.system)

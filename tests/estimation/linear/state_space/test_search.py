@@ -10,18 +10,20 @@ import pytest
 import sysid
 
 
-@pytest.mark.parametrize("noise", [True, False], ids=["innovations", "output error"])
-@pytest.mark.parametrize("seed", range(4))
-def test_more_states_never_fit_the_records_worse(seed: int, noise: bool) -> None:
-    """A valve's curve, a limit and noise: no linear system is right, and subspace starts may end in a bad minimum."""
+@pytest.mark.parametrize(
+    ("seed", "samples", "noise"),
+    [(3, 300, True), (13, 300, True), (14, 600, True), (2, 300, False), (5, 600, False)],
+    ids=str,
+)
+def test_more_states_never_fit_the_records_worse(seed: int, samples: int, noise: bool) -> None:
+    """Two tanks that may flow over: from subspace estimates alone each of these ends in a worse minimum at 3 or 4."""
     rng = np.random.default_rng(seed)
-    u = np.repeat(rng.uniform(0.5, 4.0, 30), 10)
-    x = np.zeros((2, 301))
-    for k in range(300):
-        x[0, k + 1] = min(x[0, k] + 0.3 * u[k] - 0.35 * np.sqrt(max(x[0, k], 0.0)), 10.0)
-        x[1, k + 1] = x[1, k] + 0.35 * np.sqrt(max(x[0, k], 0.0)) - 0.3 * np.sqrt(max(x[1, k], 0.0))
-    y = x[1, :-1] + 0.05 * rng.standard_normal(300)
-    traces = sysid.data((u, y), sample_time=1.0)
+    u = np.repeat(rng.uniform(0.5, 4.0, samples // 10), 10)
+    x = np.full((2, samples + 1), 4.0)
+    for k in range(samples):
+        x[0, k + 1] = min(x[0, k] + 0.12 * u[k] - 0.14 * np.sqrt(max(x[0, k], 0.0)), 10.0)
+        x[1, k + 1] = min(x[1, k] + 0.14 * np.sqrt(max(x[0, k], 0.0)) - 0.13 * np.sqrt(max(x[1, k], 0.0)), 10.0)
+    traces = sysid.data((u, x[1, :-1] + 0.01 * rng.standard_normal(samples)), sample_time=1.0)
     errors = [
         sysid.fit(traces, "u -> y", sysid.LinearStateSpace(states=n, noise=noise)).history["mse"][-1]
         for n in (1, 2, 3, 4)
