@@ -31,13 +31,13 @@ from sysid.reporting.orders_view import orders_section
 from sysid.reporting.overview import overview_section
 from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
 from sysid.reporting.published.tables import PublishedTable
-from sysid.reporting.results import FitRecord, Results
+from sysid.reporting.results import FitRecord, LearningCurve, Results
 from sysid.reporting.runtime_table import exported_run_times
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.state_table import state_section
 from sysid.reporting.sweep.section import sweep_points, sweep_sections
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
-from sysid.reporting.training_view import training_parts, trust_sections
+from sysid.reporting.training_view import RELATIVE, error_unit, trained_models, training_parts, trust_sections
 from sysid.reporting.verdict import verdict
 from sysid.reporting.worst_instants import Instant, worst_instants
 
@@ -219,6 +219,19 @@ def _run_times(results: Results, published: PublishedTable | None) -> Section:
     return Section(anchor="run-times", title="Run times", parts=tuple(parts))
 
 
+def _learning(results: Results) -> list[tuple[str, str, dict[str, LearningCurve | None]]]:
+    """Caption, unit of the errors and learning curves: of each mapping, and of the models of several outputs."""
+    found = []
+    for mapping, fits in results.mappings().items():
+        # A fit whose curve stands elsewhere keeps its colour.
+        curves = {fit.name: None if error_unit(fit) == RELATIVE else fit.learning_curve for fit in fits}
+        caption = f"Learning curves on the estimation records, {mapping}; open loop learns the error of one step."
+        found.append((caption, f"{fits[0].unit}²", curves))
+    shared = {fit.name: fit.learning_curve for fit in trained_models(results) if error_unit(fit) == RELATIVE}
+    caption = "Learning curves on the estimation records of models of several outputs, each output over its own errors."
+    return [*found, (caption, RELATIVE, shared)]
+
+
 def _tried(results: Results) -> Section:
     parts: list[Part] = []
     if results.best is not None:
@@ -226,15 +239,10 @@ def _tried(results: Results) -> Section:
     if results.selection is not None and not (results.best is not None and results.best.cases_chose):
         parts.append(f"Traces that choose: {results.selection.name} ({', '.join(results.selection.cases)}).")
     parts.append(ranking_table(results))
-    for index, fits in enumerate(results.mappings().values()):
-        curves = {fit.name: fit.learning_curve for fit in fits}
-        if not any(curve is not None and len(curve.mse) > 1 for curve in curves.values()):
-            continue
-        unit, mapping = fits[0].unit, fits[0].mapping
-        caption = f"Learning curves on the estimation records, {mapping}; open loop learns the error of one step."
-        parts.append(
-            picture(figures.learning_figure(curves, unit=unit), "Learning curves", caption, f"learning-{index}")
-        )
+    for index, (caption, unit, curves) in enumerate(_learning(results)):
+        if any(curve is not None and len(curve.mse) > 1 for curve in curves.values()):
+            picture_of = figures.learning_figure(curves, unit=unit)
+            parts.append(picture(picture_of, "Learning curves", caption, f"learning-{index}"))
     parts += training_parts(results)
     if len([fit for fit in results.fits if fit.n_parameters is not None]) > 2:
         caption = "Size against accuracy on the traces that choose; lower left is better. Ringed: the chosen fit."

@@ -130,7 +130,9 @@ class AttemptRecord(Record):
     seed: int | None = Field(default=None, description="Of the start; null for one that was given.")
     iterations: int = Field(description="Done by then.")
     elapsed_s: Number = Field(description="Seconds that it had taken.")
-    estimation_mse: Number = Field(description="On the estimation records, in the output's unit squared.")
+    estimation_mse: Number = Field(
+        description="On the estimation records, in the output's unit squared; relative for several outputs."
+    )
     selection_mse: Number = Field(description="Geometric mean over the selection traces.")
     log_evidence: Number = Field(description="Null where none was computed.")
     effective_parameters: Number = Field(description="Parameters that the data determine.")

@@ -8,12 +8,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.figures.style import MARKERS, PALETTE, new_figure, styled
 from sysid.reporting.fit_tables import case_columns
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.results import AttemptRecord, CaseRecord, FitRecord, Results
 from sysid.reporting.tables import Cell, Table, figure_cell
+
+RELATIVE = "relative"
+"""Unit of errors that several outputs have in common."""
 
 ROWS = 30
 """Starts that a table names; the figure shows all."""
@@ -38,6 +42,36 @@ def trust_sections(results: Results) -> list[Section]:
     return sections
 
 
+def trained_models(results: Results) -> list[FitRecord]:
+    """One record a model: those of a model of several outputs tell of the same training, which is told once.
+
+    Args:
+        results: The run.
+
+    Returns:
+        The records, one of a shared model under the name of the whole.
+    """
+    found: dict[str, FitRecord] = {}
+    for fit in results.fits:
+        shared = fit.system is not None and fit.model_slug not in {"", fit.slug}
+        named = fit.model_copy(update={"name": fit.system}) if shared else fit
+        found.setdefault(fit.model_slug or fit.slug, named)
+    return list(found.values())
+
+
+def error_unit(fit: FitRecord) -> str:
+    """The unit of a fit's training errors: errors of a model of several outputs are relative, each output to its own.
+
+    Args:
+        fit: The fit.
+
+    Returns:
+        The output's unit squared, or ``relative``.
+    """
+    row = ESTIMATORS.get(fit.structure.get("kind", ""))
+    return RELATIVE if row is not None and row.structure.several_outputs else f"{fit.unit}²"
+
+
 def training_parts(results: Results) -> list[Part]:
     """Starts and evidence of every fit that has them.
 
@@ -54,7 +88,7 @@ def training_parts(results: Results) -> list[Part]:
             "Log evidence against the number of parameters: higher is better, between fits of one kind of training."
         )
         parts.append(picture(sizes, "Evidence against size", caption, "evidence-size"))
-    for fit in results.fits:
+    for fit in trained_models(results):
         if len({attempt.start for attempt in fit.attempts}) > 1:
             caption = (
                 f"{fit.name}: every start at every checkpoint. Left: how much of the error on unseen traces the error "
@@ -153,8 +187,8 @@ def attempts_table(fit: FitRecord) -> Table:
         head=(
             ("start", ""),
             ("iterations", "s"),
-            ("estimation mse", f"{fit.unit}²"),
-            ("selection mse", f"{fit.unit}², geometric mean"),
+            ("estimation mse", error_unit(fit)),
+            ("selection mse", f"{error_unit(fit)}, geometric mean"),
             ("log evidence", ""),
             ("effective parameters", ""),
             ("free run", ""),
@@ -203,12 +237,12 @@ def attempts_figure(fit: FitRecord) -> Figure:
         if both:
             _scatter(panels[0], fit, [a.estimation_mse for a in fit.attempts], chosen_by)
             panels[0].set_xscale("log")
-            panels[0].set_xlabel(f"mse on the estimation records [{fit.unit}²]")
-            panels[0].set_ylabel(f"mse on the selection traces [{fit.unit}²]")
+            panels[0].set_xlabel(f"mse on the estimation records [{error_unit(fit)}]")
+            panels[0].set_ylabel(f"mse on the selection traces [{error_unit(fit)}]")
         errors = chosen_by if both else [attempt.estimation_mse for attempt in fit.attempts]
         _scatter(panels[-1], fit, [a.log_evidence for a in fit.attempts], errors)
         panels[-1].set_xlabel("log evidence")
-        panels[-1].set_ylabel("" if both else f"mse on the estimation records [{fit.unit}²]")
+        panels[-1].set_ylabel("" if both else f"mse on the estimation records [{error_unit(fit)}]")
         panels[-1].legend(loc="upper right")
         return figure
 

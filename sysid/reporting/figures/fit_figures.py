@@ -205,7 +205,7 @@ def learning_figure(curves: Dict[str, LearningCurve | None], *, unit: str) -> Fi
     Args:
         curves: By name of the fit; a fit without one is left out, and the others keep the colours that they
             have in charts of all fits.
-        unit: The output's unit.
+        unit: Of the squared errors.
 
     Returns:
         The figure, with a logarithmic axis.
@@ -222,7 +222,7 @@ def learning_figure(curves: Dict[str, LearningCurve | None], *, unit: str) -> Fi
             axes.plot(x, y, **style, markevery=max(1, len(x) // 8), markersize=4, label=name)
         axes.set_yscale("log")
         axes.set_xlabel("iteration")
-        axes.set_ylabel(f"mse on the estimation records [{unit}²]")
+        axes.set_ylabel(f"mse on the estimation records [{unit}]")
         axes.legend(loc="upper right")
         return figure
 

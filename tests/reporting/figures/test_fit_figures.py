@@ -100,4 +100,4 @@ def test_what_cannot_stand_on_a_logarithmic_axis_is_left_out() -> None:
     drawn = [np.isfinite(np.asarray(line.get_ydata(), dtype=float)).sum() for line in axes.lines]
     assert drawn == [1, 0]
     curve = LearningCurve(iteration=[0.0, 1.0, 2.0], mse=[1.0, float("nan"), 0.0])
-    assert learning_figure({"a": curve}, unit="psi").axes[0].get_yscale() == "log"
+    assert learning_figure({"a": curve}, unit="psi²").axes[0].get_yscale() == "log"

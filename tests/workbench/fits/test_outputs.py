@@ -15,6 +15,7 @@ from sysid.errors import ConfigError
 from sysid.export import read_bundle
 from sysid.models import model_from_dict
 from sysid.reporting.results import Results, read_results
+from sysid.reporting.training_view import RELATIVE, error_unit, trained_models
 from sysid.workbench.fits.config import Pipeline, parse_pipeline
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.run import run_pipeline
@@ -121,6 +122,12 @@ def test_the_screen_has_the_whole_below_its_outputs(results: Results) -> None:
     assert cells[:3] == ["ARX, level", "ARX, heat", "ARX"]
     run_3 = list(table_of_fits(results).columns[3 + list(results.data.cases).index("run-3")].cells)
     assert run_3[2] == f"{results.systems[0].cases['run-3'].mean_fit:.2f} %"
+
+
+def test_the_training_of_one_model_is_told_once_and_its_errors_have_no_single_unit(results: Results) -> None:
+    told = trained_models(results)
+    assert [fit.name for fit in told] == ["ARX, level", "ARX, heat", "alone, level", "alone, heat", "whole", "further"]
+    assert [error_unit(fit) for fit in told] == ["cm²", "K²", "cm²", "K²", RELATIVE, RELATIVE]
 
 
 def test_whether_linear_is_enough_is_said_of_each_output(results: Results) -> None:
