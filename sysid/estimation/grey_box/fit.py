@@ -367,9 +367,7 @@ def _gone_on(provider: EquationProvider, solution: Solution, training: Training)
     )  # fmt: skip
     found = engine.minimise(provider, solution.theta, solution.state.prior)
     done, spent = solution.state.iteration, solution.curve[-1].elapsed_s
-    further = [
-        replace(one, iteration=done + one.iteration, elapsed_s=spent + one.elapsed_s) for one in found.curve[1:]
-    ]
+    further = [replace(one, iteration=done + one.iteration, elapsed_s=spent + one.elapsed_s) for one in found.curve[1:]]
     state = replace(found.state, curve=(*solution.curve, *further), iteration=done + found.state.iteration)
     return replace(found, state=state)
 

@@ -20,7 +20,7 @@ from sysid.estimation.nonparametric.dead_time import shares
 from sysid.estimation.nonparametric.evidence import CHUNK, Posterior, Triangle, posterior, triangle
 from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
 from sysid.estimation.nonparametric.noise import whitener
-from sysid.estimation.nonparametric.prior import DeadTime, Prior, dead_times, tuned
+from sysid.estimation.nonparametric.prior import DeadTime, Prior, dead_times, tuned, with_doubt
 from sysid.estimation.nonparametric.segments import Segment, columns_of_lags, segments_of
 from sysid.models import Mapping
 from sysid.traces import Trace
@@ -296,7 +296,7 @@ def estimate_impulse_response(
         kernels = tuple(Kernel) if kernel is None else (kernel,)
         found = _stage(problem, np.ones(1), given, kernels, None)
         if length >= most or all(_settled(row) for row in found.response):
-            return _result(_whitened(found, given, kernels, noise_order), traces, mapping)
+            return _result(_doubted(_whitened(found, given, kernels, noise_order)), traces, mapping)
         length = min(2 * length, most)
 
 
@@ -432,6 +432,14 @@ def _stage(
         dead=found,
         whiten=whiten,
     )
+
+
+def _doubted(found: _Fitted) -> _Fitted:
+    """The same responses, their bands wider by what is not known of the prior."""
+    if not found.prior.kept.any():
+        return found
+    data = found.problem.triangle(found.whiten)
+    return replace(found, posterior=with_doubt(data, found.prior))
 
 
 def _settled(g: NDArray[np.float64]) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.estimation.nonparametric.evidence import Triangle, factored
+from sysid.estimation.nonparametric.evidence import Posterior, Triangle, factored, posterior
 from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
 
 SCALES = (0.0, 4.0, 8.0)
@@ -20,6 +20,8 @@ CONSTANTS = (0.05, 0.15, 0.4)
 
 PLACES = 24
 """Dead times that are looked at all over a record, before every sample about the best of them."""
+STEP, MOST_SPREAD = 1e-2, 0.7
+"""Step of differences of a gradient, and largest standard deviation, of a hyperparameter's logarithm: a factor of 2."""
 DOUBT = 3.0
 """Natural logarithm of the ratio of evidences up to which two answers are both possible: a factor of 20."""
 
@@ -108,6 +110,53 @@ def tuned(
             best = -float(found.fun), search.prior(np.asarray(found.x))
     assert best is not None  # noqa: S101 - there is a kernel
     return best[1]
+
+
+def with_doubt(data: Triangle, prior: Prior) -> Posterior:
+    """The posterior under a prior that is itself known only as well as the data tell it.
+
+    Far out in the tail of a response its decay decides how wide the bands are, and a decay that is taken for certain
+    makes them too narrow. The hyperparameters are spread as the curvature of the evidence has it, and means and
+    covariances averaged over points on either side along its axes (Julier and Uhlmann 2004, "Unscented filtering and
+    nonlinear estimation").
+
+    Args:
+        data: The regression on the lags of every input.
+        prior: Of largest evidence.
+
+    Returns:
+        The posterior of that prior, with the covariance over all points.
+    """
+    search = _Search(data=data, kernel=prior.kernel, length=prior.length, dead=prior.dead)
+    low, high = np.array(search.bounds).T
+    best, kept = posterior(data.columns(prior.kept), prior.factor()), data.columns(prior.kept)
+    axes = _axes(search, prior.theta, low, high)
+    covariance, count = np.zeros_like(best.covariance), 2 * axes.shape[1]
+    for away in (*axes.T, *-axes.T):
+        moved = search.prior(np.clip(prior.theta + away, low, high))
+        one = posterior(kept, moved.factor())
+        apart = one.mean - best.mean
+        covariance += (one.covariance + np.outer(apart, apart)) / count
+    # What every point leaves out cannot make the bands narrower than those of the best one.
+    wider = np.maximum(np.diag(best.covariance) - np.diag(covariance), 0.0)
+    return replace(best, covariance=covariance + np.diag(wider))
+
+
+def _axes(
+    search: _Search, theta: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Axes of the hyperparameters' spread as columns, each as long as points along it are away."""
+    d, slopes = len(theta), []
+    for i in range(d):
+        step = np.eye(d)[i] * STEP
+        ahead, behind = (np.clip(theta + way * step, low, high) for way in (1.0, -1.0))
+        slopes.append((search.descent(ahead)[1] - search.descent(behind)[1]) / max(float((ahead - behind)[i]), STEP))
+    H = np.array(slopes)
+    if not np.isfinite(H).all():
+        return np.zeros((d, d))
+    curvature, directions = np.linalg.eigh(0.5 * (H + H.T))
+    spread = np.minimum(1.0 / np.sqrt(np.maximum(curvature, 1e-12)), MOST_SPREAD)
+    return np.asarray(directions * (spread * np.sqrt(d)))
 
 
 @dataclass(frozen=True, kw_only=True)
