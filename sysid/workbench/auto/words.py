@@ -75,7 +75,8 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: st
             f"{quantity(root, unit)} (root mean square) beside {quantity(math.sqrt(error(choice.least)), unit)} of "
             f"{choice.least.label}"
         )
-    finals = f", the {again} best networks again from other starts" if again else ""
+    best = "the best network" if again == 1 else f"the {again} best networks"
+    finals = f", {best} again from other starts" if again else ""
     parts = [f"{why}, of {tried} tried{finals}"]
     if choice.linear is not None and choice.linear.number != choice.chosen.number:
         share = 1.0 - root / math.sqrt(error(choice.linear))
