@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +32,10 @@ from sysid.traces import Trace
 
 Array = NDArray[np.float64]
 
-SHORT, TRIED = 6, 2
+SHORT, TRIED = 6, 5
 """Steps from the best starts, before the best end goes on; and how many of these there are."""
+NESTED, CANCELLED = 200_000, (0.0, 0.5, 0.9)
+"""Samples times squared poles up to which models with fewer are fitted first; and poles that are cancelled in them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +142,8 @@ def _search(
         whitening=np.eye(1),
         stable=stable and not orders.drifts,
     )
-    starts = [theta for theta in _starts(pieces, orders) if np.isfinite(theta).all()]
+    starts = [*_starts(pieces, orders), *_of_fewer(segments, orders, training)]
+    starts = [theta for theta in starts if np.isfinite(theta).all()]
     if not errors.stable or training.stable is not None:
         return errors, _minimum(errors, starts, training)
     lengths = [len(segment) for segment in errors.segments]
@@ -200,7 +204,35 @@ def _starts(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Array
     else:
         kinds = [(long, whitened) for long in longs for whitened in (False, True)]
         found = [box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
+        same = LongARX.of_state_space(looked, orders)
+        if same is not None:
+            found.append(box_jenkins_start(looked, orders, same, whitened=False))
     return [*found, np.zeros(orders.n_parameters)]  # the last is finite whatever the record
+
+
+def _of_fewer(segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining) -> list[Array]:
+    """The best model with a pole and a zero less at each input, and one that cancel: the start is as good as that."""
+    nf = orders.denominators
+    inputs = orders.nb and not orders.order("na")
+    long = sum(map(len, segments)) * sum(nf) ** 2 > NESTED
+    if not inputs or long or min(nf) < 2 or min(orders.nb) < 2:
+        return []
+    fewer: AbstractPolynomial = replace(
+        cast("Any", orders), nb=tuple(n - 1 for n in orders.nb), nf=tuple(n - 1 for n in nf)
+    )
+    try:
+        lower = _search(segments, fewer, training)[1].theta
+    except FitDivergedError:
+        return []
+    places = np.cumsum([*fewer.nb, *fewer.denominators])
+    *parts, rest = np.split(lower, places)
+    B, F = parts[: len(nf)], parts[len(nf) :]
+    found = []
+    for pole in CANCELLED:
+        wider = [np.convolve(b, [1.0, -pole]) for b in B]
+        wider += [np.convolve(np.concatenate([[1.0], f]), [1.0, -pole])[1:] for f in F]
+        found.append(np.concatenate([*wider, rest]))
+    return found
 
 
 def _differenced(piece: Segment) -> Segment:

@@ -13,15 +13,19 @@ chapter 6). What is left is the noise, an ARMA series.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from scipy import linalg
 
+from sysid.errors import UserError
 from sysid.estimation.linear.segments import Segment
+from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
 from sysid.estimation.linear.subspace.projections import arx_orders, regress
 from sysid.estimation.linear.subspace.windows import Windows
+from sysid.models import LinearStateSpace
 from sysid.models.polynomial import AbstractPolynomial
 
 Array = NDArray[np.float64]
@@ -29,6 +33,8 @@ Array = NDArray[np.float64]
 LONGEST, ROUNDS, INSIDE, SETTLED = 40, 12, 0.98, 1e-3
 """Lags of a long ARX model at most; filtering rounds; how far inside the unit circle a root is put; and a change of
 coefficients at which filtering may end."""
+STEPS = 30
+"""Steps of a state space that a start is taken from."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,6 +76,41 @@ class LongARX:
         A = np.concatenate([[1.0], -lagged[:, m]])
         B = tuple(np.concatenate([[now[j]], lagged[:, j]]) for j in range(m))
         return cls(A=A, B=B, constant=float(theta[0]))
+
+    @classmethod
+    def of_state_space(cls, pieces: Sequence[Segment], orders: AbstractPolynomial) -> LongARX | None:
+        """What the inputs do in a state space of the same order that is fitted to the free run.
+
+        Args:
+            pieces: Unbroken records.
+            orders: The structure: its largest denominator says how many states.
+
+        Returns:
+            The transfer functions over their common denominator, beside no noise model; ``None`` where there is none.
+        """
+        states = max(orders.denominators, default=0)
+        if not states:
+            return None
+        # Without D a state space has as many coefficients above as states, the first of them at a lag of one sample.
+        direct = min(orders.nk) == 0 or max(orders.nb) > states
+        dead = [nk - (not direct) for nk in orders.nk]
+        late = [
+            replace(p, inputs=np.column_stack([_back(u, k) for u, k in zip(p.inputs.T, dead, strict=True)]))
+            for p in pieces
+        ]
+        asked = LinearStateSpace(states=states, feedthrough=direct, noise=False)
+        try:
+            system = search(late, asked, StateSpaceTraining(max_iterations=STEPS)).system
+        except (UserError, linalg.LinAlgError, ValueError):  # too short for it: the other starts do
+            return None
+        A = np.real(np.poly(system.A))
+        B = []
+        for j, k in enumerate(dead):
+            b, d = system.B[:, j : j + 1], float(system.D[0, j])
+            # C adj(zI - A) b + d det(zI - A): the determinant lemma.
+            numerator = np.real(np.poly(system.A - b @ system.C)) + (d - 1.0) * A
+            B.append(np.concatenate([np.zeros(k), numerator]))
+        return cls(A=A, B=tuple(B), constant=0.0)
 
     def innovations(self, piece: Segment) -> Array:
         """What the model does not explain; its first samples, which it cannot tell, are zero."""
