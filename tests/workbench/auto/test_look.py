@@ -1,0 +1,51 @@
+"""What is in a record that a search goes by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid.models import Mapping, Start, StartKind
+from sysid.traces import Role, Trace
+from sysid.workbench.auto.look import Looked, look
+from tests.workbench.auto.conftest import data, record
+
+MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
+
+
+def shifted(trace: Trace, by: float) -> Trace:
+    return replace(trace, values=np.asarray(trace.values) + np.array([0.0, by]))
+
+
+@pytest.fixture(scope="module")
+def looked() -> Looked:
+    return look(data(record("a", 200), others={Role.TEST: record("t", 50, seed=1)}), MAPPING, ESTIMATED)
+
+
+def test_orders_dead_time_and_lags_are_found(looked: Looked) -> None:
+    assert looked.orders
+    assert looked.orders[0].na >= 1
+    assert looked.delay >= 0
+    assert 2 <= looked.lags <= 6
+    assert looked.suggested
+
+
+def test_what_asks_to_be_looked_at_is_told_in_words(looked: Looked) -> None:
+    assert any("linear" in one for one in looked.cautions)
+
+
+def test_traces_that_only_score_have_no_say(looked: Looked) -> None:
+    other = data(record("a", 200), others={Role.TEST: shifted(record("t", 50, seed=2), 9.0)})
+    assert look(other, MAPPING, ESTIMATED) == looked
+
+
+def test_a_sensor_that_may_not_tell_a_sign_is_known_but_for_its_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sysid.workbench.auto.look._orders", lambda *_: ())
+    monkeypatch.setattr("sysid.workbench.auto.look.advise", lambda *_: replaced)
+    replaced = type("Advice", (), {"suggestions": (), "record": None, "mapping": MAPPING})
+    monkeypatch.setattr("sysid.workbench.auto.look.lines", lambda _: [])
+    lowest = float(record("a", 200)["y"].min())
+    for by, one_sign in ((0.0, False), (-lowest, True), (-lowest - 0.005, True), (-lowest - 0.1, False)):
+        assert look(data(shifted(record("a", 200), by)), MAPPING, ESTIMATED).never_negative is one_sign
