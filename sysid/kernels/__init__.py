@@ -5,6 +5,7 @@ which the function calls from another file, such as a kind of neuron, it does no
 the newest file of this room is taken away.
 """
 
+import time
 from pathlib import Path
 
 
@@ -15,7 +16,9 @@ def forget_what_is_older(folder: Path) -> None:
         folder: With the sources; what was compiled of them lies in its ``__pycache__`` folders. One that cannot be
             written keeps what it has.
     """
-    newest = max((file.stat().st_mtime for file in folder.rglob("*.py")), default=0.0)
+    # A file from the future, as after a wrong clock, would take everything away at every start.
+    written = (file.stat().st_mtime for file in folder.rglob("*.py"))
+    newest = max((when for when in written if when <= time.time()), default=0.0)
     for index in folder.rglob("__pycache__/*.nbi"):
         try:
             if index.stat().st_mtime < newest:

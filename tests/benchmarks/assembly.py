@@ -43,7 +43,7 @@ from sysid.models import Cascade, simulate_family
 from sysid.reporting import read_published
 from sysid.reporting.numbers import number
 from sysid.traces import Trace
-from sysid.workbench.assembly.runner import read_line
+from sysid.workbench.assembly.runner import read_interpolation
 from tests.benchmarks._cascades import COMBINED, DESIGNED, SERVICE, Fitted, cascade, fitted
 from tests.benchmarks._findings import FILE_VARIABLE, found, read
 from tests.benchmarks._timing import Taken, handle, reference, say, say_faster, taken
@@ -208,7 +208,7 @@ def fitted_whole(one: Fitted, designed: Case, sets: dict[str, list[Case]]) -> No
 
 def fitted_line(folder: Path, large: Taken) -> None:
     """A fitted line at every place; its handle never asks for an emergency."""
-    line, places = read_line(folder).line, np.arange(1.0, CARS + 1.0)
+    line, places = read_interpolation(folder).line, np.arange(1.0, CARS + 1.0)
     inputs = np.maximum(handle(DESIGNED), 64.2)
     print(f"\n{folder.name}, fitted: {line.n_parameters} parameters")
     all_cars(f"{folder.name}, every place", lambda: line.simulate(inputs, places, workers=WORKERS), large, 7)

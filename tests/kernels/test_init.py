@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 
 from sysid.kernels import forget_what_is_older
 
@@ -12,6 +13,7 @@ def test_an_index_goes_that_is_older_than_a_file_of_the_room(tmp_path):
     for folder, file, seconds in (
         (tmp_path, "recursion.py", 100.0),
         (inner, "tanh.py", 200.0),
+        (inner, "of_tomorrow.py", time.time() + 86400.0),
         (tmp_path / "__pycache__", "recursion.free_run.nbi", 150.0),
         (tmp_path / "__pycache__", "recursion.predict.nbi", 250.0),
         (inner / "__pycache__", "tanh.values.nbi", 150.0),

@@ -12,7 +12,7 @@ import pytest
 from sysid.export import read_bundle
 from sysid.ingest import load_dataset
 from sysid.validation import evaluate_cascade
-from sysid.workbench.assembly.runner import read_line
+from sysid.workbench.assembly.runner import read_interpolation
 
 REPORTS = Path(__file__).parents[2] / "reports"
 
@@ -49,7 +49,7 @@ def test_its_free_run_has_the_published_error(name: str) -> None:
 @pytest.mark.parametrize("name", [folder.parent.name for folder in REPORTS.glob("*/line.json")])
 def test_a_published_line_has_the_published_error_at_its_first_place(name: str) -> None:
     trace = load_dataset("abdx-service", cases=["VAL04"])["VAL04"]
-    run = read_line(REPORTS / name).line.simulate_trace(trace, [1.0])
+    run = read_interpolation(REPORTS / name).line.simulate_trace(trace, [1.0])
     published = {one["mapping"].split(" -> ")[1]: one["mse"]["VAL04"] for one in scores_of(name)}
     assert run["BC"].shape == (1, len(trace))
     assert np.mean((run["BC"][0] - trace["BC"]) ** 2) == pytest.approx(published["BC"], rel=0.01)

@@ -15,7 +15,7 @@ from sysid.ingest import read_trace
 from sysid.traces import Channel
 from sysid.units import Reference
 from sysid.workbench.assembly.interpolation import StoredInterpolation
-from sysid.workbench.assembly.runner import read_line
+from sysid.workbench.assembly.runner import read_interpolation
 from sysid.workbench.cli import app
 from sysid.workbench.commands.simulate import Wish
 from sysid.workbench.commands.simulate_line import parse_positions, simulate_line_command
@@ -136,8 +136,8 @@ def test_a_picture_of_another_kind_is_refused(run_folder: Path, tmp_path: Path) 
 
 def test_a_stored_line_that_lost_its_channels_is_refused(run_folder: Path) -> None:
     fields = json.loads((run_folder / "line.json").read_text(encoding="utf-8"))
-    assert read_line(run_folder).outputs == (CYLINDER,)
+    assert read_interpolation(run_folder).outputs == (CYLINDER,)
     del fields["channels"]["inputs"]
     (run_folder / "line.json").write_text(json.dumps(fields), encoding="utf-8")
     with pytest.raises(ConfigError, match="lacks its channels"):
-        read_line(run_folder)
+        read_interpolation(run_folder)

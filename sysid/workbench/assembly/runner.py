@@ -98,7 +98,7 @@ def read_assembly(folder: Path) -> Cascade:
     return cascade_from_dict(_left(folder, ASSEMBLY, "the run has no assembly"))
 
 
-def read_line(folder: Path) -> StoredInterpolation:
+def read_interpolation(folder: Path) -> StoredInterpolation:
     """The line that a run left: every position between those that it modelled.
 
     Args:

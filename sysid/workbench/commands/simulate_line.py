@@ -14,7 +14,7 @@ from sysid.export.command_table import read_command
 from sysid.ingest import write_trace
 from sysid.traces import Channel, Trace
 from sysid.workbench.assembly.interpolation import StoredInterpolation
-from sysid.workbench.assembly.runner import read_line
+from sysid.workbench.assembly.runner import read_interpolation
 from sysid.workbench.commands.simulate import Wish, check_picture
 from sysid.workbench.runner.console import console
 
@@ -53,7 +53,7 @@ def simulate_line_command(wish: Wish, asked: str) -> None:
             remedy="give --command FILE alone",
         )
     check_picture(wish.plot)
-    out, stored, positions = wish.out, read_line(wish.bundle), parse_positions(asked)
+    out, stored, positions = wish.out, read_interpolation(wish.bundle), parse_positions(asked)
     table = read_command(wish.command, stored.inputs, time_unit=wish.time_unit, unit=wish.unit)
     trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
     write_trace(replace(trace, name=out.stem), out)
