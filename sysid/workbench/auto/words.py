@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from sysid.estimation.estimators import ESTIMATORS
-from sysid.reporting.numbers import quantity
+from sysid.reporting.numbers import number, quantity
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.plan import ALIKE
 
@@ -68,11 +68,15 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: st
         One sentence, and another where some were passed over.
     """
     root = math.sqrt(error(choice.chosen))
-    why = f"{choice.chosen.label} has the least free-run error on what chose, {quantity(root, unit)} (root mean square)"
+
+    def shown(value: float) -> str:
+        return number(value) if unit == "1" else quantity(value, unit)
+
+    why = f"{choice.chosen.label} has the least free-run error on what chose, {shown(root)} (root mean square)"
     if choice.least.number != choice.chosen.number:
         why = (
             f"{choice.chosen.label} is the smallest within {ALIKE:.0%} of the least free-run error on what chose: "
-            f"{quantity(root, unit)} (root mean square) beside {quantity(math.sqrt(error(choice.least)), unit)} of "
+            f"{shown(root)} (root mean square) beside {shown(math.sqrt(error(choice.least)))} of "
             f"{choice.least.label}"
         )
     best = "the best network" if again == 1 else f"the {again} best networks"

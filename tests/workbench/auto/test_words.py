@@ -62,3 +62,8 @@ def test_the_sentence_says_what_against_what_and_why_it_ended() -> None:
     tried = "4 tried, the 3 best networks again"
     for words in ("NSS 2/2", "NSS 2/3", "1.02\u00a0V", tried, "49% less", "ARX [1; 1; 1]", "the budget is spent"):
         assert words in said
+
+
+def test_a_pure_number_has_no_unit_in_the_sentence() -> None:
+    said = sentence(choose(TRIALS, error, stable), len(TRIALS), unit="1", ended="", error=error)
+    assert "1.02 (root mean square)" in said
