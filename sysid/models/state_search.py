@@ -26,6 +26,9 @@ STEPS = 50
 MANY = 6
 """States up to which searches begin on both sides of each."""
 
+LARGEST = 1e100
+"""Numbers from here on are those of a run that explodes."""
+
 RANK = 1e-9
 """Share of the largest singular value below which an equilibrium leaves a direction open."""
 
@@ -103,7 +106,7 @@ def _stood(
     for _ in range(STEPS):
         (change, by_state, _), (y, out_state, _) = standing(x)
         J = by_state[:, places] * scale / rows[:, None]
-        if not np.isfinite(J).all() or not np.isfinite(change).all():
+        if not _usable(J) or not _usable(change):
             return np.inf, x
         J, open_ = _split(J, change)
         step = -np.linalg.pinv(J, rcond=RANK) @ (change / rows)
@@ -127,9 +130,14 @@ def _stood(
     return now, x
 
 
+def _usable(values: Array) -> bool:
+    """Whether numbers can be squared and summed up: of a run that explodes they cannot."""
+    return bool(np.all(np.abs(values) < LARGEST))
+
+
 def _split(J: Array, change: Array) -> tuple[Array, Array]:
     """A matrix that is safe to invert, and the directions that it leaves open."""
-    if not np.isfinite(J).all() or not np.isfinite(change).all():
+    if not _usable(J) or not _usable(change):
         return np.zeros_like(J), np.zeros((J.shape[1], 0))
     _, sizes, rows = np.linalg.svd(J)
     rank = int(np.count_nonzero(sizes > RANK * max(float(sizes.max(initial=0.0)), 1e-300)))
@@ -184,7 +192,7 @@ class StateSearch:
         n, damping, best = len(xi), 1e-3, self._total(xi, noise)
         for _ in range(STEPS):
             away, J = self.misfit(xi, True)
-            if not np.isfinite(J).all() or not np.isfinite(away).all():
+            if not _usable(J) or not _usable(away):
                 break
             spread = np.sqrt(damping * ((J**2).sum(axis=0) / noise**2 + 1.0))
             rows = np.concatenate([J / noise, np.eye(n), np.diag(spread)])

@@ -1,0 +1,210 @@
+"""Grey boxes: coverage of their intervals on simulated systems, time beside SciPy, and the Cascaded Tanks.
+
+    [SYSID_DATA=<folder>] python -m tests.benchmarks grey_boxes [--seeds=20] [--only=coverage,time,tanks]
+
+Coverage: each system is run at known parameters, with white noise of 2 % of the output's range; the fit starts at
+parameters that are off by up to 40 %; how often the 95 % interval of a parameter holds the true one is counted over
+parameters and seeds. Time: two tanks, beside ``scipy.optimize.least_squares`` over ``solve_ivp`` (RK45, held inputs,
+finite differences), both from the same start to the same cost. Tanks: ``cascaded_tanks/dataBenchmark.csv`` (4TU
+10.4121/12960104), fitted to the estimation record alone; the first 50 samples of the validation record give its state,
+and the samples after them count.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from dataclasses import dataclass
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+import scipy
+
+from sysid.estimation import FitResult, Training
+from sysid.estimation.grey_box.fit import fit_grey_box
+from sysid.models import GreyBox, History, Mapping, Start, StartKind
+from sysid.models.grey_box_model import GreyBoxModel
+from sysid.traces import Channel, Trace
+from tests.benchmarks._findings import found
+from tests.benchmarks._public import checked
+
+MAPPING = Mapping.parse("u -> y")
+ESTIMATED = Start(kind=StartKind.ESTIMATED)
+SAMPLES, NOISE = 400, 0.02
+
+
+@dataclass(frozen=True, kw_only=True)
+class System:
+    """Equations, their true parameters, the state they begin at, and the range of their input."""
+
+    equations: str
+    true: dict[str, float]
+    begin: dict[str, float]
+    inputs: tuple[float, float]
+    sample_time: float
+    fixed: dict[str, float] | None = None
+
+    def grey(self, parameters: dict[str, float]) -> GreyBox:
+        named: dict[str, Any] = {name: {"start": value, "low": 0.0} for name, value in parameters.items()}
+        named |= {name: {"start": value, "fixed": True} for name, value in (self.fixed or {}).items()}
+        return GreyBox(equations=self.equations, parameters=named, initial=dict(self.begin))
+
+
+SYSTEMS = {
+    "two tanks": System(
+        equations="out = k1*sqrt(x1); dx1/dt = k4*u - out; dx2/dt = out - k2*sqrt(x2); y = x2",
+        true={"k1": 0.05, "k2": 0.045, "k4": 0.04}, begin={"x1": 4.0, "x2": 3.0}, inputs=(1.0, 4.0), sample_time=4.0,
+    ),
+    "DC motor": System(
+        equations="di/dt = (u - r*i - k*w)/l; dw/dt = (k*i - b*w)/j; y = w",
+        true={"r": 1.2, "k": 0.4, "b": 0.02}, begin={"i": 0.0, "w": 0.0}, inputs=(-5.0, 5.0), sample_time=0.05,
+        fixed={"l": 0.1, "j": 0.05},
+    ),
+    "pendulum": System(
+        equations="dq/dt = w; dw/dt = -g*sin(q) - d*w + k*u; y = q",
+        true={"g": 9.0, "d": 0.5, "k": 3.0}, begin={"q": 0.3, "w": 0.0}, inputs=(-1.0, 1.0), sample_time=0.05,
+    ),
+    "two masses with friction": System(
+        equations="dw1/dt = (u - c*phi - d*(w1 - w2) - f*tanh(w1/0.2))/j; dphi/dt = w1 - w2; "
+        "dw2/dt = (c*phi + d*(w1 - w2))/j2; y = w1",
+        true={"c": 20.0, "d": 0.4, "f": 0.5, "j": 0.3}, begin={"w1": 0.0, "phi": 0.0, "w2": 0.0}, inputs=(-2.0, 2.0),
+        sample_time=0.03, fixed={"j2": 0.5},
+    ),
+    "heat exchanger": System(
+        equations="da/dt = u*(20 - a)/m + h*(b - a); db/dt = 3 - h*(b - a); y = a",
+        true={"m": 8.0, "h": 0.15}, begin={"a": 40.0, "b": 60.0}, inputs=(0.4, 2.0), sample_time=1.0,
+    ),
+    "predator and prey": System(
+        equations="da/dt = g*a - e*a*b + u; db/dt = -d*b + c*a*b; y = a",
+        true={"g": 0.6, "e": 0.3, "d": 0.5, "c": 0.2}, begin={"a": 3.0, "b": 2.0}, inputs=(0.0, 0.4), sample_time=0.2,
+    ),
+}  # fmt: skip
+
+
+def trace(u: np.ndarray, y: np.ndarray, sample_time: float, name: str = "record") -> Trace:
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+    return Trace(name=name, sample_time=sample_time, channels=channels, values=np.column_stack([u, y]))
+
+
+def record(system: System, rng: np.random.Generator) -> Trace:
+    """The system at its true parameters, from where it begins."""
+    u = np.repeat(rng.uniform(*system.inputs, SAMPLES // 20), 20)
+    start = trace(u, np.zeros(SAMPLES), system.sample_time)
+    training = Training(max_iterations=1, starts=1)
+    template = fit_grey_box([start], MAPPING, system.grey(system.true), training, start=Start())
+    model = template.model
+    assert isinstance(model, GreyBoxModel)
+    y = model.with_theta(np.array(list(system.true.values()))).simulate(u[:, None])
+    return trace(u, y + NOISE * np.ptp(y) * rng.standard_normal(SAMPLES), system.sample_time)
+
+
+def started(system: System, rng: np.random.Generator) -> GreyBox:
+    return system.grey({name: value * rng.uniform(0.6, 1.4) for name, value in system.true.items()})
+
+
+def coverage(seeds: int) -> None:
+    for name, system in SYSTEMS.items():
+        began, held, counted, missed = time.perf_counter(), 0, 0, 0
+        for seed in range(seeds):
+            rng = np.random.default_rng([seed, len(name)])
+            fit = fit_grey_box([record(system, rng)], MAPPING, started(system, rng), Training(), start=ESTIMATED)
+            assert fit.uncertainty is not None
+            low, high = fit.uncertainty.interval(0.95).T
+            true = np.array(list(system.true.values()))
+            known = np.isfinite(low)
+            missed += int(np.count_nonzero(~known))
+            held += int(np.count_nonzero(((low <= true) & (true <= high))[known]))
+            counted += int(np.count_nonzero(known))
+        seconds = (time.perf_counter() - began) / seeds
+        note = f"{counted} intervals, {missed} parameters without one, {seconds:.2f} s a record and fit"
+        found(f"{name}: true parameters within their 95 % intervals", 100.0 * held / max(counted, 1), "%", note=note)
+
+
+def beside_scipy() -> None:
+    system = SYSTEMS["two tanks"]
+    rng = np.random.default_rng(1)
+    data = record(system, rng)
+    u, y = data["u"], data["y"]
+    begin = {name: value * 1.3 for name, value in system.true.items()}
+    fit_grey_box([data], MAPPING, system.grey(begin), Training(starts=1), start=ESTIMATED)  # loads what is compiled
+    began = time.perf_counter()
+    ours = fit_grey_box([data], MAPPING, system.grey(begin), Training(starts=1), start=ESTIMATED)
+    seconds = time.perf_counter() - began
+
+    def run(p: np.ndarray) -> np.ndarray:
+        k1, k2, k4, *x = p
+        levels = []
+        for value in u:
+            levels.append(x[1])
+
+            def rates(_: float, x: np.ndarray, value: float = value) -> list[float]:
+                out = k1 * max(x[0], 0.0) ** 0.5
+                return [k4 * value - out, out - k2 * max(x[1], 0.0) ** 0.5]
+
+            x = scipy.integrate.solve_ivp(rates, (0.0, system.sample_time), x, rtol=1e-6, atol=1e-8).y[:, -1]
+        return np.array(levels) - y
+
+    began = time.perf_counter()
+    first = np.array([*begin.values(), *system.begin.values()])
+    theirs = scipy.optimize.least_squares(run, first, x_scale=np.abs(first))
+    peer = time.perf_counter() - began
+    note = (
+        f"{seconds:.2f} s and {peer:.1f} s; mean squares {ours.history['mse'][-1]:.4g} and {np.mean(theirs.fun**2):.4g}"
+    )
+    found("two tanks: times faster than SciPy's least_squares with solve_ivp", peer / seconds, "", note=note)
+
+
+TANKS = """
+    over = max(x1 - 10, 0)/2
+    spill = max(x2 - 10, 0)/2
+    dx1/dt = -k1*sqrt(x1) + k4*u - over {first}
+    dx2/dt = k2*sqrt(x1) - k3*sqrt(x2) + k5*over - spill {second}
+    y = x2
+"""
+
+
+def tanks() -> None:
+    data = np.genfromtxt(checked("cascaded_tanks/dataBenchmark.csv"), delimiter=",", names=True)
+    estimation = trace(data["uEst"], data["yEst"], 4.0, "estimation")
+    start = {name: {"start": 0.05, "low": 0.0} for name in ("k1", "k2", "k3", "k4")}
+    parameters = start | {"k5": {"start": 0.3, "low": 0.0, "high": 1.0}}
+    levels = {name: {"start": 5.0, "low": 0.0, "high": 15.0} for name in ("x1", "x2")}
+    for title, first, second in (
+        ("equations alone", "", ""),
+        ("with two networks of 2 neurons", "+ net(x1, u; neurons=2)", "+ net(x1, x2; neurons=2)"),
+    ):
+        grey = GreyBox(equations=TANKS.format(first=first, second=second), parameters=parameters, initial=levels)
+        began = time.perf_counter()
+        fit = fit_grey_box([estimation], MAPPING, grey, Training(max_iterations=150), start=ESTIMATED)
+        seconds = time.perf_counter() - began
+        note = (
+            f"{seconds:.1f} s, {fit.model.n_parameters} parameters; best published grey box 0.191 V, over all samples"
+        )
+        found(f"Cascaded Tanks, {title}: free run on the validation record", after(fit, data), "V", note=note)
+
+
+def after(fit: FitResult, data: Any) -> float:
+    """Error after the first 50 samples, which give the state."""
+    u, y = data["uVal"][:, None], data["yVal"]
+    run = fit.model.simulate(u[50:], History(inputs=u[:50], output=y[:50]))
+    return float(np.sqrt(np.mean((run - y[50:]) ** 2)))
+
+
+def main() -> None:
+    """Measure."""
+    given = dict(option.removeprefix("--").split("=") for option in sys.argv[1:] if option.startswith("--"))
+    asked = given.get("only", "coverage,time,tanks").split(",")
+    if "coverage" in asked:
+        coverage(int(given.get("seeds", 20)))
+    if "time" in asked:
+        beside_scipy()
+    if "tanks" in asked and "SYSID_DATA" in os.environ:
+        tanks()
+
+
+if __name__ == "__main__":
+    main()
