@@ -19,7 +19,7 @@ WORDS = (
     *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
     *("advise", "excite", "frequency_response", "impulse_response"),
     *("OrderSearch", "ARX", "ARMAX", "OE", "BJ", "LinearStateSpace", "VectorStateSpace", "TransferFunction"),
-    *("NARX", "NeuralStateSpace", "VectorNARX", "VectorNeuralStateSpace", "GreyBox"),
+    *("NARX", "NeuralStateSpace", "VectorNARX", "VectorNeuralStateSpace", "GreyBox", "VectorGreyBox"),
     *("Training", "JointTraining", "TransferFunctionTraining", "StateSpaceTraining", "PolynomialTraining"),
     *("StabilityOptions", "Start", "Role"),
 )

@@ -43,6 +43,7 @@ from sysid.models import (
     NeuralStateSpace,
     Start,
     TransferFunction,
+    VectorGreyBox,
     VectorNARX,
     VectorNeuralStateSpace,
     VectorStateSpace,
@@ -62,7 +63,7 @@ __all__ = [
     "Start",
 ]
 __all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining", "VectorStateSpace"]
-__all__ += ["VectorNeuralStateSpace"]
+__all__ += ["VectorGreyBox", "VectorNeuralStateSpace"]
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
 __all__ += ["advise", "excite", "frequency_response", "impulse_response"]
 __all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]

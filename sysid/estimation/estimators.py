@@ -17,7 +17,7 @@ from sysid.errors import ConfigError
 from sysid.estimation.estimator import Estimator, Options
 from sysid.estimation.grey_box.fit import STARTS as GREY_STARTS
 from sysid.estimation.grey_box.fit import check_training as check_grey_training
-from sysid.estimation.grey_box.fit import fit_grey_box
+from sysid.estimation.grey_box.fit import fit_grey_box, fit_vector_grey_box
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
@@ -56,6 +56,7 @@ from sysid.models import (
     NeuralStateSpace,
     Start,
     TransferFunction,
+    VectorGreyBox,
     VectorNARX,
     VectorNeuralStateSpace,
     VectorStateSpace,
@@ -104,15 +105,21 @@ ESTIMATORS: dict[str, Estimator] = {
                 (VectorNeuralStateSpace, "a neural state space of several outputs", fit_vector_neural_state_space),
             )
         ),
-        Estimator(
-            structure=GreyBox,
-            name="a grey box",
-            fit=fit_grey_box,
-            training=Training,
-            check_training=check_grey_training,
-            no_posterior=ENDED,
-            begins="a grey box begins at the starts of its parameters",
-            starts=GREY_STARTS,
+        *(
+            Estimator(
+                structure=structure,
+                name=name,
+                fit=fit,
+                training=Training,
+                check_training=check_grey_training,
+                no_posterior=ENDED,
+                begins="a grey box begins at the starts of its parameters",
+                starts=GREY_STARTS,
+            )
+            for structure, name, fit in (
+                (GreyBox, "a grey box", fit_grey_box),
+                (VectorGreyBox, "a grey box of several outputs", fit_vector_grey_box),
+            )
         ),
         Estimator(
             structure=TransferFunction,

@@ -10,8 +10,8 @@ from sysid.models.cascade_run import Activity, CascadeRun
 from sysid.models.ends import Ends
 from sysid.models.equation_form import EquationForm
 from sysid.models.form import AbstractForm
-from sysid.models.grey_box import GreyBox, InitialState, Parameter
-from sysid.models.grey_box_model import GreyBoxModel
+from sysid.models.grey_box import GreyBox, InitialState, Parameter, VectorGreyBox
+from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 from sysid.models.history import History, Start, StartKind
 from sysid.models.innovations import Innovations
 from sysid.models.interpolation import Interpolation
@@ -59,6 +59,7 @@ __all__ = [
     "Domain",
     "Ends",
     "EquationForm",
+    "EquationModel",
     "GreyBox",
     "GreyBoxModel",
     "History",
@@ -86,6 +87,8 @@ __all__ = [
     "StateSpace",
     "TransferFunction",
     "TransferFunctionModel",
+    "VectorGreyBox",
+    "VectorGreyBoxModel",
     "VectorNARX",
     "VectorNARXModel",
     "VectorNeuralStateSpace",

@@ -227,6 +227,12 @@ class GreyBox(AbstractStructure):
         weights = lowered(self, self.system.others, (), None).n_weights
         return f"{self.kind} {len(self.system.states)}/{len(self.free)}{f'+{weights}' if weights else ''}"
 
+    def for_outputs(self, n_outputs: int) -> GreyBox:
+        """The same equations of several outputs, where there are several: they share states and parameters."""
+        if n_outputs == 1 or self.several_outputs:
+            return self
+        return VectorGreyBox(**{one.name: getattr(self, one.name) for one in fields(self)})
+
     def check_mapping(self, mapping: Mapping) -> None:
         """Refuse a mapping whose inputs or outputs the equations do not know."""
         self.system.check_names(mapping.inputs, mapping.outputs)
@@ -241,6 +247,14 @@ class GreyBox(AbstractStructure):
             "tables": {name: [list(point) for point in points] for name, points in self.points.items()},
             "substeps": self.substeps,
         }
+
+
+@dataclass(frozen=True, kw_only=True)
+class VectorGreyBox(GreyBox):
+    """The same of several outputs, each of which counts over what is left of it."""
+
+    kind = "VectorGreyBox"
+    several_outputs = True
 
 
 @lru_cache(maxsize=64)

@@ -5,40 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.equations import Lowered
-from sysid.models.base import AbstractModel
+from sysid.models.base import AbstractModel, SeveralOutputs
 from sysid.models.equation_form import EquationForm, StateTerms
-from sysid.models.grey_box import GreyBox, lowered
+from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
 from sysid.models.history import History
 from sysid.models.mapping import Mapping
-from sysid.models.scaling import Scaling
+from sysid.models.scaling import Scaling, VectorScaling
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class GreyBoxModel(AbstractModel):
-    """A fitted grey box of one output.
+_ModelT = TypeVar("_ModelT", bound="EquationModel")
 
-    Args:
-        grey: The equations.
-        theta: Parameters that were estimated, then the weights of networks, in their units.
-        norms: Levels and scales of what networks see.
-        levels: An ordinary value of each state, in its unit.
-        spans: How far each ordinarily goes from there.
-        substeps: Runge-Kutta steps from sample to sample.
-        scaling: Of the output; the equations themselves are in units.
-        mapping: Which channels go in, which comes out.
-        sample_time: Seconds.
-        input_units: Unit of each input.
-        output_unit: Unit of the output.
-        rest_output: Output at rest, in its unit.
-    """
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EquationModel(AbstractModel):
+    """What fitted grey boxes of one output and of several have in common; both have the fields below."""
 
     grey: GreyBox
     theta: Array
@@ -46,12 +34,10 @@ class GreyBoxModel(AbstractModel):
     levels: tuple[float, ...]
     spans: tuple[float, ...]
     substeps: int
-    scaling: Scaling
+    scaling: Scaling | VectorScaling
     mapping: Mapping
     sample_time: float
     input_units: tuple[str, ...]
-    output_unit: str
-    rest_output: float
 
     clamp = np.inf
     """Bound of the output: none."""
@@ -116,7 +102,7 @@ class GreyBoxModel(AbstractModel):
             fixed=np.array([one is not None and one.fixed for one in given], dtype=np.bool_),
         )
 
-    def with_theta(self, theta: Array) -> GreyBoxModel:
+    def with_theta(self: _ModelT, theta: Array) -> _ModelT:
         """The same model with other parameters."""
         return replace(self, theta=theta)
 
@@ -138,17 +124,15 @@ class GreyBoxModel(AbstractModel):
             past = form.given(history.inputs, history.inputs)[0]
             x, S = form.resting_moves(past, history.output.reshape(1, -1)[0], p)
         _, J = form.moved(form.given(inputs, history.inputs), x, S, p)
-        return np.asarray(J[:, 0] @ factor)
+        return np.asarray((J if self.structure.several_outputs else J[:, 0]) @ factor)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
+    def _fields(self) -> dict[str, Any]:
+        """What is stored of either kind."""
         return {
             "structure": self.grey.to_dict(),
             "mapping": str(self.mapping),
             "sample_time": self.sample_time,
             "input_units": list(self.input_units),
-            "output_unit": self.output_unit,
-            "rest_output": self.rest_output,
             "substeps": self.substeps,
             "norms": list(self.norms),
             "levels": list(self.levels),
@@ -157,15 +141,80 @@ class GreyBoxModel(AbstractModel):
             "theta": self.theta.tolist(),
         }
 
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        """The arguments that are the same for either kind."""
+        given = ("sample_time", "substeps", "norms", "levels", "spans", "input_units")
+        found = {name: fields[name] for name in given}
+        theta = np.array(fields["theta"], dtype=np.float64)
+        return found | {"theta": theta, "mapping": Mapping.parse(fields["mapping"])}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GreyBoxModel(EquationModel):
+    """A fitted grey box of one output.
+
+    Args:
+        grey: The equations.
+        theta: Parameters that were estimated, then the weights of networks, in their units.
+        norms: Levels and scales of what networks see.
+        levels: An ordinary value of each state, in its unit.
+        spans: How far each ordinarily goes from there.
+        substeps: Runge-Kutta steps from sample to sample.
+        scaling: Of the output; the equations themselves are in units.
+        mapping: Which channels go in, which comes out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+    """
+
+    scaling: Scaling
+    output_unit: str
+    rest_output: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return self._fields() | {"output_unit": self.output_unit, "rest_output": self.rest_output}
+
     @classmethod
     def from_dict(cls, fields: Dict[str, Any]) -> GreyBoxModel:
         """The model that :meth:`to_dict` wrote."""
         structure = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        given = ("sample_time", "output_unit", "rest_output", "substeps", "norms", "levels", "spans", "input_units")
         return cls(
             grey=GreyBox(**structure),
-            theta=np.array(fields["theta"], dtype=np.float64),
             scaling=Scaling.from_dict(fields["scaling"]),
-            mapping=Mapping.parse(fields["mapping"]),
-            **{name: fields[name] for name in given},
+            output_unit=fields["output_unit"],
+            rest_output=fields["rest_output"],
+            **cls._read(fields),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VectorGreyBoxModel(EquationModel, SeveralOutputs):
+    """A fitted grey box of several outputs; its other fields are those of :class:`GreyBoxModel`.
+
+    Args:
+        output_units: Unit of each output.
+        rest_outputs: Each output at rest, in its unit.
+    """
+
+    scaling: VectorScaling
+    output_units: tuple[str, ...]
+    rest_outputs: tuple[float, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        return self._fields() | {"output_units": list(self.output_units), "rest_outputs": list(self.rest_outputs)}
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> VectorGreyBoxModel:
+        """The model that :meth:`to_dict` wrote."""
+        structure = {key: value for key, value in fields["structure"].items() if key != "kind"}
+        return cls(
+            grey=VectorGreyBox(**structure),
+            scaling=VectorScaling.from_dict(fields["scaling"]),
+            output_units=tuple(fields["output_units"]),
+            rest_outputs=tuple(fields["rest_outputs"]),
+            **cls._read(fields),
         )

@@ -10,8 +10,8 @@ from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_program import Limit
-from sysid.models.grey_box import GreyBox
-from sysid.models.grey_box_model import GreyBoxModel
+from sysid.models.grey_box import GreyBox, VectorGreyBox
+from sysid.models.grey_box_model import GreyBoxModel, VectorGreyBoxModel
 from sysid.models.linear_state_space import (
     LinearStateSpace,
     LinearStateSpaceModel,
@@ -36,6 +36,7 @@ _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
     (VectorNeuralStateSpace, VectorNeuralStateSpaceModel),
     (TransferFunction, TransferFunctionModel),
     (GreyBox, GreyBoxModel),
+    (VectorGreyBox, VectorGreyBoxModel),
     (LinearStateSpace, LinearStateSpaceModel),
     (VectorStateSpace, VectorStateSpaceModel),
     *((structure, PolynomialModel) for structure in POLYNOMIALS.values()),

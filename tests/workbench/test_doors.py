@@ -76,6 +76,7 @@ FITS = [
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
     pytest.param(GREY, {"seed": 7, "max_iterations": 12, "starts": 2}, ALONE, id="GreyBox"),
+    pytest.param(GREY | {"kind": "VectorGreyBox"}, {"max_iterations": 3, "starts": 1}, ALONE, id="VectorGreyBox, of one"),
     pytest.param(VECTOR_SS, None, ALONE, id="VectorSS, of one"),
     pytest.param(VECTOR_NSS, {"seed": 7, "max_iterations": 4, "starts": 1}, ALONE, id="VectorNSS, of one"),
     pytest.param(VECTOR, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="NARX of several outputs, of one"),

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation.experiment import Experiment, experiments_of, unit_range
+from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.grey_box.findings import Findings, with_evidence
 from sysid.estimation.grey_box.layout import EquationLayout
 from sysid.estimation.grey_box.preparing import (
@@ -38,8 +40,8 @@ from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.models import Mapping, Start
-from sysid.models.grey_box import GreyBox, lowered
-from sysid.models.grey_box_model import GreyBoxModel
+from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
+from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]
@@ -61,6 +63,10 @@ FIRST_SUBSTEPS = 8
 
 SAME = 1e-4
 """By how much the loss of exact switches may differ from that of soft ones and be the same."""
+
+NOISE_ROUNDS, WIDEST, ALIKE = 3, 1e4, 0.05
+"""Times that outputs are weighed anew; by how much their errors may differ; and below which difference they are alike,
+as a natural logarithm."""
 
 SHARE_OF_ERROR, FINEST = 0.03, 1e-8
 """What a step may add to the errors that remain, as a share of them; and the least that is asked of it."""
@@ -105,24 +111,95 @@ def fit_grey_box(
         ConfigError: If the equations do not know a channel of the mapping, or an option does not apply.
         TraceError: If no sample counts, or the equations have no free run at their declared start.
     """
-    began = time.perf_counter()
-    training, start = (training or Training()).with_starts(STARTS), start or Start()
-    check_training(training)
-    grey.check_mapping(mapping)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
-    experiments = experiments_of(traces, mapping, start, rest)
-    ready = _ready(_template(traces[0], mapping, grey, experiments, rest), experiments)
+    experiments = experiments_of(traces, mapping, start or Start(), rest)
+    grey.check_mapping(mapping)
+    n = len(mapping.inputs)  # which are read as they are
+    template = GreyBoxModel(
+        **_common(traces[0], mapping, grey),
+        scaling=replace(unit_range(experiments), input_offset=(0.0,) * n, input_scale=(1.0,) * n),
+        output_unit=traces[0].channel(mapping.output).unit,
+        rest_output=rest,
+    )
+    return _fit(
+        template, experiments, training, (traces, selection, start or Start()), vet=vet, on_progress=on_progress
+    )
+
+
+def fit_vector_grey_box(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    grey: VectorGreyBox,
+    training: Training | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: Dict[str, float] | None = None,
+    selection: Sequence[Trace] = (),
+    vet: Callable[[starts.Network], bool] | None = None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> FitResult:
+    """Fit equations of several outputs, each of which counts over what is left of it; see :func:`fit_grey_box`.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which come out.
+        grey: The equations.
+        training: How to train.
+        start: What stands before each trace.
+        rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
+        selection: Traces that choose between starts.
+        vet: Whether a model's free run is stable.
+        on_progress: Called after every iteration.
+
+    Returns:
+        The fit. Its errors are mean squares over the outputs, in scaled numbers.
+
+    Raises:
+        ChannelError: As for one output.
+        ConfigError: Likewise.
+        TraceError: Likewise.
+    """
+    given = rest_output or {}
+    rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
+    experiments = experiments_of(traces, mapping, start or Start(), np.array(rests))
+    grey.check_mapping(mapping)
+    n = len(mapping.inputs)  # which are read as they are
+    template = VectorGreyBoxModel(
+        **_common(traces[0], mapping, grey),
+        scaling=replace(unit_ranges(experiments), input_offset=(0.0,) * n, input_scale=(1.0,) * n),
+        output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
+        rest_outputs=rests,
+    )
+    return _fit(
+        template, experiments, training, (traces, selection, start or Start()), vet=vet, on_progress=on_progress
+    )
+
+
+def _fit(
+    template: GreyBoxModel | VectorGreyBoxModel,
+    experiments: Sequence[Experiment],
+    training: Training | None,
+    data: tuple[Sequence[Trace], Sequence[Trace], Start],
+    *,
+    vet: Callable[[starts.Network], bool] | None,
+    on_progress: Callable[[FitProgress], None],
+) -> FitResult:
+    """Fit a model of any number of outputs."""
+    began = time.perf_counter()
+    training = (training or Training()).with_starts(STARTS)
+    check_training(training)
+    ready = _ready(template, experiments)
     starts.check_samples(ready.provider)
     multistart = starts.Multistart(
         training=training,
         layout=EquationLayout(
-            parameters=grey.free, nets=ready.template.lowered.nets, provider=ready.provider, begun=ready.theta
+            parameters=template.grey.free, nets=ready.template.lowered.nets, provider=ready.provider, begun=ready.theta
         ),
         provider=ready.provider,
         to_plain=ready.to_plain,
         template=ready.template,
-        selection=selection,
-        start=start,
+        selection=data[1],
+        start=data[2],
         initial=None,
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
@@ -137,14 +214,14 @@ def fit_grey_box(
     status = multistart_status(done.candidate, candidates, records, interrupted=multistart.stop.is_set())
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
     found = multistart_result(choice, candidates, training, status, seconds)
-    return _told(found, done, (traces, selection, start))
+    return _told(found, done, data)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Ready:
     """A fit that can begin: the model but for its parameters, the records, and where the parameters start."""
 
-    template: GreyBoxModel
+    template: GreyBoxModel | VectorGreyBoxModel
     provider: EquationProvider
     theta: Array
     stepping: Stepping
@@ -165,10 +242,10 @@ class _Done:
     softened: float
 
     @property
-    def model(self) -> GreyBoxModel:
+    def model(self) -> EquationModel:
         """The model."""
         found = self.candidate.model
-        assert isinstance(found, GreyBoxModel)  # noqa: S101 - the template's class
+        assert isinstance(found, EquationModel)  # noqa: S101 - the template's class
         return found
 
 
@@ -206,33 +283,27 @@ def check_training(training: Training) -> None:
         )
 
 
-def _template(
-    first: Trace, mapping: Mapping, grey: GreyBox, experiments: Sequence[Experiment], rest: float
-) -> GreyBoxModel:
-    """The model but for its parameters, and for what the records say of its states."""
+def _common(first: Trace, mapping: Mapping, grey: GreyBox) -> dict[str, Any]:
+    """A model but for its parameters, what the records say of its states, and its outputs."""
     low = lowered(grey, mapping.inputs, mapping.outputs, first.sample_time)
-    n, n_inputs = low.n_states, len(mapping.inputs)
-    return GreyBoxModel(
-        grey=grey,
-        theta=np.array([*(one.start for one in grey.free), *[0.0] * low.n_weights]),
-        norms=low.norms,
-        levels=(0.0,) * n,
-        spans=(1.0,) * n,
-        substeps=grey.substeps or FIRST_SUBSTEPS,
-        scaling=replace(unit_range(experiments), input_offset=(0.0,) * n_inputs, input_scale=(1.0,) * n_inputs),
-        mapping=mapping,
-        sample_time=first.sample_time,
-        input_units=tuple(first.channel(name).unit for name in mapping.inputs),
-        output_unit=first.channel(mapping.output).unit,
-        rest_output=rest,
-    )
+    return {
+        "grey": grey,
+        "theta": np.array([*(one.start for one in grey.free), *[0.0] * low.n_weights]),
+        "norms": low.norms,
+        "levels": (0.0,) * low.n_states,
+        "spans": (1.0,) * low.n_states,
+        "substeps": grey.substeps or FIRST_SUBSTEPS,
+        "mapping": mapping,
+        "sample_time": first.sample_time,
+        "input_units": tuple(first.channel(name).unit for name in mapping.inputs),
+    }
 
 
-def _ready(template: GreyBoxModel, experiments: Sequence[Experiment]) -> _Ready:
+def _ready(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence[Experiment]) -> _Ready:
     """Levels, ranges and a step, from the records at the declared start."""
     grey, form = template.grey, template.recursion
     n_weights = template.lowered.n_weights
-    records = tuple(Record.of([experiment], form) for experiment in experiments)
+    records = tuple(Record.of(experiment, form) for experiment in experiments)
     means = np.array([np.mean([np.mean(record.output[:, j]) for record in records]) for j in range(form.n_outputs)])
     limits = np.array([[one.low, one.high] for one in grey.free] + [[-np.inf, np.inf]] * n_weights).reshape(-1, 2).T
     provider = EquationProvider(
@@ -302,6 +373,8 @@ def _finished(ready: _Ready, chosen: starts.Candidate, training: Training, *, st
     """The chosen candidate with switches as they are, and with steps that its parameters need."""
     provider, solution, stepping = ready.provider, chosen.solution, ready.stepping
     softened = float("nan")
+    if provider.form.n_outputs > 1 and not stopped:
+        provider, solution = _weighed(provider, solution, training)
     if provider.form.lowered.switches and not stopped:
         provider, solution, softened = _sharpened(provider, solution, training)
     exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
@@ -325,6 +398,20 @@ def _finished(ready: _Ready, chosen: starts.Candidate, training: Training, *, st
     )
     candidate = _settled(replace(chosen, solution=solution, model=model), provider)
     return _Done(candidate=candidate, provider=provider, stepping=stepping, softened=softened)
+
+
+def _weighed(provider: EquationProvider, solution: Solution, training: Training) -> tuple[EquationProvider, Solution]:
+    """Outputs over what is left of each: a noisy one does not blur what a clean one shows of the states they share."""
+    for _ in range(NOISE_ROUNDS):
+        left = provider.left(solution.theta)
+        left = np.maximum(left, max(float(left.max()) / WIDEST, np.finfo(np.float64).eps))
+        noise = left / np.exp(np.mean(np.log(left)))
+        before = np.ones(len(noise)) if provider.noise is None else provider.noise
+        if np.abs(np.log(noise / before)).max() < ALIKE:
+            break
+        provider = replace(provider, noise=noise)
+        solution = _gone_on(provider, solution, training)
+    return provider, solution
 
 
 def _accuracy(solution: Solution, provider: EquationProvider) -> float:
@@ -378,7 +465,7 @@ def _told(found: FitResult, done: _Done, data: tuple[Sequence[Trace], Sequence[T
     posterior = _posterior(done, *data)
     findings = Findings.of(solution, done.provider, model.grey.free)
     n = max(done.provider.n_samples - model.n_parameters, 1)
-    variance = 2.0 * solution.at.loss / n * model.scaling.output_scale**2
+    variance = 2.0 * solution.at.loss / n * model.scaling.error_unit
     notes = [_step_note(model, done.stepping)] if model.lowered.n_continuous else []
     unread = [one for i, one in enumerate(model.mapping.inputs) if i not in {i for i, _ in model.lowered.lagged}]
     notes += [f"The equations do not read {', '.join(unread)}."] if unread else []
@@ -400,7 +487,7 @@ def _told(found: FitResult, done: _Done, data: tuple[Sequence[Trace], Sequence[T
     )
 
 
-def _step_note(model: GreyBoxModel, stepping: Stepping) -> str:
+def _step_note(model: EquationModel, stepping: Stepping) -> str:
     n = model.substeps
     given = model.grey.substeps is not None
     halved = "" if given else f"; half of that changes the output by {stepping.change:.1e} of its range"
@@ -410,7 +497,7 @@ def _step_note(model: GreyBoxModel, stepping: Stepping) -> str:
     )
 
 
-def _step_warning(model: GreyBoxModel, stepping: Stepping) -> str:
+def _step_warning(model: EquationModel, stepping: Stepping) -> str:
     return (
         f"{model.substeps} Runge-Kutta steps between samples are not enough: twice as many change the output by "
         f"{stepping.change:.1e} of its range. The equations are stiff; make what is fast algebraic, or slower."

@@ -38,33 +38,32 @@ class Record:
     free: bool
 
     @classmethod
-    def of(cls, experiments: Sequence[Experiment], form: EquationForm) -> Record:
-        """An experiment of each output as one record.
+    def of(cls, experiment: Experiment, form: EquationForm) -> Record:
+        """An experiment as a record.
 
         Args:
-            experiments: The same record for each output.
+            experiment: Of one output or several.
             form: What is run over it.
 
         Returns:
             The record. Samples of a measured history count like the others; one alone is a system that has stood there.
         """
-        first = experiments[0]
-        history = first.history
+        first, history = experiment, experiment.history
         stood = len(history.output) == 1 and (first.past is None or bool(first.past.any()))
         n_past = len(history.output) if not stood and first.past is not None and first.past.any() else 0
         inputs = np.concatenate([history.inputs[:n_past], first.inputs])
-        columns = [np.concatenate([e.history.output[:n_past], e.output]) for e in experiments]
+        output = np.concatenate([history.output[:n_past], first.output])
         before, roots = first.past_weights[:n_past], None
         if first.weights is not None or not before.all():
             weights = np.ones(len(first.output)) if first.weights is None else first.weights
             roots = np.sqrt(np.concatenate([before, weights]))
         return cls(
             u=form.given(inputs, history.inputs[:1] if n_past else history.inputs),
-            output=np.column_stack(columns),
+            output=np.ascontiguousarray(output.reshape(len(output), -1)),
             roots=roots,
             rest=(
                 form.given(history.inputs[:1], history.inputs[:1])[0],
-                np.array([e.history.output[0] for e in experiments]),
+                np.atleast_1d(history.output[0]),
             ),
             free=first.free and not stood,
         )
@@ -95,12 +94,14 @@ class EquationProvider(AbstractProvider):
         records: The records.
         scale: Of each parameter and weight, in its unit, shape ``(p,)``.
         limits: Least and greatest of each, in its unit, shape ``(2, p)``.
+        noise: How much of each output is left, relative to the others: what its residuals count over.
     """
 
     form: EquationForm
     records: tuple[Record, ...]
     scale: Array
     limits: Array
+    noise: Array | None = None
     n_samples: int = field(init=False)
     n_parameters: int = field(init=False)
     """Those of the model and of the records' initial states."""
@@ -109,6 +110,26 @@ class EquationProvider(AbstractProvider):
         counted = sum(int(np.count_nonzero(record.known)) for record in self.records)
         object.__setattr__(self, "n_samples", counted * self.form.n_outputs)
         object.__setattr__(self, "n_parameters", len(self.scale) + len(self.open_states) * len(self._free))
+
+    @property
+    def unit(self) -> Array:
+        """What the residuals of each output are over, in its unit."""
+        return self.form.output_scale if self.noise is None else self.form.output_scale * self.noise
+
+    def left(self, theta: Array) -> Array:
+        """Root of the mean square that some parameters leave of each output, over its scale.
+
+        Args:
+            theta: What is trained.
+
+        Returns:
+            Shape ``(n_outputs,)``.
+        """
+        form, total = self.at(theta), np.zeros(self.form.n_outputs)
+        for i, record in enumerate(self.records):
+            error = record.errors(form.run(record.u, self.begin(form, theta, i)), form.output_scale)
+            total += np.sum(error**2, axis=0)
+        return np.sqrt(total * form.n_outputs / max(self.n_samples, 1))
 
     @property
     def open_states(self) -> NDArray[np.int64]:
@@ -186,7 +207,7 @@ class EquationProvider(AbstractProvider):
         form, total = self.at(theta), 0.0
         with np.errstate(over="ignore", invalid="ignore"):  # a free run that explodes has no loss
             for i, record in enumerate(self.records):
-                error = record.errors(form.run(record.u, self.begin(form, theta, i)), form.output_scale)
+                error = record.errors(form.run(record.u, self.begin(form, theta, i)), self.unit)
                 total += 0.5 * float(np.vdot(error, error))
         return total if np.isfinite(total) else np.inf
 
@@ -229,10 +250,10 @@ class EquationProvider(AbstractProvider):
             rows = slice(first, min(first + BLOCK, len(record.output)))
             y, J = form.moved(record.u[rows], x, S, p)
             J *= scale
-            J /= form.output_scale[:, None]
+            J /= self.unit[:, None]
             if record.roots is not None:
                 J = np.where(record.roots[rows, None, None] > 0.0, J * record.roots[rows, None, None], 0.0)
-            yield record.errors(y, form.output_scale, rows), J, places
+            yield record.errors(y, self.unit, rows), J, places
 
     def paths(self, theta: Array) -> list[tuple[Array, Array]]:
         """What the programs read, and every state that the records visit.

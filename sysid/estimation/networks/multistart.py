@@ -31,7 +31,7 @@ from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import Loop, Status
-from sysid.models import GreyBoxModel, NARXModel, NeuralStateSpaceModel, Start, VectorNeuralStateSpaceModel, beginning
+from sysid.models import EquationModel, NARXModel, NeuralStateSpaceModel, Start, VectorNeuralStateSpaceModel, beginning
 from sysid.traces import Trace
 
 RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
@@ -47,7 +47,7 @@ INITIAL_ALPHA = 1e-2
 underdetermined network small."""
 
 
-Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel | GreyBoxModel
+Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel | EquationModel
 """What is trained here."""
 
 

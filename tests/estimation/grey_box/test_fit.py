@@ -9,9 +9,9 @@ import pytest
 
 import sysid
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation.grey_box.fit import fit_grey_box
+from sysid.estimation.grey_box.fit import fit_grey_box, fit_vector_grey_box
 from sysid.estimation.result import FitResult, Status
-from sysid.models import GreyBox, GreyBoxModel, Mapping, Start, StartKind
+from sysid.models import GreyBox, GreyBoxModel, Mapping, Start, StartKind, VectorGreyBox
 from sysid.traces import Channel, Trace
 from sysid.validation import predict_interval
 
@@ -172,3 +172,27 @@ def test_equations_without_a_run_are_refused() -> None:
 def test_options_of_lagged_regressors_are_refused() -> None:
     with pytest.raises(ConfigError, match="a grey box is not trained with stride"):
         fitted([first_order(3.0, 4.0)], LAG, sysid.Training(stride=2), parameters={"gain": 1, "lag": 1})
+
+
+def test_several_outputs_share_states_and_parameters_and_count_over_their_noise() -> None:
+    u, x, z = steps(250), np.zeros(251), np.zeros(251)
+    for t in range(250):
+        x[t + 1] = 0.8 * x[t] + 0.4 * u[t]
+        z[t + 1] = 0.9 * z[t] + 0.05 * x[t]
+    noise = np.random.default_rng(2).standard_normal((2, 250))
+    channels = tuple(Channel(name=name, unit="V") for name in ("u", "x", "z"))
+    values = np.column_stack([u, x[:250] + 0.2 * noise[0], z[:250] + 0.001 * noise[1]])
+    record = Trace(name="r", sample_time=1.0, channels=channels, values=values)
+    grey = GreyBox(
+        equations="x[k+1] = a*x + b*u; z[k+1] = c*z + d*x", parameters={"a": 0.5, "b": 0.5, "c": 0.5, "d": 0.1}
+    ).for_outputs(2)
+    assert isinstance(grey, VectorGreyBox)
+    fit = fit_vector_grey_box([record], Mapping.parse("u -> x+z"), grey, sysid.Training(starts=1), start=ESTIMATED)
+    assert fit.uncertainty is not None
+    away = np.abs(fit.uncertainty.values - [0.8, 0.4, 0.9, 0.05]) / fit.uncertainty.standard_deviations
+    assert (away < 3.5).all()
+    assert fit.uncertainty.standard_deviations[0] < 0.004  # what the noisy output alone says is ten times wider
+    again = FitResult.from_dict(fit.to_dict())
+    assert again.model.simulate(u[:, None]).shape == (250, 2)
+    interval = predict_interval(fit, record, start=ESTIMATED)
+    assert interval.low.shape[1] == 2
