@@ -26,8 +26,7 @@ import scipy
 
 from sysid.estimation import FitResult, Training
 from sysid.estimation.grey_box.fit import fit_grey_box
-from sysid.models import GreyBox, History, Mapping, Start, StartKind
-from sysid.models.grey_box_model import GreyBoxModel
+from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Scaling, Start, StartKind
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 from tests.benchmarks._public import checked
@@ -93,12 +92,21 @@ def trace(u: np.ndarray, y: np.ndarray, sample_time: float, name: str = "record"
 def record(system: System, rng: np.random.Generator) -> Trace:
     """The system at its true parameters, from where it begins."""
     u = np.repeat(rng.uniform(*system.inputs, SAMPLES // 20), 20)
-    start = trace(u, np.zeros(SAMPLES), system.sample_time)
-    training = Training(max_iterations=1, starts=1)
-    template = fit_grey_box([start], MAPPING, system.grey(system.true), training, start=Start())
-    model = template.model
-    assert isinstance(model, GreyBoxModel)
-    y = model.with_theta(np.array(list(system.true.values()))).simulate(u[:, None])
+    model = GreyBoxModel(
+        grey=system.grey(system.true),
+        theta=np.array(list(system.true.values())),
+        norms=(),
+        levels=(0.0,) * len(system.begin),
+        spans=(1.0,) * len(system.begin),
+        substeps=50,
+        scaling=Scaling.identity(1),
+        mapping=MAPPING,
+        sample_time=system.sample_time,
+        input_units=("V",),
+        output_unit="V",
+        rest_output=0.0,
+    )
+    y = model.simulate(u[:, None])
     return trace(u, y + NOISE * np.ptp(y) * rng.standard_normal(SAMPLES), system.sample_time)
 
 

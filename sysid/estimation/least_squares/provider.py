@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+LARGEST = 1e150
+"""Entries of a matrix from here on are those of sensitivities that explode: what multiplies them may overflow."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Linearisation:
@@ -39,7 +42,7 @@ class Linearisation:
     @property
     def finite(self) -> bool:
         """Whether the matrix can be used: the sensitivities of an unstable free run grow beyond all numbers."""
-        return bool(np.isfinite(self.gauss_newton).all() and np.isfinite(self.gradient).all())
+        return bool((np.abs(self.gauss_newton) < LARGEST).all() and np.isfinite(self.gradient).all())
 
 
 class AbstractProvider(ABC):
