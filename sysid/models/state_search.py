@@ -165,6 +165,10 @@ class StateSearch:
 
     def found(self) -> Array:
         """The state, from the best of several beginnings."""
+        with np.errstate(over="ignore", invalid="ignore"):  # runs from some of them may explode
+            return self._found()
+
+    def _found(self) -> Array:
         n = len(self.expected)
         near = np.clip(self.expected, self.low, self.high)
         begins = [near, np.clip(np.zeros(n), self.low, self.high)]
