@@ -28,6 +28,7 @@ EXTRAS = {
     "distributed": "dask",
     "psycopg": "postgres",
     "ziglang": "fmu-cross",
+    "casadi": "casadi",
 }
 """Our extra by the name that is imported."""
 

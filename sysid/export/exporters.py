@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from sysid.errors import ConfigError
 from sysid.export.c_exporter import CExporter
+from sysid.export.casadi_exporter import CasadiExporter
 from sysid.export.exporter import AbstractExporter
 from sysid.export.fmu_exporter import FmuExporter
 from sysid.export.onnx_exporter import OnnxExporter
@@ -25,6 +26,7 @@ EXPORTERS: dict[str, AbstractExporter] = {
         CExporter(name="c-float32", dtype="float32"),
         FmuExporter(name="fmi2", version=2),
         FmuExporter(name="fmi3", version=3),
+        CasadiExporter(),
     )
 }
 """Every format by name."""

@@ -69,6 +69,7 @@ ROWS = {
     "C, float": Row(format="c-float32", name="{name}.c", dtype="float32", tolerance=1e-3),
     "FMI 2.0": Row(format="fmi2", name="{name}.fmi2.fmu"),
     "FMI 3.0": Row(format="fmi3", name="{name}.fmi3.fmu"),
+    "CasADi, step": Row(format="casadi", name="step.casadi"),
 }
 """Every file of every format: the table of the contract."""
 FORMATS = tuple(dict.fromkeys(row.format for row in ROWS.values()))
