@@ -88,6 +88,7 @@ def test_base_code_needs_no_extra(tmp_path):
         "sysid.workbench.commands.sweep",
         "sysid.workbench.sweep.run",
         "sysid.workbench.sweep.sampler",
+        "sysid.workbench.sweep.sweep_steps",
         'pip install "sysid-workbench[frames]"',
         "c",
         'onnx left out: pip install "sysid-workbench[onnx]"',
