@@ -219,13 +219,17 @@ def free_run_errors(model: AbstractModel, experiments: Sequence[Experiment]) -> 
         experiments: The records, each with the history that its run begins with.
 
     Returns:
-        For each record and output shape ``(n_samples,)``.
+        For each record and output shape ``(n_samples,)``; of several outputs relative to their sizes.
     """
-    found = []
+    found: list[NDArray[np.float64]] = []
     for e in experiments:
         left = (model.simulate(e.inputs, e.history) - e.output).reshape(len(e.output), -1)
         counts = np.ones(len(left), dtype=bool) if e.weights is None else e.weights > 0.0
         found += list(np.where(counts[:, np.newaxis], left, 0.0).T)
+    n = len(model.mapping.outputs)
+    if n > 1:  # in units of their own: over their sizes, so that none of them speaks for all
+        sizes = [np.sqrt(np.mean(np.concatenate(found[output::n]) ** 2)) for output in range(n)]
+        found = [error / (sizes[at % n] or 1.0) for at, error in enumerate(found)]
     return found
 
 
