@@ -30,6 +30,8 @@ from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.search import search
 from sysid.kernels import linear as kernel
 from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, VectorStateSpace
+from sysid.models.innovations import Innovations
+from sysid.models.linear_state_space import polynomials
 from sysid.models.polynomial import AbstractPolynomial
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
@@ -154,6 +156,41 @@ def coverage(runs: int) -> None:
         found(f"{name}: intervals of 95 % that hold the truth", share, "%", note=f"92 to 98 asked; {runs} records")
 
 
+TWO_BY_TWO = Innovations(
+    A=np.array([[0.9, 0.2], [-0.2, 0.7]]),
+    B=np.array([[0.5, 0.0], [0.2, 0.6]]),
+    C=np.array([[1.0, 0.0], [0.3, 1.0]]),
+    D=np.zeros((2, 2)),
+    K=np.array([[0.3, 0.0], [0.1, 0.2]]),
+    constant=np.zeros(2),
+)
+"""Two inputs, two outputs, two states, noise through the states."""
+
+
+def record_of_two(seed: int, n: int = 1_000) -> tuple[Trace, Mapping]:
+    """A record of the two by two system that goes on before it; the noise of its outputs hangs together."""
+    rng = np.random.default_rng(seed)
+    u = np.sign(rng.normal(size=(n + 100, 2)))
+    e = 0.5 * rng.normal(size=(n + 100, 2)) @ np.array([[1.0, 0.4], [0.0, 0.9]])
+    x, y = np.zeros(2), np.zeros((n + 100, 2))
+    for t in range(n + 100):
+        y[t] = TWO_BY_TWO.C @ x + e[t]
+        x = TWO_BY_TWO.A @ x + TWO_BY_TWO.B @ u[t] + TWO_BY_TWO.K @ e[t]
+    return trace_of(u[100:], y[100:])
+
+
+def coverage_of_two(runs: int) -> None:
+    """The same for a state space of two outputs: numerators, denominator, noise and constants."""
+    F, numerators, noise = (np.real(part) for part in polynomials(TWO_BY_TWO))
+    truth = [*numerators[:, :, 1:].ravel(), *F[1:], *noise[:, :, 1:].ravel(), 0.0, 0.0]
+    inside = []
+    for seed in range(runs):
+        trace, mapping = record_of_two(seed)
+        inside.append(held(fit([trace], mapping, VectorStateSpace(states=2), start=FREE, stability=None), truth))
+    share = 100.0 * float(np.mean(inside))
+    found("VectorSS: intervals of 95 % that hold the truth", share, "%", note=f"92 to 98 asked; {runs} records")
+
+
 def million() -> None:
     """Subspace over a million samples of two inputs and two outputs, ten states."""
     rng, n, N = np.random.default_rng(0), 10, 1_000_000
@@ -189,6 +226,7 @@ def main() -> None:
     million()
     three_systems(range(11, 11 + option("seeds", 20)), beside="--without-peers" not in sys.argv)
     coverage(option("runs", 200))
+    coverage_of_two(option("runs", 200))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 
 from sysid.errors import TraceError
-from sysid.estimation.experiment import Experiment, experiments_of, unit_range
+from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
@@ -18,6 +18,7 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.segments import scaling_of
 from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_search import AbstractProblem
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
@@ -77,7 +78,7 @@ def fit_transfer_function(
     experiments, own = tuple(determined.only(e) for e in whole), determined.narrowed(orders)
     problem = _Problem(
         experiments=experiments,
-        scaling=unit_range(experiments),
+        scaling=scaling_of(experiments, constant=orders.intercept),
         orders=own,
         training=training or TransferFunctionTraining(),
         terms=Terms(
@@ -88,7 +89,7 @@ def fit_transfer_function(
             rest_output=rest,
         ),
     )
-    scaling = unit_range(whole)
+    scaling = scaling_of(whole, constant=orders.intercept)
 
     def of_all_inputs(model: AbstractModel) -> AbstractModel:
         if own is orders:

@@ -188,7 +188,7 @@ def _run(errors: PredictionErrors, theta: Array, training: PolynomialTraining) -
 
 def _limits(training: PolynomialTraining) -> Termination:
     return Termination(
-        max_iterations=training.max_iterations, max_time_s=training.max_time_s, tolerance=1e-7, patience=3
+        max_iterations=training.max_iterations, max_time_s=training.max_time_s, tolerance=1e-11, patience=3
     )
 
 

@@ -299,7 +299,7 @@ class _Problem:
             if left <= 0:
                 break
             spent = time.perf_counter() - began
-            limits = Termination(max_iterations=left, max_time_s=seconds - spent, tolerance=1e-6, patience=2)
+            limits = Termination(max_iterations=left, max_time_s=seconds - spent, tolerance=1e-9, patience=2)
             engine = LevenbergMarquardt(termination=limits, evidence_after=None)
             solution = engine.minimise(errors, zero, flat_prior(len(zero)))
             before = curve[-1].iteration if curve else 0
