@@ -57,7 +57,7 @@ def test_a_field_without_a_range_of_its_own_cannot_be_asked_for_it() -> None:
 @pytest.mark.parametrize(
     ("structure", "fields"),
     [
-        (NARX, {"input_delays", "output_delays", "neurons"}),
+        (NARX, {"activation", "input_delays", "output_delays", "neurons"}),
         (ARX, {"na", "nb", "nk"}),
         (TransferFunction, {"poles", "zeros"}),
     ],
