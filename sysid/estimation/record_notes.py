@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from sysid.models import AbstractModel, History, Mapping, Start, beginning
 from sysid.traces import Trace
@@ -192,5 +192,5 @@ def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usab
         return 0.0
     both = float(left @ left) * float(new @ new)
     share = float(left @ new) ** 2 / max(both, float(np.finfo(np.float64).tiny))
-    by_chance = stats.f.sf(share * free / max(1.0 - share, np.finfo(np.float64).eps), 1, free)
+    by_chance = float(special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))
     return share if share > SHARE and by_chance < SURE else 0.0

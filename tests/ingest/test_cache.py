@@ -109,6 +109,7 @@ def test_a_damaged_entry_is_not_trusted(tmp_path: Path, damage: Callable[[Path, 
 
 
 def test_a_folder_that_cannot_be_written_to_loses_nothing(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("WARNING", logger="sysid.ingest.cache")
     (tmp_path / "file").write_text("in the way")
     TraceCache(folder=tmp_path / "file").store("k", TRACE)
     assert "was not cached" in caplog.text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 from sysid.errors import ChannelError, ConfigError, MissingExtraError, ReaderError
 from sysid.ingest import READERS, FileOptions, load_dataset, read_table
+from sysid.ingest.readers.reader import silent
 from tests.ingest.recordings import (
     PIPE,
     TIME,
@@ -208,3 +210,15 @@ def test_a_missing_column_is_guessed_at(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text("t [s],P_pipe [bar]\n0,1\n1,2\n")
     with pytest.raises(ChannelError, match="did you mean P_pipe"):
         read_table(tmp_path / "run.csv").find("P_pip")
+
+
+def test_libraries_are_silent_while_any_thread_reads_and_heard_again_afterwards() -> None:
+    """The second reader ends after the first: neither may leave the log shut, or open it too early."""
+    first, second = silent(), silent()
+    before = logging.root.manager.disable
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert logging.root.manager.disable == logging.CRITICAL
+    second.__exit__(None, None, None)
+    assert logging.root.manager.disable == before

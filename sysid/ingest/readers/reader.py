@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
 
 from sysid.content import nearest_file
 from sysid.errors import ConfigError, ReaderError
@@ -138,13 +139,31 @@ def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOpt
 
 @contextmanager
 def silent() -> Iterator[None]:
-    """Keep a library from telling in its log what our error or note says."""
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
+    """Keep a library from telling in its log what our error or note says; in any number of threads at once."""
+    with _SILENCE.lock:
+        if _SILENCE.readers == 0:
+            _SILENCE.before = logging.root.manager.disable
+            logging.disable(logging.CRITICAL)
+        _SILENCE.readers += 1
     try:
         yield
     finally:
-        logging.disable(before)
+        with _SILENCE.lock:
+            _SILENCE.readers -= 1
+            if _SILENCE.readers == 0:
+                logging.disable(_SILENCE.before)
+
+
+@dataclass
+class _Silence:
+    """Who reads silently now, and what was logged before the first of them came: the switch is one for all threads."""
+
+    lock: Lock = field(default_factory=Lock)
+    readers: int = 0
+    before: int = 0
+
+
+_SILENCE = _Silence()
 
 
 def damaged(path: Path, kind: str, error: BaseException) -> ReaderError:
