@@ -260,3 +260,25 @@ def convert(
 def _parsed(unit: str) -> pint.Unit:
     plain = plain_unit(unit) or unit
     return _registry().parse_units("dimensionless" if plain == "1" else plain)
+
+
+def squared(unit: str) -> str:
+    """The unit of a square, such as of a mean squared error.
+
+    Args:
+        unit: Of what is squared.
+
+    Returns:
+        Its square as people write it; a pure number stays one.
+
+    Example:
+        >>> squared("psi"), squared("m/s"), squared("1")
+        ('psi²', '(m/s)²', '1')
+    """
+    if unit in {"", "1"}:
+        return unit
+    return f"{unit}²" if _SINGLE.fullmatch(unit) else f"({unit})²"
+
+
+_SINGLE = re.compile(r"[^\W\d]+|%|°\w*")
+"""A unit whose exponent is its own: one word."""

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from sysid.names import c_comment, c_string, markdown_inline, read_sides, xml_attribute
+from sysid.units import squared
 
 
 @cache
@@ -32,6 +33,7 @@ def environment(*, markdown: bool = False) -> Any:
     )
     found.filters |= {
         "number": _number,
+        "squared": squared,
         "real": c_real,
         "table": _table,
         "comment": c_comment,

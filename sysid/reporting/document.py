@@ -40,6 +40,7 @@ from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
 from sysid.reporting.training_view import RELATIVE, error_unit, trained_models, training_parts, trust_sections
 from sysid.reporting.verdict import verdict
 from sysid.reporting.worst_instants import Instant, worst_instants
+from sysid.units import squared
 
 
 def build_document(folder: Path, results: Results, published: PublishedTable | None) -> Document:
@@ -120,7 +121,7 @@ def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
     }
     if published:
         series.append(figures.Series(name="published", values=published, published=True))
-    figure = figures.cases_figure(series, cases, quantity=f"free-run mse [{fits[0].unit}²]")
+    figure = figures.cases_figure(series, cases, quantity=f"free-run mse [{squared(fits[0].unit)}]")
     caption = f"Free-run mse by case and fit, {mapping}; logarithmic, lower is better. A fit without a mark diverges."
     return picture(figure, f"Free-run mse by case, {mapping}", caption, name)
 
@@ -173,7 +174,7 @@ def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int
         )
         caption = (
             f"{fit.name} on {name} ({case.role.value}): target and free run above, error below. "
-            f"mse {number(case.free_run.mse, missing='diverged')} {fit.unit}², largest error "
+            f"mse {number(case.free_run.mse, missing='diverged')} {squared(fit.unit)}, largest error "
             f"{number(case.free_run.max_abs_error, missing='diverged')} {fit.unit}."
             f"{'' if signal.low is None else ' Shaded: the 95 % interval of the free run.'}"
         )
@@ -226,7 +227,7 @@ def _learning(results: Results) -> list[tuple[str, str, dict[str, LearningCurve 
         # A fit whose curve stands elsewhere keeps its colour.
         curves = {fit.name: None if error_unit(fit) == RELATIVE else fit.learning_curve for fit in fits}
         caption = f"Learning curves on the estimation records, {mapping}; open loop learns the error of one step."
-        found.append((caption, f"{fits[0].unit}²", curves))
+        found.append((caption, squared(fits[0].unit), curves))
     shared = {fit.name: fit.learning_curve for fit in trained_models(results) if error_unit(fit) == RELATIVE}
     caption = "Learning curves on the estimation records of models of several outputs, each output over its own errors."
     return [*found, (caption, RELATIVE, shared)]

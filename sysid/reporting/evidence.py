@@ -14,6 +14,7 @@ from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.residuals import GroupRecord, read_residuals
 from sysid.reporting.results import FitRecord, LinearityRecord, Results
 from sysid.reporting.tables import Cell, Table, figure_cell
+from sysid.units import squared
 
 
 def evidence_sections(folder: Path, results: Results) -> list[Section]:
@@ -111,7 +112,7 @@ def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord
         head=(
             ("fit", ""),
             ("cases", ""),
-            ("variance", f"{results.fits[0].unit}²"),
+            ("variance", squared(results.fits[0].unit)),
             ("Ljung-Box", "p"),
             ("residuals", "whiteness"),
             ("past inputs", "independence"),

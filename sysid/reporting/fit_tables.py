@@ -9,6 +9,7 @@ from sysid.reporting.numbers import number, seconds, times
 from sysid.reporting.results import CaseRecord, ExportRecord, FiguresRecord, FitRecord, PublishedRecord, Results
 from sysid.reporting.tables import DIVERGED, Cell, Column, Table, figure_cell
 from sysid.traces import Role
+from sysid.units import squared
 from sysid.validation.metrics import MERITS
 
 SCORED = (Role.VALIDATION, Role.TEST)
@@ -54,7 +55,7 @@ def accuracy_table(fits: Sequence[FitRecord], kind: str, best: Collection[str]) 
         "added to its output (a transfer function, a neural state space) has no such prediction: -.",
     }[kind]
     return Table(
-        caption=f"{words}: mean squared error [{fits[0].unit}²] by case. {fits[0].mapping}.",
+        caption=f"{words}: mean squared error [{squared(fits[0].unit)}] by case. {fits[0].mapping}.",
         head=(
             ("fit", ""),
             *((name, role.value) for name, role in columns.items()),
@@ -292,7 +293,7 @@ def _name_cell(fit: FitRecord, best: Collection[str]) -> Cell:
 
 def _selection_words(results: Results) -> str:
     units = {fit.unit for fit in results.fits}
-    return f"{units.pop()}², free run" if len(units) == 1 else "free run"
+    return f"{squared(units.pop())}, free run" if len(units) == 1 else "free run"
 
 
 def _mark(fit: FitRecord, best: Collection[str]) -> str:

@@ -50,14 +50,14 @@ def quantity(value: float, unit: str, *, digits: int = 3, missing: str = "not de
         missing: What to say for NaN.
 
     Returns:
-        The text, with the unit where it is a number.
+        The text, with the unit where it is a number and the unit is not the pure number's.
 
     Example:
-        >>> quantity(0.0541, "psi"), quantity(float("nan"), "psi", missing="diverged")
-        ('0.0541\xa0psi', 'diverged')
+        >>> quantity(0.0541, "psi"), quantity(float("nan"), "psi", missing="diverged"), quantity(0.5, "1")
+        ('0.0541\xa0psi', 'diverged', '0.500')
     """
     text = number(value, digits=digits, missing=missing)
-    return f"{text}\u00a0{unit}" if math.isfinite(value) else text
+    return f"{text}\u00a0{unit}" if math.isfinite(value) and unit != "1" else text
 
 
 def seconds(value: float) -> str:

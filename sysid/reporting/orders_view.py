@@ -6,6 +6,7 @@ from sysid.reporting.figures.order_figure import OrderCurve, order_figure, state
 from sysid.reporting.parts import Part, Section, picture
 from sysid.reporting.results import OrdersRecord, Results
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
+from sysid.units import squared
 
 
 def orders_section(results: Results) -> Section | None:
@@ -68,7 +69,7 @@ def _table(found: OrdersRecord) -> Table:
         head=(
             ("structure", ""),
             ("parameters", ""),
-            ("one-step mse", f"{found.unit}²"),
+            ("one-step mse", squared(found.unit)),
             ("AICc", ""),
             ("BIC", ""),
             ("free run, fit", "%"),

@@ -23,6 +23,7 @@ from sysid.reporting.markdown import rows_lines
 from sysid.reporting.numbers import number
 from sysid.reporting.records import RESULTS_FILE
 from sysid.reporting.scores import SCORES_FILE, Score, read_scores
+from sysid.units import squared
 
 _SETTING: Final = re.compile(r", (?:(?:ARX|TF|NARX|NSS) .*|n = \d+|full)$|(?<=: time of ).*?(?= to )")
 """What tells findings on the same record apart: a structure, a number of samples, a tool."""
@@ -98,8 +99,8 @@ def _errors(ours: Sequence[Score], peers: Sequence[Score]) -> list[str]:
     cases = list(dict.fromkeys(case for score in ours for case in score.mse))
     rows = [["free run, mean squared error", *cases], ["---"] * (len(cases) + 1)]
     for score in ours:
-        scale, squared = _scale(score), f"{score.unit}²"
-        unit = squared if scale == 1.0 else f"10⁻³ {squared}"
+        scale, of_squares = _scale(score), squared(score.unit)
+        unit = of_squares if scale == 1.0 else f"10⁻³ {of_squares}"
         rows.append(
             [
                 f"**{markdown_cell(score.mapping)}** [{unit}]: {markdown_cell(score.model)}",

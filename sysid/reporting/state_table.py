@@ -6,6 +6,7 @@ from sysid.reporting.fit_tables import SCORED
 from sysid.reporting.parts import Section
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.tables import Cell, Table, figure_cell
+from sysid.units import squared
 
 
 def state_section(results: Results) -> Section | None:
@@ -27,7 +28,8 @@ def _table(fits: list[FitRecord]) -> Table | None:
         return None
     rows = tuple((Cell(text=fit.name, header=True), *(_mean(fit, label) for label in labels)) for fit in fits)
     return Table(
-        caption=f"Free run: mean squared error [{fits[0].unit}²] by state, over the unseen cases. {fits[0].mapping}.",
+        caption=f"Free run: mean squared error [{squared(fits[0].unit)}] by state, over the unseen cases. "
+        f"{fits[0].mapping}.",
         head=(("fit", ""), *((label, _share(fits[0], label)) for label in labels)),
         rows=rows,
         note="Each state weighs by its samples in a case, and each case by its samples.",

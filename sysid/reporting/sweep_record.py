@@ -12,6 +12,7 @@ from typing import Any, Final
 from pydantic import Field
 
 from sysid.reporting.records import Number, Record, parse_record, read_document, write_record
+from sysid.units import squared
 
 SCHEMA_VERSION: Final = 1
 SWEEP_FILE: Final = "sweep.json"
@@ -80,7 +81,7 @@ class Figure:
 
     Args:
         words: What it is, for axes and tables.
-        unit: Its unit; ``{unit}`` stands for the output's.
+        unit: Its unit; ``{unit}`` stands for the output's, ``{squared}`` for its square.
         of: Its value for a trial, on some traces.
         measured: Whether it changes with the load of the machine.
     """
@@ -92,8 +93,8 @@ class Figure:
 
 
 FIGURES: Final[dict[str, Figure]] = {
-    "free_run_mse": Figure(words="free-run mse", unit="{unit}²", of=lambda trial, on: trial.mean("free_run_mse", on)),
-    "one_step_mse": Figure(words="one-step mse", unit="{unit}²", of=lambda trial, on: trial.mean("one_step_mse", on)),
+    "free_run_mse": Figure(words="free-run mse", unit="{squared}", of=lambda trial, on: trial.mean("free_run_mse", on)),
+    "one_step_mse": Figure(words="one-step mse", unit="{squared}", of=lambda trial, on: trial.mean("one_step_mse", on)),
     "run_time": Figure(words="mean run time", unit="s", of=lambda trial, _: trial.mean("run_time_s"), measured=True),
     "operations": Figure(words="multiplications a step", unit="", of=lambda trial, _: float(trial.operations)),
     "parameters": Figure(words="parameters", unit="", of=lambda trial, _: float(trial.parameters)),
@@ -101,13 +102,13 @@ FIGURES: Final[dict[str, Figure]] = {
     # "Best of both", error times run time: in free run, and one step ahead as in Lopes 2021, section 4.5.
     "BB": Figure(
         words="BB: free-run mse × run time",
-        unit="{unit}² s",
+        unit="{squared} s",
         of=lambda trial, on: trial.mean("free_run_mse", on) * trial.mean("run_time_s"),
         measured=True,
     ),
     "BB_one_step": Figure(
         words="BB: one-step mse × run time",
-        unit="{unit}² s",
+        unit="{squared} s",
         of=lambda trial, on: trial.mean("one_step_mse", on) * trial.mean("run_time_s"),
         measured=True,
     ),
@@ -184,7 +185,7 @@ class SweepRecord(Record):
     def words(self, name: str) -> str:
         """A figure with its unit, for an axis."""
         figure = FIGURES[name]
-        unit = figure.unit.format(unit=self.unit)
+        unit = figure.unit.format(unit=self.unit, squared=squared(self.unit))
         return f"{figure.words} [{unit}]" if unit else figure.words
 
     @property
@@ -203,7 +204,7 @@ class SweepRecord(Record):
             winner=self.winner,
             label="" if winner is None else winner.label,
             least=math.nan if winner is None else self.figure(winner, self.choose_by),
-            unit=FIGURES[self.choose_by].unit.format(unit=self.unit),
+            unit=FIGURES[self.choose_by].unit.format(unit=self.unit, squared=squared(self.unit)),
             front=[trial.number for trial in self.front()],
             wall_s=self.wall_s,
             workers=self.workers,

@@ -15,6 +15,7 @@ from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.results import AttemptRecord, CaseRecord, FitRecord, Results
 from sysid.reporting.tables import Cell, Table, figure_cell
+from sysid.units import squared
 
 RELATIVE = "relative"
 """Unit of errors that several outputs have in common."""
@@ -69,7 +70,7 @@ def error_unit(fit: FitRecord) -> str:
         The output's unit squared, or ``relative``.
     """
     row = ESTIMATORS.get(fit.structure.get("kind", ""))
-    return RELATIVE if row is not None and row.structure.several_outputs else f"{fit.unit}²"
+    return RELATIVE if row is not None and row.structure.several_outputs else squared(fit.unit)
 
 
 def training_parts(results: Results) -> list[Part]:

@@ -13,6 +13,7 @@ from sysid.reporting.numbers import number, quantity, seconds, times
 from sysid.reporting.parts import Tile, Verdict
 from sysid.reporting.results import CaseRecord, FitRecord, Results
 from sysid.reporting.worst_instants import Instant
+from sysid.units import squared
 
 
 def verdict(results: Results, instants: Dict[str, Sequence[Instant]], comparability: str) -> Verdict:
@@ -74,7 +75,7 @@ def _tiles(fit: FitRecord, cases: Dict[str, CaseRecord]) -> tuple[Tile, ...]:
         words = f"lowest fit of {output_side(fit.mapping)}, free run"
         return (Tile(figure=quantity(min(fits), "%", digits=4) if fits else "-", words=words),)
     return (
-        Tile(figure=quantity(mean, f"{fit.unit}²", missing="diverged"), words="mean mse, free run"),
+        Tile(figure=quantity(mean, squared(fit.unit), missing="diverged"), words="mean mse, free run"),
         Tile(figure=quantity(min(fits), "%", digits=4) if fits else "-", words="lowest fit, free run"),
         Tile(figure=quantity(_largest(errors), fit.unit, missing="diverged"), words="largest error of any sample"),
         Tile(figure=times(factor), words="faster than real time, at least"),
@@ -86,7 +87,7 @@ def _largest(values: Sequence[float]) -> float:
 
 
 def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord], *, cases_chose: bool) -> str:
-    squared = f"{fit.unit}²"
+    of_squares = squared(fit.unit)
     kind = "that it was neither fitted to nor chosen on" if scored_cases(fit) else "of this run"
     if cases_chose:
         kind = "that it was not fitted to, but that took part in its choice"
@@ -99,17 +100,17 @@ def _accuracy(fit: FitRecord, cases: Dict[str, CaseRecord], *, cases_chose: bool
         (error,) = (case.free_run.mse for case in finite.values())
         rms = quantity(math.sqrt(error), fit.unit)
         return (
-            f"In free run on {low}, the one case {kind}, the mse is {quantity(error, squared)}: a root mean square "
+            f"In free run on {low}, the one case {kind}, the mse is {quantity(error, of_squares)}: a root mean square "
             f"error of {rms}."
         )
     text = (
         f"In free run on the {_count(len(cases), 'case')} {kind}, the mse lies between "
-        f"{quantity(finite[low].free_run.mse, squared)} ({low}) and "
-        f"{quantity(finite[high].free_run.mse, squared)} ({high})"
+        f"{quantity(finite[low].free_run.mse, of_squares)} ({low}) and "
+        f"{quantity(finite[high].free_run.mse, of_squares)} ({high})"
     )
     if len(finite) < len(cases):
         return f"{text}; on {', '.join(sorted(set(cases) - set(finite)))} it diverges."
-    text += f", on average {quantity(mean_mse(fit, 'free_run'), squared)}" if scored_cases(fit) else ""
+    text += f", on average {quantity(mean_mse(fit, 'free_run'), of_squares)}" if scored_cases(fit) else ""
     rms = quantity(math.sqrt(finite[high].free_run.mse), fit.unit)
     return f"{text}. The root mean square error of the worst case is {rms}."
 
@@ -145,7 +146,7 @@ def _weakness(fit: FitRecord, cases: Dict[str, CaseRecord], instants: Sequence[I
     if diverging:
         return f"The free run diverges on {', '.join(diverging)}: do not use this model there."
     worst = max(cases, key=lambda name: cases[name].free_run.mse)
-    text = f"Weakest on {worst} (mse {quantity(cases[worst].free_run.mse, fit.unit + '²')})."
+    text = f"Weakest on {worst} (mse {quantity(cases[worst].free_run.mse, squared(fit.unit))})."
     if instants:
         instant = instants[0]
         text += (
@@ -200,9 +201,9 @@ def _overtaken(results: Results, best: FitRecord) -> list[str]:
     if not rivals:
         return []
     ahead = min(rivals, key=lambda fit: mean_mse(fit, "free_run"))
-    squared = f"{best.unit}²"
-    theirs = quantity(mean_mse(ahead, "free_run"), squared)
-    ours = quantity(mean_mse(best, "free_run"), squared, missing="diverged")
+    of_squares = squared(best.unit)
+    theirs = quantity(mean_mse(ahead, "free_run"), of_squares)
+    ours = quantity(mean_mse(best, "free_run"), of_squares, missing="diverged")
     if results.best is not None and results.best.cases_chose:
         return [f"{ahead.name} has a lower mean free-run mse ({theirs} against {ours}), which is not what chose."]
     return [

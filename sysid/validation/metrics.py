@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.units import squared
+
 
 @dataclass(frozen=True, kw_only=True)
 class Merit:
@@ -43,7 +45,7 @@ class Merit:
         Returns:
             The unit, or other words.
         """
-        return self.below or self.unit.format(unit=unit)
+        return self.below or self.unit.format(unit=unit, squared=squared(unit))
 
 
 def _merit(heading: str, unit: str, **shown: Any) -> Any:
@@ -63,7 +65,7 @@ class Figures:
         unit: The output's unit.
     """
 
-    mse: float = _merit("mse", "{unit}²")
+    mse: float = _merit("mse", "{squared}")
     nrmse_fit: float = _merit("fit", "%", digits=4)
     max_abs_error: float = _merit("largest error", "{unit}")
     # R lies close to 1 for any useful model: three digits would print 1.00 for all of them.

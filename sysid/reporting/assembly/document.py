@@ -31,6 +31,7 @@ from sysid.reporting.parts import Document, Part, Section, Verdict, data_set_sec
 from sysid.reporting.published.tables import PublishedTable, read_published
 from sysid.reporting.signals import MONTE_CARLO_FILE, read_signals
 from sysid.reporting.tables import Table, plain_table
+from sysid.units import squared
 
 ANCHOR = "the-assembly"
 
@@ -113,7 +114,7 @@ def _stages(results: AssemblyResults) -> Table:
 
 def _squared(results: AssemblyResults, output: str) -> str:
     """The unit of an output's squared error."""
-    return f"{results.outputs[output].unit}²"
+    return squared(results.outputs[output].unit)
 
 
 def headline(results: AssemblyResults) -> str:

@@ -9,6 +9,7 @@ from sysid.reporting.assembly.results import CandidateRecord, MemberRecord
 from sysid.reporting.assembly.tables import Value, mse_value
 from sysid.reporting.published.tables import PublishedTable
 from sysid.reporting.tables import Table, plain_table
+from sysid.units import squared
 
 
 def member_tables(member: MemberRecord, published: PublishedTable | None) -> list[Table]:
@@ -42,7 +43,8 @@ def _free_table(member: MemberRecord, rows: Rows) -> Table:
         said.append([candidate_name(one), *map(mse_value, one.free_run_mse.values()), one.selection])
         said += asked.errors("free_run", "closed", [None]) if last else []
     return plain_table(
-        f"{member.mapping} by itself, behind measured inputs: mean squared error of the free run [{member.unit}²]",
+        f"{member.mapping} by itself, behind measured inputs: mean squared error of the free run "
+        f"[{squared(member.unit)}]",
         [("Candidate", ""), *((case, "") for case in member.cases), ("Selection", "geometric mean")],
         said,
         note="The selection traces alone say which is the best, and which the whole has.",
@@ -63,7 +65,7 @@ def _one_step_table(member: MemberRecord, rows: Rows) -> Table | None:
     if not said:
         return None
     return plain_table(
-        f"{member.mapping} by itself, fitted one step ahead: mean squared error [{member.unit}²]",
+        f"{member.mapping} by itself, fitted one step ahead: mean squared error [{squared(member.unit)}]",
         [("Candidate", ""), *((case, "") for case in member.cases)],
         said,
         note="One step ahead the past output is the measured one, in free run the network's own.",

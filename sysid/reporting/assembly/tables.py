@@ -17,6 +17,7 @@ from sysid.reporting.assembly.results import (
 )
 from sysid.reporting.published.tables import PublishedTable
 from sysid.reporting.tables import Table, plain_table
+from sysid.units import squared
 
 Value = int | float | str | None
 """Of a plain table."""
@@ -38,7 +39,7 @@ def stage_table(results: AssemblyResults, output: str, published: PublishedTable
     Returns:
         The table.
     """
-    cases, squared = list(results.cases), f"{results.outputs[output].unit}²"
+    cases, of_squares = list(results.cases), squared(results.outputs[output].unit)
     rows: list[list[Value]] = [
         [
             f"{stage.name} (chosen)" if stage.name == results.whole.stage else stage.name,
@@ -64,7 +65,7 @@ def stage_table(results: AssemblyResults, output: str, published: PublishedTable
             [said, *(by[case].value if case in by else None for case in cases), None] for said, by in wholes.items()
         ]
     return plain_table(
-        f"{output}: mean squared error of the free run of the whole [{squared}]",
+        f"{output}: mean squared error of the free run of the whole [{of_squares}]",
         [("Stage", ""), *((case, "") for case in cases), ("Selection", "geometric mean")],
         rows,
         note="From the inputs of the whole alone. No case had a say in any choice.",

@@ -16,6 +16,7 @@ from sysid.reporting.html import page_template, readable
 from sysid.reporting.numbers import quantity, seconds, times
 from sysid.reporting.parts import Part, Section, Tile, Verdict, identifier, picture
 from sysid.reporting.tables import DIVERGED, Cell, Column, Table
+from sysid.units import squared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +129,7 @@ def _order(contest: Contest) -> float:
 
 
 def _extreme(contest: Contest, found: Comparison) -> str:
-    unit = f"{found.ours.entries[contest.output].unit}²"
+    unit = squared(found.ours.entries[contest.output].unit)
     ours = quantity(contest.ours.error, unit, missing=DIVERGED)
     theirs = quantity(contest.theirs.error, unit, missing=DIVERGED)
     share = "" if math.isnan(contest.ratio) else f", {times(contest.ratio)} of it"
@@ -187,7 +188,7 @@ def _cases(found: Comparison, output: str) -> Section:
         figures.Series(name=name, values={c.case: getattr(c, side).error for c in contests})
         for side, name in (("ours", first), ("theirs", second))
     ]
-    drawing = figures.cases_figure(series, [c.case for c in contests], quantity=f"free-run mse [{one.unit}²]")
+    drawing = figures.cases_figure(series, [c.case for c in contests], quantity=f"free-run mse [{squared(one.unit)}]")
     caption = "Free-run mse by case; logarithmic, lower is better. A run without a mark diverges."
     name = identifier(output) if several else ""
     return Section(

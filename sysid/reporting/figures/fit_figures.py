@@ -18,6 +18,7 @@ from sysid.reporting.numbers import number
 from sysid.reporting.results import CaseRecord, LearningCurve, Results
 from sysid.reporting.signals import CaseSignals
 from sysid.reporting.worst_instants import Instant
+from sysid.units import squared
 
 _COLUMNS = 450
 _FREE_RUN: dict[str, Any] = {"color": PALETTE[0], "linestyle": DASHES[1], "linewidth": 1.5}
@@ -307,7 +308,7 @@ def size_figure(results: Results) -> Figure:
                 axes.plot([effective, fit.n_parameters], [error, error], color=style["color"], linewidth=1.0)
         axes.set_yscale("log")
         axes.set_xlabel("parameters (the line reaches to the effective ones)")
-        axes.set_ylabel(f"free-run mse [{results.fits[0].unit}²]")
+        axes.set_ylabel(f"free-run mse [{squared(results.fits[0].unit)}]")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return figure
 

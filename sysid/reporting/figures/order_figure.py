@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from sysid.estimation.linear.order_search import Criterion, OrderLosses
 from sysid.reporting.figures.style import MARKERS, PALETTE, new_figure, styled
+from sysid.units import squared
 
 CRITERIA = (Criterion.BIC, Criterion.AICC, Criterion.AIC)
 """Whose choices are marked."""
@@ -83,7 +84,7 @@ def order_figure(curve: OrderCurve, *, unit: str, title: str = "One-step loss of
         if min(curve.lowest) > 0.0:
             axes.set_yscale("log")
         axes.set_xlabel("number of parameters")
-        axes.set_ylabel(f"mean squared one-step error [{unit}²]")
+        axes.set_ylabel(f"mean squared one-step error [{squared(unit)}]")
         axes.legend(loc="upper right")
         return figure
 

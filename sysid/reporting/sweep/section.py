@@ -21,6 +21,7 @@ from sysid.reporting.sweep.tables import (
     published_ranks,
 )
 from sysid.reporting.sweep_record import FIGURES, TRACES, SweepRecord, has_sweep, read_sweep
+from sysid.units import squared
 
 
 def sweep_sections(folder: Path, published: PublishedTable | None) -> list[Section]:
@@ -75,7 +76,7 @@ def sweep_points(folder: Path, published: PublishedTable | None) -> list[tuple[s
     winner = None if record is None else record.winning
     if record is None or winner is None:
         return []
-    unit = FIGURES[record.choose_by].unit.format(unit=record.unit)
+    unit = FIGURES[record.choose_by].unit.format(unit=record.unit, squared=squared(record.unit))
     least = record.choice(winner)
     text = (
         f"{winner.label} has the least {FIGURES[record.choose_by].words} on {TRACES[record.choose_on]}, "
@@ -84,11 +85,11 @@ def sweep_points(folder: Path, published: PublishedTable | None) -> list[tuple[s
     )
     best = next(iter(_published(record, published)["error"]), None)
     if best is not None:
-        theirs = quantity(best.mse, f"{record.unit}²")
+        theirs = quantity(best.mse, squared(record.unit))
         ratio = times(least / best.mse)
         text += f" The published sweep's best has {theirs} ({best.structure}, {best.source}): ours is {ratio} that."
     for hand in record.beside:
-        ours, other = (quantity(mean_not_fitted(trial), f"{record.unit}²") for trial in (winner, hand))
+        ours, other = (quantity(mean_not_fitted(trial), squared(record.unit)) for trial in (winner, hand))
         text += f" In free run on the cases not fitted to, {winner.label} has {ours} on average, {hand.label} {other}."
     return [("Sweep", text)]
 

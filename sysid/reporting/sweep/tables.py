@@ -11,6 +11,7 @@ from sysid.reporting.numbers import seconds
 from sysid.reporting.published.tables import PublishedTable
 from sysid.reporting.sweep_record import SweepRecord, Trial
 from sysid.reporting.tables import Cell, Table, figure_cell
+from sysid.units import squared
 
 SHOWN = 5
 """Rows of a table of the best."""
@@ -94,7 +95,11 @@ def best_table(record: SweepRecord, name: str, *, mse: str, published: Sequence[
         ("parameters", ""),
     ]
     if published:
-        head += [(published[0].source, "structure"), ("published mse", f"{record.unit}²"), ("published run time", "s")]
+        head += [
+            (published[0].source, "structure"),
+            ("published mse", squared(record.unit)),
+            ("published run time", "s"),
+        ]
     return Table(
         caption=f"The best by {record.words(name)} of {len(record.tried_in_full)} trials in full.",
         head=tuple(head),
@@ -179,7 +184,7 @@ def beside_table(record: SweepRecord) -> Table | None:
     kind = "chose the winner" if chose else "unseen"
     seen = " These cases did choose the winner here, by another figure." if chose else ""
     return Table(
-        caption=f"Free run of the winner and of what was chosen by hand, mean squared error [{record.unit}²].",
+        caption=f"Free run of the winner and of what was chosen by hand, mean squared error [{squared(record.unit)}].",
         head=(("structure", ""), *((name, kind) for name in unseen), ("mean", kind), ("selection", "")),
         rows=tuple(rows),
         note="One trial each: another seed gives other figures, for either." + seen,

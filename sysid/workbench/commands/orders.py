@@ -18,6 +18,7 @@ from sysid.names import slug
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.numbers import number
+from sysid.units import squared
 from sysid.validation.metrics import percent
 from sysid.validation.structure_search import KINDS, MOST
 from sysid.workbench.runner.console import console
@@ -74,7 +75,7 @@ def _table(found: OrderSearch) -> Table:
     title = f"{len(found.losses):,} ARX structures of {found.mapping}, {found.chosen_by}"
     table = Table(title=title, title_justify="left")
     table.add_column("structure")
-    for head in ("parameters", f"one-step mse [{found.unit}²]", "AICc", "BIC", "free run, fit %"):
+    for head in ("parameters", f"one-step mse [{squared(found.unit)}]", "AICc", "BIC", "free run, fit %"):
         table.add_column(head, justify="right")
     for one in found.contenders[: ROWS if found.others is None else None]:
         aicc, bic = (found.score(one, criterion) for criterion in (Criterion.AICC, Criterion.BIC))

@@ -17,6 +17,7 @@ from sysid.export.reading import read_bundle
 from sysid.export.simulation import Simulation, simulate_bundle
 from sysid.ingest import write_trace
 from sysid.models import Start, StartKind
+from sysid.units import squared
 from sysid.validation.metrics import percent
 from sysid.workbench.commands.reader_options import as_typed, reading_options
 from sysid.workbench.runner.console import console
@@ -205,7 +206,7 @@ def _tell(simulation: Simulation, out: Path) -> None:
         of = (
             f"on the {len(simulation.trace) - simulation.first} samples after" if simulation.first else "on all samples"
         )
-        text = f"fit {percent(found.nrmse_fit)} %, mean squared error {found.mse:.4g} {found.unit}²"
+        text = f"fit {percent(found.nrmse_fit)} %, mean squared error {found.mse:.4g} {squared(found.unit)}"
         console().print(f"against the measured {name}: {text}, {of}", soft_wrap=True, markup=False)
     for sentence in simulation.sentences:
         console().print(sentence, soft_wrap=True)

@@ -16,6 +16,7 @@ from sysid.export.exporters import wanted_formats
 from sysid.reporting.published.tables import read_published
 from sysid.reporting.results import Results, parse_results
 from sysid.reporting.sweep_record import has_sweep, read_sweep
+from sysid.units import squared
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data, load_data, unmade_data
@@ -410,7 +411,7 @@ def _ended(fit: FitResult) -> str:
 def _worst(scores: steps.Scores) -> str:
     """How a fit came out, in a line."""
     worst = max(scores.evaluation.cases.values(), key=lambda case: case.free_run.mse)
-    return f"free run at worst {worst.free_run.mse:.3g} {worst.free_run.unit}² ({worst.case})"
+    return f"free run at worst {worst.free_run.mse:.3g} {squared(worst.free_run.unit)} ({worst.case})"
 
 
 def _looked(found: Sequence[Mapping[str, Any]]) -> str:

@@ -6,6 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from sysid.reporting.results import FitRecord, Results, SystemRecord
+from sysid.units import squared
 
 
 def table_of_fits(results: Results) -> Table:
@@ -18,7 +19,7 @@ def table_of_fits(results: Results) -> Table:
         The table.
     """
     units = {fit.unit for fit in results.fits}
-    unit = f"{units.pop()}²" if len(units) == 1 else "each output's unit, squared"
+    unit = squared(units.pop()) if len(units) == 1 else "each output's unit, squared"
     # Shown in one power of ten, as publications print them, so that columns compare at a glance.
     title = f"Free run, mean squared error in {unit}" + (
         "; of a whole, its outputs' mean fit" if results.systems else ""
