@@ -26,7 +26,7 @@ from sysid.reporting.fit_tables import (
     systems_table,
 )
 from sysid.reporting.judging.document import judgement_sections
-from sysid.reporting.numbers import number
+from sysid.reporting.numbers import quantity
 from sysid.reporting.orders_view import orders_section
 from sysid.reporting.overview import overview_section
 from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
@@ -174,8 +174,8 @@ def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int
         )
         caption = (
             f"{fit.name} on {name} ({case.role.value}): target and free run above, error below. "
-            f"mse {number(case.free_run.mse, missing='diverged')} {squared(fit.unit)}, largest error "
-            f"{number(case.free_run.max_abs_error, missing='diverged')} {fit.unit}."
+            f"mse {quantity(case.free_run.mse, squared(fit.unit), missing='diverged')}, largest error "
+            f"{quantity(case.free_run.max_abs_error, fit.unit, missing='diverged')}."
             f"{'' if signal.low is None else ' Shaded: the 95 % interval of the free run.'}"
         )
         parts.append(picture(figure, f"{fit.name} on {name}", caption, f"case-{identifier(fit.slug)}-{index}"))

@@ -155,7 +155,9 @@ def instants_figure(
             _line(axes, case.time[window], case.target[window], _COLUMNS, color=TARGET, linewidth=1.1, label="target")
             _line(axes, case.time[window], case.simulated[window], _COLUMNS, **_FREE_RUN, label="free run")
             axes.axvline(instant.time, color=PALETTE[1], linewidth=0.9, linestyle=DASHES[2])
-            error = f"{instant.error:+.3g} {unit}" if np.isfinite(instant.error) else "diverged"
+            error = "diverged"
+            if np.isfinite(instant.error):
+                error = f"{instant.error:+.3g} {unit}".removesuffix(" 1")
             axes.set_title(f"{number + 1}. {instant.case}, {instant.time:g} s: {error}", fontsize=8.5)
             axes.set_xlabel("time [s]")
             axes.set_ylabel(f"{label} [{unit}]" if number % columns == 0 else "")

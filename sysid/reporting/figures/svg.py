@@ -20,6 +20,8 @@ _PAIRS: Final = {"M": 1, "L": 1, "Q": 2, "C": 3}
 FAR: Final = 1e6
 """Points; nothing farther off is drawn, and an outline that runs away may come with 300 digits."""
 _SHARED: Final = ("style", "clip-path")
+PIXELS: Final = 1.75
+"""On the screen, for each point of a figure: one as wide as the page fills it."""
 MODEL: Final = "model-"
 """What is called so is a line that a page may hide: its name becomes a class."""
 
@@ -54,7 +56,7 @@ def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
             "role": "img",
             "aria-labelledby": f"{name}-title {name}-desc",
             "viewBox": box,
-            "style": f"stroke-linejoin:round;stroke-linecap:butt;font-family:{_FONT_STACK}",
+            "style": f"stroke-linejoin:round;stroke-linecap:butt;font-family:{_FONT_STACK};max-width:{_widest(box)}px",
         }
     )
     for place, (tag, text) in enumerate((("title", title), ("desc", description))):
@@ -64,6 +66,11 @@ def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
     for element in root.iter():
         element.tail = "\n"
     return ET.tostring(root, encoding="unicode").strip()
+
+
+def _widest(box: str) -> int:
+    """Pixels at most on the screen: a small figure, and its letters, are not blown up to the width of the page."""
+    return round(PIXELS * float(box.split()[2])) if box else 0
 
 
 def _plain_names(root: ET.Element) -> None:
