@@ -9,17 +9,18 @@ import time
 from pathlib import Path
 
 
-def forget_what_is_older(folder: Path) -> None:
+def forget_what_is_older(folder: Path, callers: Path | None = None) -> None:
     """Take away the indices of compiled functions that are older than some file of a folder.
 
     Args:
-        folder: With the sources; what was compiled of them lies in its ``__pycache__`` folders. One that cannot be
-            written keeps what it has.
+        folder: With the sources.
+        callers: Where what calls them was compiled, in ``__pycache__`` folders; by default in the same folder. One that
+            cannot be written keeps what it has.
     """
     # A file from the future, as after a wrong clock, would take everything away at every start.
     written = (file.stat().st_mtime for file in folder.rglob("*.py"))
     newest = max((when for when in written if when <= time.time()), default=0.0)
-    for index in folder.rglob("__pycache__/*.nbi"):
+    for index in (callers or folder).rglob("__pycache__/*.nbi"):
         try:
             if index.stat().st_mtime < newest:
                 index.unlink()
@@ -27,4 +28,4 @@ def forget_what_is_older(folder: Path) -> None:
             continue
 
 
-forget_what_is_older(Path(__file__).parent)
+forget_what_is_older(Path(__file__).parent, Path(__file__).parent.parent)

@@ -8,7 +8,7 @@ from sysid.kernels.recursion import free_run
 
 
 @njit(cache=True, nogil=True)
-def advance(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, bounds):
+def advance(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n_neurons, kinds, bounds):
     """Run every car over the same steps, writing ``y[:, depth:]`` in place.
 
     Args:
@@ -21,10 +21,11 @@ def advance(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n
         output_lag: As in the recursion.
         theta: Parameters of each car, shape ``(cars, n_parameters)``.
         n_neurons: Number of neurons.
+        kinds: Code of their kind in each car's model, shape ``(cars,)``.
         bounds: Lower and upper bound of each car's output, shape ``(cars, 2)``.
     """
     for car in range(len(u)):
         free_run(
             u[car], y[car], depth, n_steps, input_channel, input_lag, output_lag, theta[car], n_neurons,
-            bounds[car, 0], bounds[car, 1],
+            kinds[car], bounds[car, 0], bounds[car, 1],
         )  # fmt: skip

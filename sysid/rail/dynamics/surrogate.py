@@ -12,6 +12,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import BrakedTrain, Probe
 from sysid.airbrake.variant import PHYSICAL, Variant
 from sysid.errors import ConfigError
+from sysid.kernels.neurons import code_of
 from sysid.models import AbstractModel, Ends, Recursion, Wiring
 from sysid.rail.dynamics import kernel_bank
 from sysid.rail.dynamics.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
@@ -89,6 +90,7 @@ class ModelBank:
         self.mapping = models[0].mapping
         recursions = stage.forms * cars if len(stage.forms) == 1 else stage.forms
         self._lags, self._neurons = recursions[0].lags, recursions[0].neurons
+        self._kinds = np.array([code_of(recursion.activation) for recursion in recursions])
         self._theta = np.array([recursion.theta for recursion in recursions])
         self._bounds = np.array([[recursion.low, recursion.high] for recursion in recursions])
         scalings = [recursion.scaling for recursion in recursions]
@@ -118,7 +120,7 @@ class ModelBank:
         lags = self._lags
         kernel_bank.advance(
             u, y, depth, samples, lags.input_channel, lags.input_lag, lags.output_lag,
-            self._theta, self._neurons, self._bounds,
+            self._theta, self._neurons, self._kinds, self._bounds,
         )  # fmt: skip
         self._inputs, self._outputs = u[:, samples:].copy(), y[:, samples:].copy()
         return np.ascontiguousarray((y[:, depth:] * self._output_scale[:, None] + self._output_offset[:, None]).T)
