@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,25 @@ WITH_OWN = frozenset({machine.GREATER, machine.NOT_LESS, machine.SIGN, machine.S
 """Operations that have a switch or a table."""
 COMMUTES = frozenset({machine.ADD, machine.MUL, machine.MIN, machine.MAX})
 
-Key = tuple[object, ...]
+OPERATION = "operation"
+
+
+class Value(NamedTuple):
+    """What a node of the graph is.
+
+    Args:
+        kind: A constant, a kind of leaf, or an operation.
+        number: Of a constant.
+        place: Of a leaf among those of its kind; of an operation, which one.
+        reads: Nodes that an operation reads.
+        own: The operation's own number: a switch or a table.
+    """
+
+    kind: str
+    number: float = 0.0
+    place: int = 0
+    reads: tuple[int, ...] = ()
+    own: int = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,11 +85,11 @@ class Graph:
     values that stand before it.
     """
 
-    nodes: list[Key] = field(default_factory=list)
-    known: dict[Key, int] = field(default_factory=dict)
+    nodes: list[Value] = field(default_factory=list)
+    known: dict[Value, int] = field(default_factory=dict)
 
-    def _node(self, key: Key) -> int:
-        if key not in self.known:
+    def _node(self, value: Value) -> int:
+        if value not in self.known:
             if len(self.nodes) >= MOST_NODES:
                 raise ConfigError(
                     "the equations compute too many values",
@@ -78,30 +97,30 @@ class Graph:
                     expected=f"at most {MOST_NODES:,}",
                     remedy="use fewer or smaller networks, or shorter delays",
                 )
-            self.known[key] = len(self.nodes)
-            self.nodes.append(key)
-        return self.known[key]
+            self.known[value] = len(self.nodes)
+            self.nodes.append(value)
+        return self.known[value]
 
     def constant(self, value: float) -> int:
         """A number."""
-        return self._node((CONSTANT, float(value) + 0.0))
+        return self._node(Value(kind=CONSTANT, number=float(value) + 0.0))
 
     def leaf(self, kind: str, place: int) -> int:
         """A parameter, state or input, by its place among those of its kind."""
-        return self._node((kind, place))
+        return self._node(Value(kind=kind, place=place))
 
     def counts(self) -> dict[str, int]:
         """How many there are of each kind of leaf, from the places that were asked for."""
         found = dict.fromkeys(LEAVES, 0)
-        for kind, *rest in self.nodes:
-            if kind in found:
-                found[str(kind)] = max(found[str(kind)], int(rest[0]) + 1)  # type: ignore[call-overload]  # its place
+        for node in self.nodes:
+            if node.kind in found:
+                found[node.kind] = max(found[node.kind], node.place + 1)
         return found
 
     def value_of(self, node: int) -> float | None:
         """The value of a constant; ``None`` for what is none."""
-        key = self.nodes[node]
-        return float(key[1]) if key[0] == CONSTANT else None  # type: ignore[arg-type]  # a constant's is a number
+        value = self.nodes[node]
+        return value.number if value.kind == CONSTANT else None
 
     def apply(self, operation: int, a: int, b: int | None = None, c: int | None = None, own: int = 0) -> int:
         """An operation over values; of constants the constant that it gives.
@@ -123,15 +142,19 @@ class Graph:
             a, b = b, a
         if operation == machine.ADD and b is not None:
             for product, other in ((b, a), (a, b)):
-                if self.nodes[product][0] == machine.MUL:
-                    _, x, y, *_ = self.nodes[product]
-                    return self._node((machine.FMA, x, y, other, 0))
-        given = [self.value_of(one) for one in (a, b, c) if one is not None]
-        if None not in given and operation not in WITH_OWN:
-            folded = computed(operation, [float(one) for one in given])  # type: ignore[arg-type]  # none is None
+                factors = self.nodes[product]
+                if factors.kind == OPERATION and factors.place == machine.MUL:
+                    return self._operation(machine.FMA, *factors.reads, other)
+        reads = tuple(one for one in (a, b, c) if one is not None)
+        given = [value for one in reads if (value := self.value_of(one)) is not None]
+        if len(given) == len(reads) and operation not in WITH_OWN:
+            folded = computed(operation, given)
             if math.isfinite(folded):
                 return self.constant(folded)
-        return self._node((operation, a, b, c, own))
+        return self._operation(operation, *reads, own=own)
+
+    def _operation(self, operation: int, *reads: int, own: int = 0) -> int:
+        return self._node(Value(kind=OPERATION, place=operation, reads=reads, own=own))
 
     def _simpler(self, operation: int, a: int, b: int | None) -> int | None:
         """What is no operation at all: nothing is added, or multiplied by 1."""
@@ -159,7 +182,7 @@ class Graph:
             The program.
         """
         needed = self._needed(results)
-        constants = [node for node in needed if self.nodes[node][0] == CONSTANT]
+        constants = [node for node in needed if self.nodes[node].kind == CONSTANT]
         place = {node: at for at, node in enumerate(constants)}
         at, firsts = len(constants), {}
         for kind in LEAVES:
@@ -168,12 +191,12 @@ class Graph:
         sizes = (n_theta, counts[CONTINUOUS_STATE] + counts[DISCRETE_STATE], counts[INPUT])
         code: list[list[int]] = []
         for node in needed:
-            key, *rest = self.nodes[node]
-            if key in firsts:
-                place[node] = firsts[str(key)] + int(rest[0])  # type: ignore[call-overload]  # a leaf's place
-            elif key != CONSTANT:
-                reads = [0 if one is None else place[one] for one in rest[:3]]  # type: ignore[index]  # values
-                code.append([int(key), *reads, int(rest[3])])  # type: ignore[call-overload]
+            value = self.nodes[node]
+            if value.kind in firsts:
+                place[node] = firsts[value.kind] + value.place
+            elif value.kind == OPERATION:
+                reads = [*(place[one] for one in value.reads), 0, 0][:3]
+                code.append([value.place, *reads, value.own])
                 place[node], at = at, at + 1
         return Program(
             code=np.array(code, dtype=np.uint64).reshape(-1, 5),
@@ -190,9 +213,7 @@ class Graph:
             node = waiting.pop()
             if node not in found:
                 found.add(node)
-                key = self.nodes[node]
-                if not isinstance(key[0], str):
-                    waiting += [int(one) for one in key[1:4] if one is not None]  # type: ignore[call-overload]
+                waiting += self.nodes[node].reads
         return sorted(found)
 
 

@@ -19,7 +19,7 @@ from sysid.estimation.linear_posteriors import LinearPosterior
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import Training
-from sysid.estimation.record_notes import acts_at_once, undetermined, worse_than_constant
+from sysid.estimation.record_notes import contradicted, undetermined
 from sysid.estimation.result import FitResult
 from sysid.estimation.stability.check import (
     AbstractStabilityCheck,
@@ -198,9 +198,8 @@ class Estimator:
             found = self.with_posterior(found, traces, named["start"], given.get("selection", ()))
             told = () if found.posterior is not None else (f"No interval of the output: {self.no_posterior}.",)
             off = equilibrium_notes(found.model, traces, named["start"])
-            late = acts_at_once(found.model, traces, named["start"])
-            lost = worse_than_constant(found.model, traces, named["start"])
-            warned = (*undetermined(traces, mapping), *lost, *late, *off)
+            against = contradicted(found.model, traces, named["start"])
+            warned = (*undetermined(traces, mapping), *against, *off)
             return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
 
         return checked.fitted(noted, traces, mapping, structure, *chosen, **known)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,82 +77,109 @@ def informative(inputs: NDArray[np.float64]) -> tuple[int, ...]:
     return tuple(kept)
 
 
-def acts_at_once(model: AbstractModel, traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
-    """Whether an input acts within its sample where the model lets it act only later.
-
-    The error of the free run is explained by its own past and past inputs, and then by the inputs of the same sample as
-    well: an F test says whether they explain more than chance would.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeRun:
+    """The free run over a record that was fitted, from where it is scored on.
 
     Args:
-        model: The fitted model.
-        traces: The records that it was fitted to; the longest is looked at.
-        start: What stands before it.
-
-    Returns:
-        One sentence for each such input, none where the model has the path, or the error is small.
+        inputs: Shape ``(n_samples, n_inputs)``.
+        output: As measured, shape ``(n_samples, n_outputs)``.
+        simulated: Likewise.
+        usable: Which samples are not masked, shape ``(n_samples,)``.
+        history: What the run began with.
     """
-    if not traces or not model.mapping.inputs:
-        return ()
-    trace = max(traces, key=len)
-    inputs, output, usable = trace.columns(model.mapping.inputs), model.measured(trace), trace.usable_samples
-    begun = beginning(model, inputs, output, start, usable)
-    window = slice(begun.first, begun.first + MOST_SAMPLES)
-    inputs, output, usable = inputs[window], output[window].reshape(len(output[window]), -1), usable[window]
-    if usable.sum() < LEAST_SAMPLES + LAGS * (1 + inputs.shape[1]):
-        return ()
-    error = output - model.simulate(inputs, begun.history).reshape(output.shape)
-    if not np.isfinite(error).all():
-        return ()
-    told = []
-    for j in informative(inputs[usable]):
-        name = model.mapping.inputs[j]
-        for i, target in enumerate(model.mapping.outputs):
-            wanted = np.std(error[usable, i]) > LEAST_ERROR * np.std(output[usable, i])
-            if not wanted or _has_path(model, inputs, begun.history, j, i):
-                continue
-            share = _share(error[:, i], inputs, j, usable)
-            if share > 0.0:
-                told.append(
-                    f"{100 * share:.0f} % of what is left of {target} moves with {name} of the same sample: either "
-                    f"{name} acts at once, which this model leaves out (give it the lag 0: nk: 0, delays: 0, "
-                    f"input_delays from 0, feedthrough: true), or {name} is fed back from {target}."
-                )
-    return tuple(told)
 
+    inputs: NDArray[np.float64]
+    output: NDArray[np.float64]
+    simulated: NDArray[np.float64]
+    usable: NDArray[np.bool_]
+    history: History
 
-def worse_than_constant(model: AbstractModel, traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
-    """Whether a constant would have done better than the free run, over the very records that were fitted.
+    @classmethod
+    def of(cls, model: AbstractModel, trace: Trace, start: Start) -> FreeRun:
+        """The run over a record, or over its beginning where that is long.
 
-    Args:
-        model: The fitted model.
-        traces: The records that it was fitted to; the first so many are looked at.
-        start: What stands before each.
+        Args:
+            model: The fitted model.
+            trace: The record.
+            start: What stands before it.
 
-    Returns:
-        One sentence for each such output; none where it does not move.
-    """
-    measured, simulated = [], []
-    for trace in traces[:MOST_TRACES]:
+        Returns:
+            The run.
+        """
         inputs, output, usable = trace.columns(model.mapping.inputs), model.measured(trace), trace.usable_samples
         begun = beginning(model, inputs, output, start, usable)
         window = slice(begun.first, begun.first + MOST_SAMPLES)
-        free = model.simulate(inputs[window], begun.history)
-        measured.append(output[window][usable[window]].reshape(-1, len(model.mapping.outputs)))
-        simulated.append(free[usable[window]].reshape(-1, len(model.mapping.outputs)))
-    y, free = np.concatenate(measured), np.concatenate(simulated)
+        shape = (-1, len(model.mapping.outputs))
+        return cls(
+            inputs=inputs[window],
+            output=output[window].reshape(shape),
+            simulated=model.simulate(inputs[window], begun.history).reshape(shape),
+            usable=usable[window],
+            history=begun.history,
+        )
+
+
+def contradicted(model: AbstractModel, traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
+    """What the free run says against a model, over the very records that it was fitted to.
+
+    Args:
+        model: The fitted model.
+        traces: The records; the first so many are looked at.
+        start: What stands before each.
+
+    Returns:
+        One sentence for each output whose free run a constant beats, and for each input that acts at once where the
+        model lets it act only later.
+    """
+    runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
+    longest = max(runs, key=lambda run: len(run.output))
+    return (*_worse_than_constant(model, runs), *_acts_at_once(model, longest))
+
+
+def _worse_than_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[str]:
+    y = np.concatenate([run.output[run.usable] for run in runs])
+    simulated = np.concatenate([run.simulated[run.usable] for run in runs])
     told = []
     for i, name in enumerate(model.mapping.outputs):
         if len(y) < LEAST_SAMPLES or _still(y[:, i]):
             continue
         with np.errstate(over="ignore", invalid="ignore"):
-            ratio = float(np.mean((free[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
+            ratio = float(np.mean((simulated[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
         if not ratio <= WORSE:
             fit = f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %" if np.isfinite(ratio) else "it diverges"
             told.append(
                 f"Over the records that were fitted the free run of {name} is worse than a constant ({fit}). Try other "
                 f"orders, a fit of the free run (loop: closed, noise: false, OE) or more iterations."
             )
-    return tuple(told)
+    return told
+
+
+def _acts_at_once(model: AbstractModel, run: FreeRun) -> list[str]:
+    """Inputs that act within their sample where the model lets them act only later.
+
+    The error of the free run is explained by its own past and past inputs, and then by the inputs of the same sample as
+    well: an F test says whether they explain more than chance would.
+    """
+    error, usable = run.output - run.simulated, run.usable
+    few = usable.sum() < LEAST_SAMPLES + LAGS * (1 + run.inputs.shape[1])
+    if few or not np.isfinite(error).all():
+        return []
+    told = []
+    for j in informative(run.inputs[usable]):
+        name = model.mapping.inputs[j]
+        for i, target in enumerate(model.mapping.outputs):
+            small = np.std(error[usable, i]) <= LEAST_ERROR * np.std(run.output[usable, i])
+            if small or _has_path(model, run, j, i):
+                continue
+            share = _share(error[:, i], run.inputs, j, usable)
+            if share > 0.0:
+                told.append(
+                    f"{100 * share:.0f} % of what is new in the error of {target} moves with {name} of the same sample."
+                    f" Either {name} acts at once, which this model leaves out (give it the lag 0: nk: 0, delays: 0, "
+                    f"input_delays from 0, feedthrough: true), or it is fed back from {target}."
+                )
+    return told
 
 
 def _still(column: NDArray[np.float64]) -> bool:
@@ -170,12 +198,12 @@ def _unit(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(columns / lengths, dtype=np.float64)
 
 
-def _has_path(model: AbstractModel, inputs: NDArray[np.float64], history: History, j: int, i: int) -> bool:
+def _has_path(model: AbstractModel, run: FreeRun, j: int, i: int) -> bool:
     """Whether an output of the model moves with an input of the same sample."""
-    few = inputs[: LAGS + 1]
+    few = run.inputs[: LAGS + 1]
     moved = few.copy()
-    moved[-1, j] += np.std(inputs[:, j]) or 1.0
-    before, after = (model.simulate(u, history).reshape(len(u), -1)[-1, i] for u in (few, moved))
+    moved[-1, j] += np.std(run.inputs[:, j]) or 1.0
+    before, after = (model.simulate(u, run.history).reshape(len(u), -1)[-1, i] for u in (few, moved))
     return bool(before != after)
 
 

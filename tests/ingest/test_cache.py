@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -110,10 +109,6 @@ def test_a_damaged_entry_is_not_trusted(tmp_path: Path, damage: Callable[[Path, 
 
 
 def test_a_folder_that_cannot_be_written_to_loses_nothing(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level("WARNING", logger="sysid.ingest.cache")
-    logging.getLogger(
-        "sysid.ingest.cache"
-    ).disabled = False  # migrations of a database in this process may have done so
     (tmp_path / "file").write_text("in the way")
     TraceCache(folder=tmp_path / "file").store("k", TRACE)
     assert "was not cached" in caplog.text

@@ -6,12 +6,13 @@ import time
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError
+from sysid.errors import TraceError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.grey_box.findings import Findings, with_evidence
 from sysid.estimation.grey_box.layout import EquationLayout
@@ -37,8 +38,8 @@ from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
-from sysid.estimation.networks.training import FitProgress, Training
-from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
+from sysid.estimation.result import FitResult, Status
 from sysid.models import Mapping, Start
 from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
 from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
@@ -48,9 +49,6 @@ Array = NDArray[np.float64]
 
 STARTS = 4
 """Starts of a fit that asks for none: the declared parameters, and three around them. Halved at each checkpoint."""
-
-LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_subsets")
-"""Options of a training that concern lagged regressors."""
 
 FLAT = 1e-8
 """Share of the loss that one more Newton step would take away, below which a fit stands at a minimum."""
@@ -73,6 +71,10 @@ SHARE_OF_ERROR, FINEST = 0.03, 1e-8
 
 STEP_ROUNDS = 2
 """Times that a fit goes on with shorter steps because its parameters turned out to need them."""
+
+
+check_training = partial(check_hidden_states, "a grey box")
+"""Refuses options that do not apply to hidden states."""
 
 
 def fit_grey_box(
@@ -254,33 +256,6 @@ def _chosen_by(training: Training, ready: _Ready) -> str:
     if training.choose_by == "selection" and not ready.template.lowered.nets:
         return "loss"
     return training.choose_by
-
-
-def check_training(training: Training) -> None:
-    """Refuse what does not apply to equations.
-
-    Args:
-        training: How to train.
-
-    Raises:
-        ConfigError: If it is for one step ahead, or has options that are for lagged regressors alone.
-    """
-    if training.loop is not Loop.CLOSED:
-        raise ConfigError(
-            "a grey box has no open loop",
-            where="loop",
-            expected="closed",
-            got=training.loop.value,
-            remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
-        )
-    strangers = [name for name in LAGGED_ONLY if getattr(training, name) != getattr(Training(), name)]
-    if strangers:
-        raise ConfigError(
-            f"a grey box is not trained with {', '.join(strangers)}",
-            where="training",
-            expected="options that do not concern lagged regressors",
-            remedy=f"leave out {', '.join(strangers)}",
-        )
 
 
 def _common(first: Trace, mapping: Mapping, grey: GreyBox) -> dict[str, Any]:

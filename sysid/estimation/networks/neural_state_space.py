@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
-from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
@@ -21,8 +21,8 @@ from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
 from sysid.estimation.networks.output_weights import reweighted, weighed
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
-from sysid.estimation.networks.training import FitProgress, Training
-from sysid.estimation.result import FitResult, Loop
+from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
+from sysid.estimation.result import FitResult
 from sysid.models import (
     Mapping,
     NeuralStateSpace,
@@ -39,8 +39,9 @@ STARTS = 6
 """Starts of a fit that asks for none: the linear model's, and five that differ (:class:`NeuralLayout`). Halved at each
 checkpoint, all of them take some 1.6 times the iterations of one."""
 
-LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_subsets")
-"""Options of a training that concern lagged regressors."""
+
+check_training = partial(check_hidden_states, "a neural state space")
+"""Refuses options that do not apply to hidden states."""
 
 
 def fit_neural_state_space(
@@ -223,33 +224,6 @@ def _posterior(chosen: starts.Candidate, provider: NeuralProvider, records: Reco
     runs, others = records.runs(model)
     found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
     return None if found is None else calibrate(found, model, others)
-
-
-def check_training(training: Training) -> None:
-    """Refuse what does not apply to hidden states.
-
-    Args:
-        training: How to train.
-
-    Raises:
-        ConfigError: If it is for one step ahead, or has options that are for lagged regressors alone.
-    """
-    if training.loop is not Loop.CLOSED:
-        raise ConfigError(
-            "a neural state space has no open loop",
-            where="loop",
-            expected="closed",
-            got=training.loop.value,
-            remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
-        )
-    strangers = [name for name in LAGGED_ONLY if getattr(training, name) != getattr(Training(), name)]
-    if strangers:
-        raise ConfigError(
-            f"a neural state space is not trained with {', '.join(strangers)}",
-            where="training",
-            expected="options that do not concern lagged regressors",
-            remedy=f"leave out {', '.join(strangers)}",
-        )
 
 
 _Scaling = TypeVar("_Scaling", Scaling, VectorScaling)

@@ -174,3 +174,35 @@ class FitProgress:
     mse: float
     elapsed_s: float
     fraction: float
+
+
+LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_subsets")
+"""Options of a training that concern lagged regressors."""
+
+
+def check_hidden_states(name: str, training: Training) -> None:
+    """Refuse what does not apply to hidden states.
+
+    Args:
+        name: What is trained, with an article.
+        training: How to train.
+
+    Raises:
+        ConfigError: If it is for one step ahead, or has options that are for lagged regressors alone.
+    """
+    if training.loop is not Loop.CLOSED:
+        raise ConfigError(
+            f"{name} has no open loop",
+            where="loop",
+            expected="closed",
+            got=training.loop.value,
+            remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
+        )
+    strangers = [option for option in LAGGED_ONLY if getattr(training, option) != getattr(Training(), option)]
+    if strangers:
+        raise ConfigError(
+            f"{name} is not trained with {', '.join(strangers)}",
+            where="training",
+            expected="options that do not concern lagged regressors",
+            remedy=f"leave out {', '.join(strangers)}",
+        )

@@ -9,7 +9,6 @@ written into a study that others can read.
 
 from __future__ import annotations
 
-import logging
 import math
 import warnings
 from abc import ABC, abstractmethod
@@ -206,11 +205,7 @@ def publish(record: SweepRecord, url: str) -> int:
 @contextmanager
 def _database(url: str) -> Iterator[optuna.storages.RDBStorage]:
     """A database of studies, whose connections are closed when we are done with it."""
-    ours = [one for one in logging.root.manager.loggerDict.values() if isinstance(one, logging.Logger)]
-    heard = [one for one in ours if not one.disabled]
     storage = optuna.storages.RDBStorage(url)
-    for one in heard:  # its migrations set up logging anew, and put all others to silence
-        one.disabled = False
     try:
         yield storage
     finally:

@@ -100,7 +100,7 @@ def fit_polynomial(
     scaling = scaling_of(experiments, constant=orders.intercept or orders.drifts)
     segments = segments_of(experiments, scaling)
     with threadpool_limits(1, "blas"):  # threads that wake for such small matrices cost more than they give
-        errors, solution = _search(segments, orders, training)
+        errors, solution = _search(segments, orders, training, began + training.max_time_s)
         at = errors.linearise(solution.theta)
         system = errors.chart.system(solution.theta)
         variance = float(errors.covariance(system)[0, 0])
@@ -131,9 +131,9 @@ def fit_polynomial(
 
 
 def _search(
-    segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining
+    segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining, until: float
 ) -> tuple[PredictionErrors, Solution]:
-    """Short runs from every start, and a long one from the best."""
+    """Short runs from every start, and a long one from the best; what it contains first, all by the same clock."""
     pieces = [piece for segment in segments for piece in segment.pieces()]
     stable = not orders.noise if training.stable is None else training.stable
     errors = PredictionErrors(
@@ -142,17 +142,17 @@ def _search(
         whitening=np.eye(1),
         stable=stable and not orders.drifts,
     )
-    starts = [*_starts(pieces, orders), *_of_fewer(segments, orders, training)]
+    starts = [*_starts(pieces, orders), *_of_fewer(segments, orders, training, until)]
     starts = [theta for theta in starts if np.isfinite(theta).all()]
     if not errors.stable or training.stable is not None:
-        return errors, _minimum(errors, starts, training)
+        return errors, _minimum(errors, starts, training, until)
     lengths = [len(segment) for segment in errors.segments]
     bounded = replace(errors, largest=slow_poles.largest_pole(lengths))
-    inside = _minimum(bounded, starts, training)
+    inside = _minimum(bounded, starts, training, until)
     system = errors.chart.system(inside.theta)
     if not slow_poles.unseen(system.radius, lengths):
         return bounded, inside
-    beyond = _minimum(errors, [inside.theta, *starts], training)
+    beyond = _minimum(errors, [inside.theta, *starts], training, until)
     better = slow_poles.significantly_better(
         errors.errors(errors.chart.system(beyond.theta)),
         errors.errors(system),
@@ -162,8 +162,9 @@ def _search(
     return (errors, beyond) if better else (bounded, inside)
 
 
-def _minimum(errors: PredictionErrors, starts: Sequence[Array], training: PolynomialTraining) -> Solution:
+def _minimum(errors: PredictionErrors, starts: Sequence[Array], training: PolynomialTraining, until: float) -> Solution:
     """Short runs from the best starts, and a long one from the best of their ends."""
+    training = replace(training, max_time_s=max(until - time.perf_counter(), 0.0))
     short = replace(training, max_iterations=min(SHORT, training.max_iterations))
     ranked = sorted((loss, at) for at, theta in enumerate(starts) if np.isfinite(loss := errors.loss(theta)))
     found: list[tuple[float, int, Solution]] = []
@@ -210,7 +211,9 @@ def _starts(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Array
     return [*found, np.zeros(orders.n_parameters)]  # the last is finite whatever the record
 
 
-def _of_fewer(segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining) -> list[Array]:
+def _of_fewer(
+    segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining, until: float
+) -> list[Array]:
     """The best model with a pole and a zero less at each input, and one that cancel: the start is as good as that."""
     nf = orders.denominators
     inputs = orders.nb and not orders.order("na")
@@ -221,7 +224,7 @@ def _of_fewer(segments: Sequence[Segment], orders: AbstractPolynomial, training:
         cast("Any", orders), nb=tuple(n - 1 for n in orders.nb), nf=tuple(n - 1 for n in nf)
     )
     try:
-        lower = _search(segments, fewer, training)[1].theta
+        lower = _search(segments, fewer, training, until)[1].theta
     except FitDivergedError:
         return []
     places = np.cumsum([*fewer.nb, *fewer.denominators])
