@@ -231,7 +231,7 @@ def orders(
     ] = "",
     most: Annotated[int, typer.Option(min=1, max=20, help="Largest order of those.")] = 4,
 ) -> None:
-    """Which orders do the data ask for? Every ARX model by its one-step loss, the best of each size in free run."""
+    """Which orders do the data ask for? ARX models by their one-step loss, others on request, the best in free run."""
     from sysid.workbench.commands.orders import orders_command
 
     ranges = {"max_na": max_na, "max_nb": max_nb, "max_nk": max_nk}

@@ -1,0 +1,206 @@
+"""How the fit of a grey box ends: outputs weighed, switches sharpened, and steps as short as its parameters need."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.grey_box.findings import with_evidence
+from sysid.estimation.grey_box.preparing import ACCURACY, ROUNDS, SHARPER, Stepping, seen_terms, substeps_for
+from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.least_squares.damping import DAMPINGS
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.networks import multistart as starts
+from sysid.estimation.networks.training import Training
+from sysid.estimation.result import Status
+from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
+
+Array = NDArray[np.float64]
+
+FLAT = 1e-8
+"""Share of the loss that one more Newton step would take away, below which a fit stands at a minimum."""
+
+NOTHING_LEFT = 1e-24
+"""Mean squared error over the output's scale that is rounding."""
+
+SAME = 1e-4
+"""By how much the loss of exact switches may differ from that of soft ones and be the same."""
+
+NOISE_ROUNDS, WIDEST, ALIKE = 3, 1e4, 0.05
+"""Times that outputs are weighed anew; by how much their errors may differ; and below which difference they are alike,
+as a natural logarithm."""
+
+SHARE_OF_ERROR, FINEST = 0.03, 1e-8
+"""What a step may add to the errors that remain, as a share of them; and the least that is asked of it."""
+
+STEP_ROUNDS = 2
+"""Times that a fit goes on with shorter steps because its parameters turned out to need them."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ready:
+    """A fit that can begin: the model but for its parameters, the records, and where the parameters start."""
+
+    template: GreyBoxModel | VectorGreyBoxModel
+    provider: EquationProvider
+    theta: Array
+    stepping: Stepping
+
+    @property
+    def to_plain(self) -> Array:
+        """From what is trained to the model's parameters."""
+        return np.eye(len(self.provider.scale), self.provider.n_parameters) * self.provider.scale[:, None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Done:
+    """A fit that has ended: the candidate, over the records as they were run last, and what was seen on the way."""
+
+    candidate: starts.Candidate
+    provider: EquationProvider
+    stepping: Stepping
+    softened: float
+
+    @property
+    def model(self) -> EquationModel:
+        """The model."""
+        found = self.candidate.model
+        assert isinstance(found, EquationModel)  # noqa: S101 - the template's class
+        return found
+
+
+def settled(candidate: starts.Candidate, provider: EquationProvider) -> starts.Candidate:
+    """A candidate with its evidence, and the status of one whose gradient is zero to rounding.
+
+    Args:
+        candidate: A start at its last checkpoint.
+        provider: The records.
+
+    Returns:
+        The candidate.
+    """
+    solution = with_evidence(candidate.solution, provider)
+    if solution.status in {Status.STALLED, Status.NOT_IMPROVED} and _at_minimum(solution, provider):
+        solution = replace(solution, status=Status.CONVERGED)
+    return replace(candidate, solution=solution)
+
+
+def _at_minimum(solution: Solution, provider: EquationProvider) -> bool:
+    at, prior = solution.at, solution.state.prior
+    if 2.0 * at.loss <= NOTHING_LEFT * provider.n_samples:
+        return True
+    if not at.finite:
+        return False
+    ridge = prior.precision / prior.beta
+    g = at.gradient + ridge * (solution.theta - prior.centre)
+    low, high = provider.bounds
+    free = ~(((solution.theta <= low) & (g > 0.0)) | ((solution.theta >= high) & (g < 0.0)))
+    H = at.gauss_newton + np.diag(ridge)
+    root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
+    scaled = g[free] / root
+    step = np.linalg.lstsq(H[np.ix_(free, free)] / np.outer(root, root), scaled, rcond=1e-12)[0]
+    return bool(scaled @ step <= FLAT * at.loss)
+
+
+def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stopped: bool) -> Done:
+    """The chosen candidate with switches as they are, and with steps that its parameters need.
+
+    Args:
+        ready: What the fit began with.
+        chosen: The candidate.
+        training: How it was trained.
+        stopped: Whether somebody asked it to stop: then nothing is trained any more.
+
+    Returns:
+        The fit.
+    """
+    provider, solution, stepping = ready.provider, chosen.solution, ready.stepping
+    softened = float("nan")
+    if provider.form.n_outputs > 1 and not stopped:
+        provider, solution = _weighed(provider, solution, training)
+    if provider.form.lowered.switches and not stopped:
+        provider, solution, softened = _sharpened(provider, solution, training)
+    exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
+    if ready.template.grey.substeps is None and not stopped:
+        for _ in range(STEP_ROUNDS):
+            stepping = substeps_for(exact, solution.theta, _accuracy(solution, exact))
+            if stepping.substeps <= provider.form.substeps or np.isnan(stepping.change):
+                stepping = replace(stepping, substeps=provider.form.substeps)
+                break
+            provider, exact = (
+                one.with_form(replace(one.form, substeps=stepping.substeps)) for one in (provider, exact)
+            )
+            solution = _gone_on(provider, solution, training)
+    seen, _ = seen_terms(exact, solution.theta)
+    model = replace(
+        ready.template,
+        theta=ready.to_plain @ solution.theta,
+        levels=tuple(map(float, seen.terms.level)),
+        spans=tuple(map(float, seen.terms.scale)),
+        substeps=provider.form.substeps,
+    )
+    candidate = settled(replace(chosen, solution=solution, model=model), provider)
+    return Done(candidate=candidate, provider=provider, stepping=stepping, softened=softened)
+
+
+def _weighed(provider: EquationProvider, solution: Solution, training: Training) -> tuple[EquationProvider, Solution]:
+    """Outputs over what is left of each: a noisy one does not blur what a clean one shows of the states they share."""
+    for _ in range(NOISE_ROUNDS):
+        left = provider.left(solution.theta)
+        left = np.maximum(left, max(float(left.max()) / WIDEST, np.finfo(np.float64).eps))
+        noise = left / np.exp(np.mean(np.log(left)))
+        before = np.ones(len(noise)) if provider.noise is None else provider.noise
+        if np.abs(np.log(noise / before)).max() < ALIKE:
+            break
+        provider = replace(provider, noise=noise)
+        solution = _gone_on(provider, solution, training)
+    return provider, solution
+
+
+def _accuracy(solution: Solution, provider: EquationProvider) -> float:
+    """How exact a step has to be so that what the records leave is not the step's doing."""
+    left = (2.0 * solution.at.loss / max(provider.n_samples, 1)) ** 0.5
+    return float(np.clip(SHARE_OF_ERROR * left, FINEST, ACCURACY))
+
+
+def _sharpened(
+    provider: EquationProvider, solution: Solution, training: Training
+) -> tuple[EquationProvider, Solution, float]:
+    """Switches sharper and sharper, as long as the run with exact ones gains by it.
+
+    Returns:
+        The records with the switches of the best, the best, and its exact loss over the soft one.
+    """
+    exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
+    best, tried = (exact.loss(solution.theta), provider, solution), list[float]()
+    now, at = provider, solution
+    while len(tried) < ROUNDS and not abs(best[0] - best[2].at.loss) <= SAME * best[2].at.loss:
+        tried.append(best[0])
+        now = now.with_form(replace(now.form, widths=SHARPER * now.form.widths))
+        at = _gone_on(now, at, training)
+        loss = exact.loss(at.theta)
+        if loss < best[0]:
+            best = (loss, now, at)
+    soft = best[2].at.loss
+    return best[1], best[2], best[0] / soft if soft > 1e-200 else 1.0
+
+
+def _gone_on(provider: EquationProvider, solution: Solution, training: Training) -> Solution:
+    """The same fit under records that are run otherwise."""
+    seconds = max(training.max_time_s - solution.curve[-1].elapsed_s, 0.0)
+    iterations = max(20, training.max_iterations // 5)
+    engine = LevenbergMarquardt(
+        termination=Termination(
+            max_iterations=iterations, max_time_s=seconds, tolerance=training.tolerance, patience=10
+        ),
+        damping=DAMPINGS[training.damping](),
+        evidence_after=5 if training.regularisation is None else None,
+    )
+    found = engine.minimise(provider, solution.theta, solution.state.prior)
+    done, spent = solution.state.iteration, solution.curve[-1].elapsed_s
+    further = [replace(one, iteration=done + one.iteration, elapsed_s=spent + one.elapsed_s) for one in found.curve[1:]]
+    state = replace(found.state, curve=(*solution.curve, *further), iteration=done + found.state.iteration)
+    return replace(found, state=state)
