@@ -155,14 +155,14 @@ def metrics(ready: FitReady) -> dict[str, float]:
         if case.intervals is not None:
             found[f"free_run_coverage/{case_name}"] = case.intervals.free_run.share
             found[f"one_step_coverage/{case_name}"] = case.intervals.one_step.share
-    return {name: _shown(value) for name, value in found.items() if math.isfinite(value)}
+    return {name: four_digits(value) for name, value in found.items() if math.isfinite(value)}
 
 
-def _shown(value: float) -> float:
+def four_digits(value: float) -> float:
     """Four digits, whole numbers whole: MLflow's tables print all that there are; results.json keeps them.
 
     Example:
-        >>> _shown(0.05525342215), _shown(123456.0)
+        >>> four_digits(0.05525342215), four_digits(123456.0)
         (0.05525, 123456.0)
     """
     return float(value) if float(value).is_integer() else float(f"{value:.4g}")

@@ -27,6 +27,7 @@ from sysid.workbench.tracking.fit_run import Entities
 from sysid.workbench.tracking.landing import VARIABLE, App, leading_to
 from sysid.workbench.tracking.registry import parsed, register
 from sysid.workbench.tracking.sqlite_store import SQLITE, held
+from sysid.workbench.tracking.sweep_run import TRIALS_TAG
 
 QUIET = {
     "MLFLOW_DISABLE_TELEMETRY": "true",
@@ -157,7 +158,7 @@ def experiment_of(client: Any, name: str, artifacts: Path | None) -> str:
 
 
 def latest_experiment(uri: str) -> str | None:
-    """The experiment with the newest run, the one to open first.
+    """The experiment with the newest fit, the one to open first; that of a search's trials where there are no fits.
 
     Args:
         uri: The tracking URI.
@@ -167,9 +168,14 @@ def latest_experiment(uri: str) -> str | None:
     """
     with no_deprecations():
         client = connect(uri)
-        experiments = [experiment.experiment_id for experiment in client.search_experiments()]
-        newest = client.search_runs(experiments, order_by=["attributes.start_time DESC"], max_results=1)
-        if not newest:
+        every = client.search_experiments()
+        fits = [one for one in every if TRIALS_TAG not in one.tags]
+        for some in (fits, every):
+            experiments = [experiment.experiment_id for experiment in some]
+            newest = client.search_runs(experiments, order_by=["attributes.start_time DESC"], max_results=1)
+            if newest:
+                break
+        else:
             return None
         # The page that is opened names the view, which an experiment made by other means has not got yet.
         views.show(client, newest[0].info.experiment_id, [])

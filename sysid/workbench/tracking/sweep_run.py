@@ -22,9 +22,13 @@ from sysid.reporting.sweep_record import SWEEP_FILE, SweepRecord, Trial
 from sysid.workbench.runner.events import SweepReady
 from sysid.workbench.runner.store import digest
 from sysid.workbench.tracking.fit_run import Entities
+from sysid.workbench.tracking.fit_values import four_digits
 
 SUMMARY = "summary"
 """Value of the tag ``kind`` of the run that has the figures."""
+
+TRIALS_TAG = "sysid.trials"
+"""Tag of an experiment that holds trials, so that nobody is led there who comes for fits."""
 
 PAGE = 1000
 """Runs that are asked for at a time."""
@@ -56,6 +60,7 @@ def log_sweep(client: Any, ready: SweepReady, *, key_tag: str, experiment: str, 
         Trials that were logged now.
     """
     record = ready.record
+    client.set_experiment_tag(experiment, TRIALS_TAG, record.name)
     known = _known(client, experiment, key_tag)
     missing = [trial for trial in record.trials if _trial_key(trial) not in known]
     for trial in missing:
@@ -102,7 +107,7 @@ def _log_trial(
     now, keys = int(time.time() * 1000), distinct(trial.values, tracking_key)
     client.log_batch(
         run.info.run_id,
-        metrics=[entities.metric(name, value, now, 0) for name, value in metrics(trial).items()],
+        metrics=[entities.metric(name, four_digits(value), now, 0) for name, value in metrics(trial).items()],
         params=[entities.param(keys[name], tracking_text(value)) for name, value in trial.values.items()],
     )
     # Whole, however the fit ended: that is what its tag says.
@@ -159,7 +164,10 @@ def _log_summary(client: Any, experiment: str, ready: SweepReady, tags: dict[str
         chosen |= {"winner": winner.label if winner else "", "warm_start": record.warm_start}
         client.log_batch(
             run_id,
-            metrics=[entities.metric(name.replace("winner/", "winner_", 1), v, now, 0) for name, v in figures.items()],
+            metrics=[
+                entities.metric(name.replace("winner/", "winner_", 1), four_digits(v), now, 0)
+                for name, v in figures.items()
+            ],
             params=[entities.param(name, str(value)) for name, value in chosen.items()],
         )
         for name, picture in _pictures(record):

@@ -11,6 +11,7 @@ import pytest
 
 from sysid.workbench.tracking import mlflow_store as tracking
 from sysid.workbench.tracking import mlflow_views as views
+from sysid.workbench.tracking.sweep_run import TRIALS_TAG
 
 
 def test_processes_may_touch_a_new_store_at_once(tmp_path: Path) -> None:
@@ -47,3 +48,18 @@ def test_an_experiment_made_by_other_means_gets_the_view_when_it_is_opened(tmp_p
     client.create_run(experiment)
     assert tracking.latest_experiment(f"sqlite:///{tmp_path / 'mlflow.db'}") == experiment
     assert views.TAG in client.get_experiment(experiment).tags
+
+
+def test_fits_are_opened_first_though_trials_are_newer(tmp_path: Path, empty_store: Path) -> None:
+    shutil.copyfile(empty_store, tmp_path / "mlflow.db")
+    uri = f"sqlite:///{tmp_path / 'mlflow.db'}"
+    client = tracking.connect(uri)
+    trials, fits = (
+        client.create_experiment(name, artifact_location=(tmp_path / name).as_uri()) for name in ("trials", "fits")
+    )
+    client.set_experiment_tag(trials, TRIALS_TAG, "a search")
+    client.create_run(trials, start_time=1)
+    assert tracking.latest_experiment(uri) == trials  # there are no fits yet
+    client.create_run(fits, start_time=2)
+    client.create_run(trials, start_time=3)
+    assert tracking.latest_experiment(uri) == fits
