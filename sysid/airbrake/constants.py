@@ -6,7 +6,7 @@ import math
 
 from sysid.airbrake import kernel
 from sysid.airbrake.consist import TEMPERATURE, Consist
-from sysid.airbrake.flow import GAS_CONSTANT
+from sysid.airbrake.flow import GAS_CONSTANT, HEAT_RATIO
 from sysid.airbrake.variant import QuickService, Variant
 from sysid.units import STANDARD_ATMOSPHERE_PA
 
@@ -26,6 +26,7 @@ def kernel_constants(consist: Consist, variant: Variant, dt: float) -> kernel.Co
     """
     valve, cylinder, atmosphere = consist.valve, consist.cylinder, STANDARD_ATMOSPHERE_PA
     gas_step = GAS_CONSTANT * TEMPERATURE * dt
+    pipe_section = consist.pipe.volume / consist.pipe.length
     rate = math.inf if variant.equalising_rate is None else variant.equalising_rate
     return kernel.Constants(
         atmosphere=atmosphere,
@@ -72,6 +73,9 @@ def kernel_constants(consist: Consist, variant: Variant, dt: float) -> kernel.Co
         relay=variant.relay_band is not None,
         relay_band=variant.relay_band or 1.0,
         equalising_step=rate * dt,
+        exhaust_as_printed=variant.exhaust_as_printed,
+        pipe_momentum=variant.pipe_momentum,
+        momentum_step=HEAT_RATIO * dt * pipe_section / consist.pipe.length,
         speed_gates=variant.speed_gates,
         accelerated_service=variant.accelerated_service,
         accelerated_emergency=variant.accelerated_emergency,

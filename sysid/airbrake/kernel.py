@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+SMALLEST_DROP = 1e-6
+"""Share of the pressure under which a conductance is that at this share: between equal pressures it has no value."""
 
 
 class Constants(NamedTuple):
@@ -67,6 +69,9 @@ class Constants(NamedTuple):
     relay: bool
     relay_band: float
     equalising_step: float
+    exhaust_as_printed: bool
+    pipe_momentum: bool
+    momentum_step: float  # gamma dt S / L of the pipe of one vehicle, in kg/s per Pa
     speed_gates: bool
     accelerated_service: bool
     accelerated_emergency: bool
@@ -92,6 +97,7 @@ class State(NamedTuple):
     tripped: NDArray[np.bool_]
     history: Array  # (delay steps, valves): pipe pressures of the past
     cursor: Integers  # (1,): row of the oldest
+    flows: Array  # kg/s out of each node; remembered where the air has momentum
 
 
 class Layout(NamedTuple):
@@ -102,9 +108,8 @@ class Layout(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Scratch space: flows out of each node, net flow into it, sums of the watched pressures."""
+    """Scratch space: net flow into each node, sums of the watched pressures."""
 
-    flows: Array
     net: Array
     sums: Array
 
@@ -244,6 +249,8 @@ def _valve(j, p, before, command, moving, x, content, releasing, tripped, nodes,
     vent = _vent(p, pc, ps, emergency, command, moving, c, values, slopes)
     opened = _cylinder_open(p, before, releasing[j], command, moving, c)
     exhaust = _flow(c.release, pc, c.atmosphere, values, slopes) if opened else 0.0
+    if c.exhaust_as_printed:
+        exhaust = abs(exhaust)
     back_to_pipe = 0.0
     if accelerated and pe >= p and c.accelerated_service:
         back_to_pipe = _flow(c.accelerate_service, pe, p, values, slopes)
@@ -266,13 +273,27 @@ def _valve(j, p, before, command, moving, x, content, releasing, tripped, nodes,
 
 
 @numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _moved(flow, drop, low, high, c, values, slopes):
+    """Flow between two nodes a step later: L/(gamma S) dm/dt = drop - m / conductance, implicit in the friction.
+
+    The conductance is that of the orifice at this difference of pressure: at rest the flow is the print's.
+    """
+    share = max(1.0 - low / high, SMALLEST_DROP)
+    conductance = c.pipe_area * _coefficient(1.0 - share, 1.0, values, slopes) / share
+    return (flow + c.momentum_step * drop) / (1.0 + c.momentum_step / conductance)
+
+
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
 def _pipe_flows(x, nodes, flows, c, values, slopes):
     """Flow from each node to the next, from the second on (the first is the head valve's)."""
     for i in range(1, nodes - 1):
         p, q = x[i], x[i + 1]
         high, low = max(p, q), min(p, q)
-        flow = c.pipe_area * _coefficient(low, high, values, slopes) * high
-        flows[i] = flow if p > q else -flow
+        if c.pipe_momentum:
+            flows[i] = _moved(flows[i], p - q, low, high, c, values, slopes)
+        else:
+            flow = c.pipe_area * _coefficient(low, high, values, slopes) * high
+            flows[i] = flow if p > q else -flow
 
 
 @numba.njit(error_model="numpy", forceinline=True, _nrt=False)
@@ -360,7 +381,7 @@ def advance(
     releasing, tripped = state.releasing, state.tripped
     valve_nodes, port_nodes, values, slopes = layout.valve_nodes, layout.port_nodes, table.values, table.slopes
     commands, speeds, tail_areas = drive.command, drive.speed, drive.tail_area
-    flows, net, sums = work.flows, work.net, work.sums
+    flows, net, sums = state.flows, work.net, work.sums
     gained = 0.0
     for k in range(len(commands)):
         for w in range(len(watch)):

@@ -120,6 +120,7 @@ def charged_state(consist: Consist, variant: Variant, dt: float) -> kernel.State
         tripped=np.zeros(valves, dtype=np.bool_),
         history=np.full((delay, valves), consist.charged),
         cursor=np.zeros(1, dtype=np.int64),
+        flows=np.zeros(nodes),
     )
 
 
@@ -216,7 +217,7 @@ class BrakedTrain:
             port_nodes=np.array(consist.port_nodes, dtype=np.int64) - 1,
         )
         nodes = consist.vehicles
-        self._work = kernel.Work(flows=np.zeros(nodes), net=np.zeros(nodes), sums=np.zeros(len(probes)))
+        self._work = kernel.Work(net=np.zeros(nodes), sums=np.zeros(len(probes)))
 
     @property
     def stored(self) -> float:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 
 from sysid.airbrake.consist import TEMPERATURE, Consist
-from sysid.airbrake.flow import GAS_CONSTANT, FlowTable
+from sysid.airbrake.flow import GAS_CONSTANT, HEAT_RATIO, FlowTable
 from sysid.airbrake.variant import QuickService, Variant
 from sysid.units import STANDARD_ATMOSPHERE_PA as PATM
 
@@ -42,6 +42,7 @@ class PlainTrain:
         self.consist, self.variant, self.time_step = consist, variant, time_step
         self._values = [float(value) for value in table.values]
         self.pipe = [consist.charged] * consist.vehicles
+        self.between = [0.0] * (consist.vehicles - 2)
         self.port = [consist.charged] * len(consist.port_nodes)
         self.pairs = [PlainPair(consist, variant, time_step) for _ in range(consist.pairs)]
 
@@ -55,6 +56,17 @@ class PlainTrain:
         high, low = max(p, q), min(p, q)
         size = area * self._coefficient(low, high) * high / math.sqrt(TEMPERATURE)
         return size if p > q else -size
+
+    def _between(self, moving: float, p: float, q: float) -> float:
+        """Flow in the pipe from one vehicle to the next; ``moving`` is what it was."""
+        pipe = self.consist.pipe
+        if not self.variant.pipe_momentum:
+            return self._flow(pipe.area, p, q)
+        high = max(p, q)
+        share = max(1.0 - min(p, q) / high, 1e-6)
+        friction = share * high / self._flow(pipe.area, high, high * (1.0 - share))  # Pa per kg/s
+        inertia = pipe.length**2 / (HEAT_RATIO * pipe.volume)  # Pa per kg/s2; fronts run at the speed of sound
+        return (inertia * moving + (p - q) * self.time_step) / (inertia + friction * self.time_step)
 
     def _charging(self, area: float, p: float, q: float) -> float:
         factor = p if self.variant.charge_from_upstream else q
@@ -90,8 +102,10 @@ class PlainTrain:
         """
         consist, pipe = self.consist, list(self.pipe)
         moving = speed > 0.01 or not self.variant.speed_gates
-        between = [self._flow(consist.pipe.area, p, q) for p, q in itertools.pairwise(pipe[1:])]
-        flows = [self._head(pipe[0], pipe[1], command), *between, self._flow(tail_area, pipe[-1], PATM)]
+        self.between = [
+            self._between(m, p, q) for m, (p, q) in zip(self.between, itertools.pairwise(pipe[1:]), strict=True)
+        ]
+        flows = [self._head(pipe[0], pipe[1], command), *self.between, self._flow(tail_area, pipe[-1], PATM)]
         net = [0.0, *(into - out for into, out in itertools.pairwise(flows))]
         for index, node in enumerate(consist.port_nodes):
             local = pipe[node - 1]
@@ -121,6 +135,7 @@ class PlainTrain:
         m_v = self._vent(pair, p3, command, moving, emergency)
         opened = self._opened(pair, p3, command, moving)
         m_x = self._flow(q.release, pc, PATM) if opened else 0.0
+        m_x = abs(m_x) if v.exhaust_as_printed else m_x
         m_r = self._flow(q.accelerate_service, pe, p3) if released and pe >= p3 and v.accelerated_service else 0.0
         after = pair.tripped and not emergency
         blows = pc > p3 and p3 > ps and v.accelerated_emergency and (after or not v.blowback_after_emergency)

@@ -14,7 +14,7 @@ import pytest
 from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.simulate import AirBrakeRecord, simulate
-from sysid.airbrake.variant import LISTING, PHYSICAL, Variant
+from sysid.airbrake.variant import ACOUSTIC, LISTING, PHYSICAL, Variant
 from sysid.errors import StabilityError
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
 
@@ -118,15 +118,24 @@ def test_a5_the_first_cylinder_fills_in_a_plausible_time(
     assert low <= rise_time(pressure) <= high
 
 
-@BOTH
-def test_a6_the_emergency_runs_at_850_to_1100_feet_per_second(variant: Variant) -> None:
+def emergency_front(variant: Variant) -> float:
     record = run(((0.0, 90.0), (APPLIED, 0.0), (10.0, 0.0)), 50, variant, sample_time=0.01)
     trips = [
         float(np.argmax(record["action", node] - record["pipe", node] > Consist().valve.emergency_drop)) * 0.01
         for node in Consist().valve_nodes
     ]
     assert np.all(np.diff(trips) > 0.0)
-    assert 850.0 <= front_speed(trips) <= 1100.0 < SOUND
+    return front_speed(trips)
+
+
+@BOTH
+def test_a6_the_emergency_runs_at_850_to_1100_feet_per_second(variant: Variant) -> None:
+    assert 850.0 <= emergency_front(variant) <= 1100.0 < SOUND
+
+
+def test_a6_with_momentum_the_emergency_runs_at_815_feet_per_second() -> None:
+    # A tenth below the 900 ft/s of manuals: the inertia comes on top of the print's orifice between vehicles.
+    assert emergency_front(ACOUSTIC) == pytest.approx(815.0, abs=5.0)
 
 
 def service_front(variant: Variant) -> float:
@@ -137,6 +146,36 @@ def service_front(variant: Variant) -> float:
 
 def test_a7_a_service_application_runs_no_faster_than_sound() -> None:
     assert 500.0 <= service_front(PHYSICAL) <= SOUND
+
+
+def release_front(variant: Variant) -> float:
+    record = run(((0.0, 90.0), (APPLIED, 64.2), (150.0, 90.0), (160.0, 90.0)), 50, variant, sample_time=0.01)
+    pipes = [record.gauge_psi("pipe", node)[14999:] for node in Consist().valve_nodes]
+    return front_speed([float(np.argmax(pipe - pipe[0] > 1.5)) * 0.01 for pipe in pipes])
+
+
+def test_a7_with_momentum_no_wave_is_faster_than_sound() -> None:
+    # The valves push a release on; without the inertia of the air nothing holds it to the speed of sound.
+    assert release_front(PHYSICAL) > 1.1 * SOUND
+    assert 800.0 <= release_front(ACOUSTIC) < SOUND
+    assert 500.0 <= service_front(ACOUSTIC) < SOUND
+
+
+def test_with_momentum_the_cylinders_hold_what_they_hold_without() -> None:
+    for reduction, pressure in ((5.8, 10.6), (16.0, 40.0), (25.8, 62.3)):
+        held = applied(reduction, 50, ACOUSTIC)
+        for node in (3, 51, 101):
+            assert held.gauge_psi("cylinder", node)[-1] == pytest.approx(pressure, abs=0.5)
+
+
+def test_an_open_cylinder_ends_at_the_atmosphere_unless_the_print_is_taken_to_the_letter() -> None:
+    rows = ((0.0, 90.0), (APPLIED, 64.2), (60.0, 90.0), (150.0, 90.0))
+    lowest = {
+        printed: run(rows, 2, LISTING.with_options({"exhaust_as_printed": printed})).gauge_psi("cylinder", 3).min()
+        for printed in (False, True)
+    }
+    assert lowest[False] == pytest.approx(0.0, abs=1e-6)
+    assert lowest[True] == pytest.approx(-0.78, abs=0.05)
 
 
 def test_a7_as_printed_every_car_knows_the_handle() -> None:
@@ -223,7 +262,7 @@ def test_a13_a_step_of_2_ms_is_refused(variant: Variant) -> None:
         run(((0.0, 90.0), (APPLIED, 64.2), (2.0, 90.0)), 1, variant, time_step=2e-3)
 
 
-@BOTH
+@pytest.mark.parametrize("variant", [LISTING, PHYSICAL, ACOUSTIC], ids=["listing", "physical", "acoustic"])
 @pytest.mark.parametrize("pairs", [1, 50])
 def test_a14_air_is_conserved(variant: Variant, pairs: int) -> None:
     # What is stored changes by what went through head valves and vents: service, emergency and both releases.

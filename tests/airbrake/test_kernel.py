@@ -9,7 +9,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.flow import flow_table
 from sysid.airbrake.machine import BrakedTrain, all_probes
 from sysid.airbrake.reference import PlainTrain
-from sysid.airbrake.variant import LISTING, PHYSICAL, Variant
+from sysid.airbrake.variant import ACOUSTIC, LISTING, PHYSICAL, Variant
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
 
 STEP = 1e-3
@@ -34,6 +34,8 @@ def single_switches() -> dict[str, Variant]:
             variants[f"physical, {field.name} as printed"] = dataclasses.replace(PHYSICAL, **back)
     variants["physical, no quick service"] = PHYSICAL.with_options({"quick_service": "none"})
     variants["listing, no quick service"] = LISTING.with_options({"quick_service": "none"})
+    variants["physical, air with momentum"] = ACOUSTIC
+    variants["listing, exhaust as printed"] = LISTING.with_options({"exhaust_as_printed": True})
     for name in ("accelerated_service", "accelerated_emergency"):
         variants[f"physical, no {name}"] = PHYSICAL.with_options({name: False})
     return variants
@@ -81,6 +83,8 @@ def randomise(compiled: BrakedTrain, plain: PlainTrain, rng: np.random.Generator
         pair.past = pressures(len(pair.past)).tolist()
     state.pressures[:] = plain_pressures(plain)
     state.port[:] = plain.port
+    plain.between = (0.1 * rng.standard_normal(nodes - 2)).tolist()
+    state.flows[1 : nodes - 1] = plain.between
     for j, pair in enumerate(plain.pairs):
         state.content[j], state.releasing[j], state.tripped[j] = pair.content, pair.releasing, pair.tripped
         state.history[:, j] = pair.past
@@ -106,7 +110,7 @@ def test_single_steps_from_random_states_agree_with_the_plain_step(consist: Cons
 
 
 @pytest.mark.parametrize("drop", [26.0, 90.0], ids=["full service", "emergency"])
-@pytest.mark.parametrize("variant", [LISTING, PHYSICAL], ids=["listing", "physical"])
+@pytest.mark.parametrize("variant", [LISTING, PHYSICAL, ACOUSTIC], ids=["listing", "physical", "acoustic"])
 def test_short_runs_agree_with_the_plain_steps(variant: Variant, drop: float) -> None:
     consist = Consist(pairs=2)
     compiled, plain = train_pair(consist, variant, sample_time=0.05)

@@ -28,6 +28,7 @@ def test_switches_change_one_thing() -> None:
         ({"feed_closed_in_lap": True}, "needs latched_release"),
         ({"graduating_lap": True}, "needs latched_release"),
         ({"equalising_rate": 1e4}, "needs relay_band"),
+        ({"pipe_momentum": True}, "needs laminar_ratio"),
         ({"rising_delay": 0.0}, "not positive"),
         ({"relay_band": -1.0}, "not positive"),
         ({"rising_delay": None}, "wrong type"),

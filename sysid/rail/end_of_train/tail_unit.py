@@ -6,6 +6,7 @@ After EP 0 941 904 and 49 CFR 232.403 and 232.405.
 from __future__ import annotations
 
 import enum
+import math
 from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import dataclass
@@ -28,6 +29,8 @@ class TailSettings:
         emergency_hold: Time in s that the emergency valve stays open: at least 15 s (49 CFR 232.405).
         emergency_delay: Time in s from the order to the open valve: at most 1 s (49 CFR 232.405).
         service_area: In m2 (ours: 5 mm across; a service rate at the end of a long train).
+        service_band: Pipe above the target in psi from which the service valve is fully open, in proportion below
+            (ours): a valve that is open or shut makes waves that apply the last cars deeper than was asked for.
         service_delay: Time in s from a service order to the valve (ours).
         minimum_reduction: Of a minimum application in psi (ours: the 26-L brake valve's is 6 to 8 psi by the
             description of the San Diego Railroad Museum).
@@ -42,12 +45,14 @@ class TailSettings:
     emergency_hold: float = 15.0
     emergency_delay: float = 1.0
     service_area: float = 2.0e-5
+    service_band: float = 3.0
     service_delay: float = 1.0
     minimum_reduction: float = 6.0
     refusal: float = 2.0
 
     def __post_init__(self) -> None:
-        if min(self.emergency_area, self.service_area, self.minimum_reduction, self.refusal) <= 0.0:
+        sizes = (self.emergency_area, self.service_area, self.service_band, self.minimum_reduction, self.refusal)
+        if min(sizes) <= 0.0:
             raise ConfigError("an area or a pressure of the tail unit is not positive", where="tail settings", got=self)
         if self.emergency_hold < 15.0 or not 0.0 <= self.emergency_delay <= 1.0:
             raise ConfigError(
@@ -93,7 +98,7 @@ class TailUnit:
         self._minimum_made = False
         self._sample_time, self._count = sample_time, 0
         self._past: deque[float] = deque(maxlen=round(history / sample_time) + 1)
-        self._emergency_until = -np.inf
+        self._emergency_left = 0
 
     @property
     def time(self) -> float:
@@ -119,7 +124,7 @@ class TailUnit:
         if not self._past:
             raise ConfigError("the tail unit has seen no pressure yet", where="tail unit", remedy="step it first")
         if message.order is Order.EMERGENCY:
-            self._emergency_until = self.time + self.settings.emergency_hold
+            self._emergency_left = math.ceil(self.settings.emergency_hold / self._sample_time - 1e-9)
             return Answer.DONE
         if message.order is Order.UPDATE:
             self.operating, self._minimum_made, self.target = self._past[-1], False, None
@@ -136,8 +141,10 @@ class TailUnit:
             if self._pressure_at(message.time) - self._past[-1] >= self.settings.refusal:
                 return Answer.OVERTAKEN
             self._minimum_made = True
-        reduction = max(message.reduction, self.settings.minimum_reduction)
-        self.target = self.operating - reduction
+            self.target = self.operating - max(message.reduction, self.settings.minimum_reduction)
+            return Answer.DONE
+        # What the driver holds by now, which may be less than the minimum of the tail's own settings.
+        self.target = self.operating - message.reduction
         return Answer.DONE
 
     def step(self, pressure: float) -> float:
@@ -147,15 +154,25 @@ class TailUnit:
             pressure: Of the pipe at the tail in psi gauge.
 
         Returns:
-            Area open to the atmosphere in m2.
+            Area open to the atmosphere in m2, until the next sample.
         """
+        self.see(pressure)
+        return self.opening()
+
+    def see(self, pressure: float) -> None:
+        """The first half of a step, before the orders that arrive with it: take the pipe's pressure in psi gauge."""
         self._count += 1
         self._past.append(pressure)
-        if self.time < self._emergency_until:
+
+    def opening(self) -> float:
+        """The other half: the area in m2 that is open until the next sample."""
+        if self._emergency_left > 0:
+            self._emergency_left -= 1
             return self.settings.emergency_area
-        if self.target is not None and pressure > self.target:
-            return self.settings.service_area
-        return 0.0
+        if self.target is None:
+            return 0.0
+        above = (self._past[-1] - self.target) / self.settings.service_band
+        return self.settings.service_area * min(1.0, max(0.0, above))
 
 
 class AbstractTestBench(ABC):
@@ -282,7 +299,7 @@ class TwoEndedBrake(AbstractBrake):
         tail: Numbers of the tail unit.
 
     Raises:
-        ConfigError: If the brake gives no pipe pressures.
+        ConfigError: If the brake gives no pipe pressures, or its samples are longer than the delay of an emergency.
     """
 
     def __init__(
@@ -296,6 +313,14 @@ class TwoEndedBrake(AbstractBrake):
         self._brake = brake
         self.computer = BrakeComputer(sample_time=brake.sample_time, settings=computer, charged=True)
         self.unit = TailUnit(sample_time=brake.sample_time, settings=tail)
+        if brake.sample_time > self.unit.settings.emergency_delay + 1e-9:
+            raise ConfigError(
+                "an emergency order cannot open the valve of the tail in time",
+                where="two-ended brake",
+                expected=f"samples of at most {self.unit.settings.emergency_delay:g} s, the delay of the emergency",
+                got=f"{brake.sample_time:g} s",
+                remedy="advance the brake in shorter samples",
+            )
         self.log: list[tuple[Message, Answer]] = []
         self._under_way: deque[tuple[int, Message]] = deque()
         self._area, self._count = 0.0, 0
@@ -325,19 +350,21 @@ class TwoEndedBrake(AbstractBrake):
         head, tail = (float(v[-1]) / PSI_IN_PA for v in (output.head_pipe, output.tail_pipe))
         reading = Reading(equalising=float(output.equalising[-1]) / PSI_IN_PA, head=head, tail=tail)
         message = self.computer.step(reading).message
-        area = self.unit.step(tail)
+        self.unit.see(tail)
         if not self._began:
             self._began = True
             self.unit.receive(Message(order=Order.UPDATE, time=0.0))
         if message is not None:
             s, emergency = self.unit.settings, message.order is Order.EMERGENCY
             delay = s.emergency_delay if emergency else s.service_delay
-            self._under_way.append((self._count + round(delay / self.sample_time), message))
+            # What the unit opens at a sample is open from the next one on: at the latest after the delay, never later.
+            samples = max(math.floor(delay / self.sample_time + 1e-9) - 1, 0)
+            self._under_way.append((self._count + samples, message))
         for due, order in [entry for entry in self._under_way if entry[0] <= self._count]:
             self._under_way.remove((due, order))
             self.log.append((order, self.unit.receive(order)))
         self._count += 1
-        return area
+        return self.unit.opening()
 
 
 def _joined(parts: list[BrakeOutput]) -> BrakeOutput:

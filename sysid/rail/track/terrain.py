@@ -179,7 +179,8 @@ def correlation(
 ) -> NDArray[np.float64]:
     """Correlation of the track with a pattern, for the leading end of the whole train at ``x``.
 
-    The weights belong to the track under the train; ahead of it, where nothing stands yet, they are 1 (ours).
+    The weights belong to the track under the train; ahead of it, where nothing stands yet, they are 1 (ours). They
+    keep the balance of the pattern (ours): a constant grade is neither a crest nor a sag, whatever the loading.
 
     Args:
         track: The line. It goes on with its last values, so that one train length beyond what is read is enough.
@@ -206,10 +207,25 @@ def correlation(
     if weighted:
         under = (middles < 0.0) & (middles > behind[0])
         place = np.clip(np.searchsorted(behind, middles, side="right") - 1, 0, len(shape.weights) - 1)
-        heights = heights * np.where(under, shape.weights[::-1][place], 1.0)
+        heights = _weighted(heights, np.where(under, shape.weights[::-1][place], 1.0), np.diff(cuts), under)
     at = np.asarray(x, dtype=np.float64)[..., None] - shape.offset + look_ahead + cuts
     rises = np.diff(track.integral(track.grades if values is None else values, at), axis=-1)
     return np.asarray(rises @ heights / (pattern.size * shape.length))
+
+
+def _weighted(
+    heights: NDArray[np.float64], weights: NDArray[np.float64], widths: NDArray[np.float64], under: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """A pattern by the weight that stands on it, with as much above and below zero as it had without.
+
+    A pattern that ends or tapers within the train meets weights whose mean is not 1: left so, a constant grade under
+    a train that is not loaded evenly would be a crest or a sag.
+    """
+    weighted = heights * weights
+    for part in (under & (heights > 0.0), under & (heights < 0.0)):
+        if part.any():
+            weighted[part] *= (heights[part] @ widths[part]) / (weighted[part] @ widths[part])
+    return weighted
 
 
 COMBINATIONS: dict[str, Callable[..., NDArray[np.float64]]] = {

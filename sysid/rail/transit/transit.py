@@ -113,7 +113,8 @@ class ControlSettings:
         correction_jerk: Fastest change of the regulator's part in m/s3; its onset is a jerk of its own.
         learning: Share of the relative mean error that goes into the modifier at each stop.
         largest_modifier: Bound of the modifier.
-        overspeed: Speed in m/s above the command at which the full service brake is applied outside a ramp.
+        overspeed: Speed in m/s above the wanted one at which the full service brake is applied: above the command, or
+            during a ramp above the ramp's speed, in its open-loop part too.
     """
 
     proportional: float = 0.5
@@ -150,6 +151,7 @@ class DecelerationController:
         self._command: float | None = None
         self._profile: JerkProfile | None = None
         self._clock, self._integral, self._error, self._correction = 0.0, 0.0, 0.0, 0.0
+        self._too_fast = False
 
     @property
     def ramp_active(self) -> bool:
@@ -180,14 +182,16 @@ class DecelerationController:
         if self._profile is None:
             return self._cruise(command, speed, tachometer, pendulum)
         grade = grade_acceleration(tachometer, pendulum)
-        if self._clock > 0.0:
-            # What was asked of the brake, on this grade, less the deceleration that came of it.
+        if self._clock > 0.0 and not self._too_fast:
+            # What was asked of the brake, on this grade, less the deceleration that came of it; a full service that
+            # the overspeed control asked for says nothing of the request.
             self._error += (self.request - grade + tachometer) * self._dt
         self.request = self._requested(self._profile, speed, grade)
+        self._too_fast = speed > self._profile.speed(self._clock) + self.settings.overspeed
         self._clock += self._dt
         if self._clock >= self._profile.duration:
             self._finish(self._profile)
-        return self.characteristic.signal(self._modified(self.request))
+        return FULL_SERVICE if self._too_fast else self.characteristic.signal(self._modified(self.request))
 
     def _modified(self, request: float) -> float:
         """The request with the modifier on what the brake adds to the friction of coasting."""

@@ -29,7 +29,16 @@ L, Y = 1000.0, 0.012
 TRIANGLE = TrackProfile.from_steps("triangle", grade=[(-5.0 * L, Y), (0.0, -Y)])
 TROUGH = TrackProfile.from_steps("trough", grade=[(-5.0 * L, -Y), (0.0, Y)])
 LINE = np.linspace(-3.0 * L, 3.0 * L, 601)
+ACROSS = Pattern(name="front against rear", edges=(-1.0, -0.5, 0.0), values=(1.0, -1.0))
 HEAVY_FRONT = Shape(lengths=np.array([500.0, 500.0]), masses=np.array([3.0, 1.0]))
+
+
+@pytest.mark.parametrize("pattern", [*PATTERNS, SAG, ACROSS], ids=lambda pattern: pattern.name)
+def test_a_constant_grade_has_no_crest_and_no_sag_whatever_the_loading(pattern: Pattern) -> None:
+    even = TrackProfile.from_steps("even", grade=[(-9000.0, 0.01)])
+    heavy_rear = Shape(lengths=np.full(10, 100.0), masses=np.repeat([1.0, 3.0], 5))
+    for shape in (heavy_rear, HEAVY_FRONT, uniform(L)):
+        assert correlation(even, shape, np.array([0.0, 321.0]), pattern=pattern) == pytest.approx(0.0, abs=1e-15)
 
 
 @pytest.mark.parametrize(

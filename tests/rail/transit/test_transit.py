@@ -10,6 +10,7 @@ from sysid.estimation import fit_arx
 from sysid.models import ARX, AbstractModel, Mapping
 from sysid.rail.constants import MPH
 from sysid.rail.transit.deceleration import (
+    FULL_SERVICE,
     JERK,
     OPEN_LOOP,
     RATE,
@@ -248,6 +249,28 @@ def test_an_overspeed_while_cruising_brakes_fully(surrogate: AbstractModel, char
     controller = DecelerationController(characteristic=characteristic, sample_time=STEP)
     assert controller.step(10.0, 10.0, 0.0, 0.0) > 60.0
     assert controller.step(10.0, 12.0, 0.0, 0.0) == 20.0
+
+
+@pytest.mark.parametrize("grade", [0.0, 0.02, -0.02], ids=["level", "up", "down"])
+def test_while_a_ramp_runs_the_overspeed_control_looks_at_the_speed(
+    surrogate: AbstractModel, characteristic: Characteristic, grade: float
+) -> None:
+    """The source: in the open loop the speed is ignored "except for overspeed control". Shoes faded to 0.2."""
+    controller = DecelerationController(characteristic=characteristic, sample_time=STEP)
+    vehicle = TransitVehicle(model=surrogate, friction=0.2, speed=40 * MPH, grade=grade)
+    trace = stop_trace(vehicle, controller, np.repeat([40.0, 20.0], [200, 400]) * MPH)
+    profile = JerkProfile(start=float(trace["V"][199]), stop=20 * MPH)
+    wanted = np.array([profile.speed(k * STEP) for k in range(round(profile.duration / STEP))])
+    over = trace["V"][199 : 199 + len(wanted)] - wanted > controller.settings.overspeed
+    assert over.sum() > 20
+    np.testing.assert_array_equal(trace["P"][200 : 200 + len(wanted)] == FULL_SERVICE, over)
+
+
+def test_a_command_far_below_is_overspeed_in_the_open_loop_only_above_the_ramp(
+    surrogate: AbstractModel, characteristic: Characteristic
+) -> None:
+    trace = stops(surrogate, characteristic, 1.0, count=1)[1][0]
+    assert trace["P"].min() > FULL_SERVICE
 
 
 def test_a_vehicle_needs_friction(surrogate: AbstractModel) -> None:
