@@ -8,13 +8,14 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from sysid.airbrake.command import Command
+from sysid.airbrake.command import MAX_DURATION, Command
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import QUANTITIES, Probe
 from sysid.airbrake.sequences import RandomCommand
 from sysid.airbrake.simulate import AirBrakeRecord, simulate
 from sysid.airbrake.variant import VARIANTS, Variant
 from sysid.errors import ConfigError
+from sysid.excitation import excite
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
 
@@ -49,19 +50,30 @@ class _Random(BaseModel):
     positions: tuple[float, ...] | None = None
 
 
+class _Excited(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    kind: str
+    seed: int = Field(ge=0)
+    duration: float = Field(gt=0, le=MAX_DURATION)
+    low: float = Field(default=66.0, ge=0)
+    high: float | None = None
+    options: dict[str, Any] = Field(default_factory=dict)
+
+
 class _Recipe(BaseModel):
     model_config = ConfigDict(extra="forbid")
     command: list[tuple[float, float]] | None = None
     time_unit: Literal["s", "ds"] = "s"
     duration: float | None = Field(default=None, gt=0)
     random: _Random | None = None
+    excitation: _Excited | None = None
 
     @model_validator(mode="after")
     def _one_of_two(self) -> _Recipe:
-        if (self.command is None) == (self.random is None):
-            raise ValueError("give either command or random")
-        if self.random is not None and self.duration is not None:
-            raise ValueError("the duration of a random command stands beside its seed")
+        if sum(one is not None for one in (self.command, self.random, self.excitation)) != 1:
+            raise ValueError("give one of command, random and excitation")
+        if self.command is None and self.duration is not None:
+            raise ValueError("the duration of a random command or an excitation stands beside its seed")
         return self
 
 
@@ -93,7 +105,32 @@ def _checked(model: type[_M], values: Mapping[str, Any], where: str) -> _M:
         ) from error
 
 
-def _command(recipe: _Recipe, running_pressure: float) -> Command:
+def _excited(asked: _Excited, running_pressure: float, sample_time: float) -> Command:
+    """An excitation as a command: a position for every sample at which the handle moves."""
+    high = running_pressure if asked.high is None else asked.high
+    found = excite(
+        asked.kind,
+        sample_time=sample_time,
+        duration=asked.duration,
+        low=asked.low,
+        high=high,
+        names="handle",
+        units="psi",
+        seed=asked.seed,
+        **asked.options,
+    )
+    values = found.values[:, 0]
+    moved = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
+    return Command(
+        times=tuple((moved * sample_time).tolist()),
+        pressures=tuple(values[moved].tolist()),
+        duration=len(values) * sample_time,
+    )
+
+
+def _command(recipe: _Recipe, running_pressure: float, sample_time: float) -> Command:
+    if recipe.excitation is not None:
+        return _excited(recipe.excitation, running_pressure, sample_time)
     if recipe.random is not None:
         limits = recipe.random.model_dump(exclude={"seed"})
         return RandomCommand(running_pressure=running_pressure, **limits).draw(recipe.random.seed)
@@ -154,7 +191,9 @@ def generate(
     Args:
         case: Its name.
         recipe: ``{command: [[time, psi gauge], ...], time_unit: s | ds, duration: s}`` or
-            ``{random: {seed: 7, duration: 900, ...}}`` (limits: :class:`sysid.airbrake.sequences.RandomCommand`).
+            ``{random: {seed: 7, duration: 900, ...}}`` (limits: :class:`sysid.airbrake.sequences.RandomCommand`), or
+            ``{excitation: {kind: ramps, seed: 7, duration: 900, low: 66, high: 90, options: {rise: 50}}}`` (a kind of
+            :func:`sysid.excitation.excite`; from 66 psi to the running pressure by default).
         options: ``variant``, ``switches`` (fields of :class:`sysid.airbrake.variant.Variant`), ``pairs``,
             ``locomotives``, ``running_pressure`` in psi gauge, ``speed`` in m/s, ``time_step`` in s, ``node``, and
             ``quantities``: what each channel is, ``command``, a quantity at ``node``, or ``{quantity: node}``.
@@ -187,7 +226,7 @@ def generate(
     )
     probes = [_probe(channel.name, options_) for channel in channels]
     record = simulate(
-        _command(recipe_, options_.running_pressure),
+        _command(recipe_, options_.running_pressure, sample_time),
         consist=consist,
         variant=variant,
         probes=tuple(dict.fromkeys(probe for probe in probes if probe is not None)),

@@ -98,7 +98,8 @@ def excite(
     """Draw the inputs of an experiment.
 
     Args:
-        kind: ``prbs``, ``multisine``, ``noise``, ``chirp``, ``staircase`` or ``aprbs``; or one with its options, as
+        kind: ``prbs``, ``multisine``, ``noise``, ``chirp``, ``staircase``, ``aprbs``, ``ramps``, ``sine`` or
+            ``pulses``; or one with its options, as
             ``PRBS(clock=4)``.
         sample_time: Seconds between samples.
         samples: Length of the experiment, or

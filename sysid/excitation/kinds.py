@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Any, Final, get_args, get_type_hints
 
 from sysid.errors import ConfigError
+from sysid.excitation.manoeuvres import Pulses, Ramps, Sine
 from sysid.excitation.noise import Chirp, FilteredNoise
 from sysid.excitation.plan import AbstractExcitation
 from sysid.excitation.sines import Multisine
@@ -21,6 +22,9 @@ KINDS: Final[Mapping[str, type[AbstractExcitation]]] = {
     "chirp": Chirp,
     "staircase": Staircase,
     "aprbs": APRBS,
+    "ramps": Ramps,
+    "sine": Sine,
+    "pulses": Pulses,
 }
 
 

@@ -286,7 +286,9 @@ def auto(  # noqa: PLR0917 - one parameter an option, by name on the command lin
 
 @app.command(epilog="Example: sysid excite multisine --samples 4000 --sample-time 0.01 --range 0:10 --out u.csv")
 def excite(
-    kind: Annotated[str, typer.Argument(help="prbs, multisine, noise, chirp, staircase or aprbs.")],
+    kind: Annotated[
+        str, typer.Argument(help="prbs, multisine, noise, chirp, staircase, aprbs, ramps, sine or pulses.")
+    ],
     *,
     out: Annotated[Path, typer.Option(help="File to write, .csv or .parquet.")],
     sample_time: Annotated[float, typer.Option(help="Seconds between samples.")],
@@ -299,15 +301,20 @@ def excite(
     seed: Annotated[int, typer.Option(help="Of everything that is random.")] = 0,
     clock: Annotated[int | None, typer.Option(help="prbs: samples that a level is held at least.")] = None,
     order: Annotated[int | None, typer.Option(help="prbs: bits of the shift register; noise: of the filter.")] = None,
-    periods: Annotated[int | None, typer.Option(help="multisine: how many.")] = None,
+    periods: Annotated[int | None, typer.Option(help="multisine, sine: how many.")] = None,
     lines: Annotated[str | None, typer.Option(help="multisine: full, odd or odd-random.")] = None,
     iterations: Annotated[int | None, typer.Option(help="multisine: for a low peak; 0 keeps random phases.")] = None,
     peak: Annotated[float | None, typer.Option(help="noise: standard deviations at which it is cut.")] = None,
     sweep: Annotated[str | None, typer.Option(help="chirp: linear or logarithmic.")] = None,
     levels: Annotated[int | None, typer.Option(help="staircase: how many.")] = None,
-    hold: Annotated[int | None, typer.Option(help="staircase, aprbs: samples at a level, at least.")] = None,
-    longest: Annotated[int | None, typer.Option(help="aprbs: samples at a level at most.")] = None,
+    hold: Annotated[
+        int | None, typer.Option(help="staircase, aprbs, ramps, pulses: samples at a level, at least.")
+    ] = None,
+    longest: Annotated[int | None, typer.Option(help="aprbs, pulses: samples at a level at most.")] = None,
     direction: Annotated[str | None, typer.Option(help="staircase: up-down or random.")] = None,
+    rise: Annotated[int | None, typer.Option(help="ramps: samples of the shortest.")] = None,
+    longest_rise: Annotated[int | None, typer.Option(help="ramps: samples of the longest.")] = None,
+    depth: Annotated[float | None, typer.Option(help="pulses: how far, as a share of the range.")] = None,
 ) -> None:
     """Draw the inputs of an experiment: signals that stay within a range and hold the frequencies asked for."""
     from sysid.workbench.commands.excite import excite_command
@@ -316,6 +323,7 @@ def excite(
         **{"samples": samples, "duration": duration, "sample_time": sample_time, "seed": seed, "clock": clock},
         **{"order": order, "periods": periods, "lines": lines, "iterations": iterations, "peak": peak, "sweep": sweep},
         **{"levels": levels, "hold": hold, "longest": longest, "direction": direction},
+        **{"rise": rise, "longest_rise": longest_rise, "depth": depth},
     }
     excite_command(kind, out, given=given, span=span, band=band, names=names, units=units)
 

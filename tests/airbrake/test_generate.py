@@ -5,6 +5,7 @@ import pytest
 
 from sysid.airbrake.generate import generate
 from sysid.errors import ConfigError, UnitError
+from sysid.excitation import excite
 from sysid.traces import Channel
 from sysid.units import Reference
 
@@ -62,12 +63,23 @@ def test_a_random_recipe_repeats_from_its_seed() -> None:
     assert made(recipe=recipe).digest != made(recipe={"random": {"seed": 4, "duration": 60.0}}).digest
 
 
+@pytest.mark.parametrize("kind", ["ramps", "aprbs", "sine"])
+def test_an_excitation_moves_the_handle(kind: str) -> None:
+    drawn = {"kind": kind, "seed": 3, "duration": 60.0, "low": 70.0}
+    trace = made(recipe={"excitation": drawn})
+    expected = excite(kind, sample_time=0.1, duration=60.0, low=70.0, high=90.0, seed=3)
+    np.testing.assert_allclose(trace["STP"], expected.values[:, 0], rtol=0.0, atol=1e-12)
+    assert trace["BC"].max() > 1.0
+
+
 @pytest.mark.parametrize(
     ("change", "error", "said"),
     [
-        ({"recipe": {}}, ConfigError, "either command or random"),
+        ({"recipe": {}}, ConfigError, "one of command, random and excitation"),
         ({"recipe": {"command": [[0, 90], [1, 80]], "seed": 3}}, ConfigError, "recipe of case A, seed"),
         ({"recipe": {"random": {"duration": 5.0}}}, ConfigError, r"random\.seed"),
+        ({"recipe": {"excitation": {"kind": "ramp", "seed": 1, "duration": 9.0}}}, ConfigError, "mean ramps"),
+        ({"recipe": {"excitation": {"kind": "sine", "seed": 1}}}, ConfigError, r"excitation\.duration"),
         ({"recipe": {"command": [[0, 120], [9, 90]]}}, ConfigError, "exceeds the running pressure"),
         ({"recipe": {"random": {"seed": 1, "duration": 9.0, "steps": 0}}}, ConfigError, "steps is out of range"),
         ({"options": {"pairs": 0}}, ConfigError, "options of the generator, pairs"),

@@ -25,6 +25,21 @@ def test_it_counts_what_is_lost_and_names_the_worst():
     assert len(found.worst) == 10
 
 
+def test_each_kind_of_sequence_has_figures_of_its_own():
+    whole = assembled(pipe(), models())
+    kinds = {"ramps-": 3, "sine-": 2}
+    sequences = [replace(trace(seed=s), name=f"{kind}{s:03}") for kind, n in kinds.items() for s in range(n)]
+    errors = {t.name: np.sqrt(np.mean((whole.simulate_trace(t)["AR"] - t["AR"]) ** 2)) for t in sequences}
+    limit = float(np.median(list(errors.values())))
+    found = run_monte_carlo(whole, sequences, "AR", limit)
+    assert {kind: one.sequences for kind, one in found.by_kind.items()} == {"ramps": 3, "sine": 2}
+    for kind, one in found.by_kind.items():
+        own = [error for name, error in errors.items() if name.startswith(kind)]
+        assert one.within == np.mean(np.array(own) < limit)
+        assert one.quantiles[1.0] == pytest.approx(max(own))
+    assert run_monte_carlo(whole, sequences[:3], "AR", limit).by_kind == {}
+
+
 class Halves:
     """An annotator: the first half of a trace is one state, the second another; a third never occurs."""
 

@@ -58,6 +58,29 @@ def test_the_range_is_used(kind: str) -> None:
     assert x.max() > 4.95
 
 
+def test_ramps_move_at_most_by_the_range_over_their_shortest_rise_and_stand_between() -> None:
+    x = drawn("ramps", 5000, rise=50, hold=20).values[:, 0]
+    moves = np.diff(x)
+    assert 0.0 < np.abs(moves).max() <= 3.0 / 50 * (1.0 + 1e-9)
+    assert np.mean(np.abs(moves) < 1e-12) > 0.2
+    turning = drawn("ramps", 5000, rise=50, longest_hold=0).values[:, 0]
+    assert np.count_nonzero(np.diff(turning) == 0.0) == 0
+
+
+def test_a_sine_has_one_line() -> None:
+    power = np.abs(np.fft.rfft(drawn("sine", periods=7).values[:, 0] - 3.5)) ** 2
+    assert power[7] > 0.999 * power.sum()
+    with pytest.raises(ConfigError, match="fewest is out of range"):
+        drawn("sine", fewest=501, most=600)
+
+
+def test_pulses_go_down_by_their_depth_and_come_back() -> None:
+    x = drawn("pulses", 4000, hold=20, longest=60, depth=0.25).values[:, 0]
+    assert set(x.tolist()) == {5.0, 4.25}
+    turns = np.diff(np.flatnonzero(np.diff(x)))
+    assert 20 <= turns.min() <= turns.max() <= 60
+
+
 def test_a_prbs_has_the_autocorrelation_of_one() -> None:
     x = excite(PRBS(order=7), samples=127, sample_time=1.0).values[:, 0]
     X = np.fft.rfft(x)
@@ -121,7 +144,10 @@ def test_it_is_an_array_a_frame_and_a_trace() -> None:
 @pytest.mark.parametrize(
     ("kind", "options"),
     [
-        ("sine", {}),
+        ("sinus", {}),
+        ("sine", {"periods": 51}),
+        ("ramps", {"rise": 30, "longest_rise": 20}),
+        ("pulses", {"depth": 1.5}),
         ("prbs", {"hold": 3}),
         ("prbs", {"clock": 0}),
         ("prbs", {"clock": 2.5}),

@@ -171,8 +171,16 @@ def _weakness(found: MonteCarloRecord) -> str:
     return (
         f"Of {found.sequences} random sequences {found.lost} diverge and {number(100.0 * found.within)} % stay within "
         f"{found.limit:g} {found.unit} (root mean square of {found.output}); the worst is {found.worst[0].name} with "
-        f"{quantity(found.worst[0].rmse, found.unit, missing='no number')}."
+        f"{quantity(found.worst[0].rmse, found.unit, missing='no number')}.{_weakest_kind(found)}"
     )
+
+
+def _weakest_kind(found: MonteCarloRecord) -> str:
+    """Of several kinds the one with the fewest under the limit: an average over kinds hides it."""
+    if not found.by_kind:
+        return ""
+    kind, one = min(found.by_kind.items(), key=lambda item: item[1].within)
+    return f" Of the {one.sequences} sequences of the kind {kind} {number(100.0 * one.within)} % do."
 
 
 def _position_point(found: InterpolationRecord) -> tuple[str, str]:

@@ -194,6 +194,15 @@ Quantiles = dict[float, Number]
 """Root mean square error of a sequence by quantile over the sequences."""
 
 
+class KindRecord(Record):
+    """The whole on the random sequences of one kind."""
+
+    sequences: int = Field(description="How many were run.")
+    lost: int = Field(description="How many diverged: held by a network's bound, or no number.")
+    within: Number = Field(description="Share of them under the limit, 0 to 1.")
+    quantiles: Quantiles = Field(description="By quantile (0 to 1), the error in the unit.")
+
+
 class MonteCarloRecord(Record):
     """The whole on random sequences of the reference."""
 
@@ -207,6 +216,9 @@ class MonteCarloRecord(Record):
     worst: list[WorstSequence] = Field(description="Worst first; their signals are stored.")
     by_state: dict[str, Quantiles] = Field(
         default={}, description="The same over the samples of a state, where an annotator says in which each is."
+    )
+    by_kind: dict[str, KindRecord] = Field(
+        default={}, description="The figures of each kind of sequence, by their names; empty where all are of one."
     )
 
 

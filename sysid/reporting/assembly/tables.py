@@ -93,13 +93,13 @@ def time_table(results: AssemblyResults) -> Table:
 
 
 def monte_carlo_tables(found: MonteCarloRecord) -> list[Table]:
-    """What came of the random sequences, and state by state where there are states.
+    """What came of the random sequences, kind by kind and state by state where there are such.
 
     Args:
         found: What came of them.
 
     Returns:
-        One or two tables.
+        One table to three.
     """
     rows: list[list[Value]] = [
         [f"{100.0 * q:g} % of the sequences at most, {found.unit}", value] for q, value in found.quantiles.items()
@@ -115,6 +115,24 @@ def monte_carlo_tables(found: MonteCarloRecord) -> list[Table]:
             note="A sequence diverged if a network was held at its bound, far outside what it was trained on.",
         )
     ]
+    if found.by_kind:
+        tables.append(
+            plain_table(
+                f"{found.output} on the random sequences, kind by kind",
+                [
+                    ("Kind", ""),
+                    ("Sequences", ""),
+                    ("Diverged", ""),
+                    (f"Under {found.limit:g} {found.unit}", "%"),
+                    *((f"{100.0 * q:g} % at most", found.unit) for q in found.quantiles),
+                ],
+                [
+                    [kind, one.sequences, one.lost, 100.0 * one.within, *one.quantiles.values()]
+                    for kind, one in found.by_kind.items()
+                ],
+                note="Root mean square error of a sequence; its kind is its name without the number.",
+            )
+        )
     if found.by_state:
         tables.append(
             plain_table(

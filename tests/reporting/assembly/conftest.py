@@ -124,6 +124,10 @@ def document() -> dict[str, Any]:
             "quantiles": {"0.5": 0.1, "0.99": 0.6},
             "worst": [{"name": "R7", "rmse": 0.6}],
             "by_state": {"filling": {"0.5": 0.05, "0.99": 0.3}},
+            "by_kind": {
+                "ramps": {"sequences": 3, "lost": 1, "within": 0.5, "quantiles": {"0.5": 0.1, "0.99": 0.4}},
+                "sine": {"sequences": 2, "lost": 0, "within": 1.0, "quantiles": {"0.5": 0.2, "0.99": 0.3}},
+            },
         },
         "limits": [
             {

@@ -23,7 +23,7 @@ def test_a_page_has_every_table_and_a_chart_for_every_signal(run_folder: Path, r
     assembly, judged, data = page.sections
     assert [section.anchor for section in page.sections] == ["the-assembly", "judged", "data"]
     kinds = [type(part) for part in assembly.parts]
-    assert kinds.count(Table) == 13
+    assert kinds.count(Table) == 14
     assert kinds.count(Picture) == 2 + 2 + 1 + 1  # active learning, two cases, positions, the worst sequence
     assert kinds.index(Table) + 1 == kinds.index(Picture), "the first chart stands beside the stages"
     (stages,) = judged.parts

@@ -40,10 +40,11 @@ def test_run_times_are_told_in_milliseconds_and_for_each_second(results: Assembl
     assert values(time_table(results)) == [["A", 300.0, 3.0, 10.0], ["V", 300.0, 6.0, 20.0]]
 
 
-def test_random_sequences_by_quantile_and_by_state(results: AssemblyResults) -> None:
+def test_random_sequences_by_quantile_by_kind_and_by_state(results: AssemblyResults) -> None:
     assert results.monte_carlo is not None
-    all_of_them, by_state = monte_carlo_tables(results.monte_carlo)
+    all_of_them, by_kind, by_state = monte_carlo_tables(results.monte_carlo)
     assert [row[1] for row in values(all_of_them)] == [0.1, 0.6, 0.75, 1, 0.6]
+    assert values(by_kind) == [["ramps", 3, 1, 50.0, 0.1, 0.4], ["sine", 2, 0, 100.0, 0.2, 0.3]]
     assert values(by_state) == [["filling", 0.05, 0.3]]
 
 
