@@ -25,7 +25,12 @@ from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_
 from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
-from sysid.estimation.linear_posteriors import arx_posterior, transfer_function_posterior
+from sysid.estimation.linear_posteriors import (
+    arx_posterior,
+    polynomial_posterior,
+    state_space_posterior,
+    transfer_function_posterior,
+)
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.narx import fit_narx
 from sysid.estimation.networks.neural_state_space import (
@@ -65,7 +70,8 @@ from sysid.traces import Trace
 
 GROWING = "the free run grows without bound, and with it every error of a parameter"
 ENDED = "training ended before there was evidence of how well the records determine the weights (some 20 iterations)"
-NO_SENSITIVITIES = "how the output moves with the parameters is not computed for this structure"
+OF_STATES = f"{GROWING}, or a subspace method alone gave it, whose covariance is not known"
+OF_POLYNOMIALS = f"{GROWING}, or its noise is integrated and drifts as far"
 LINEAR_START = "a linear model finds its own start"
 
 ESTIMATORS: dict[str, Estimator] = {
@@ -140,7 +146,8 @@ ESTIMATORS: dict[str, Estimator] = {
             training=StateSpaceTraining,
             begins=LINEAR_START,
             stability=PoleCheck,
-            no_posterior=NO_SENSITIVITIES,
+            posterior=state_space_posterior,
+            no_posterior=OF_STATES,
         ),
         Estimator(
             structure=VectorStateSpace,
@@ -149,7 +156,8 @@ ESTIMATORS: dict[str, Estimator] = {
             training=StateSpaceTraining,
             begins=LINEAR_START,
             stability=PoleCheck,
-            no_posterior=NO_SENSITIVITIES,
+            posterior=state_space_posterior,
+            no_posterior=OF_STATES,
         ),
         *(
             Estimator(
@@ -159,7 +167,8 @@ ESTIMATORS: dict[str, Estimator] = {
                 training=PolynomialTraining,
                 begins=LINEAR_START,
                 stability=PoleCheck,
-                no_posterior=NO_SENSITIVITIES,
+                posterior=polynomial_posterior,
+                no_posterior=OF_POLYNOMIALS,
             )
             for structure, name in ((OE, "an OE model"), (BJ, "a Box-Jenkins model"), (ARMAX, "an ARMAX model"))
         ),

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.linear.state_space.fit import matrices_root
 from sysid.estimation.networks.posterior import Noise, Posterior, free_run_errors, remaining
 from sysid.estimation.nonparametric.noise import persistence
 from sysid.estimation.result import FitResult
-from sysid.models import ARXModel, Start, TransferFunctionModel
+from sysid.models import (
+    AbstractModel,
+    ARXModel,
+    LinearStateSpaceModel,
+    Start,
+    TransferFunctionModel,
+    VectorStateSpaceModel,
+)
+from sysid.models.polynomial import PolynomialModel
 from sysid.traces import Trace
 
 GROWTH = 1e-6
@@ -41,12 +51,55 @@ def arx_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Post
     factor[1:] = root[:n]
     if len(root) > n:
         factor[0] = root[n]
+    noise = _noise(model, traces, start, len(root))
+    return Posterior(factor=factor, noise=replace(noise, one_step=known.noise_variance))
+
+
+def polynomial_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
+    """Of OE, Box-Jenkins and ARMAX: their coefficients, under white innovations.
+
+    Args:
+        fit: The fit.
+        traces: Estimation traces.
+        start: How a free run over them begins.
+
+    Returns:
+        The posterior; ``None`` where the free run grows without bound, or its noise drifts so.
+    """
+    model, known = cast("PolynomialModel", fit.model), fit.uncertainty
+    if known is None or model.orders.drifts or model.pole_radius > 1.0 + GROWTH:
+        return None
+    root = _root(known.covariance) / model.gains[:, np.newaxis]
+    return Posterior(factor=root, noise=_noise(model, traces, start, len(root)))
+
+
+def state_space_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
+    """Of a state space: the entries of its matrices, along the directions that change what it does.
+
+    Args:
+        fit: The fit.
+        traces: Estimation traces.
+        start: How a free run over them begins.
+
+    Returns:
+        The posterior; ``None`` where a subspace method alone was used, or the free run grows without bound.
+    """
+    model = cast("LinearStateSpaceModel | VectorStateSpaceModel", fit.model)
+    if fit.uncertainty is None or model.pole_radius > 1.0 + GROWTH:
+        return None
+    root = matrices_root(model, traces, start)
+    return Posterior(factor=root, noise=_noise(model, traces, start, root.shape[1]))
+
+
+def _noise(model: AbstractModel, traces: Sequence[Trace], start: Start, parameters: int) -> Noise:
+    """Errors of both runs over the estimation traces, with what the parameters took away from them."""
     runs = [Experiment.for_model(trace, model, start) for trace in traces]
-    counted = sum(run.n_counted for run in runs)
+    counted = len(model.mapping.outputs) * sum(run.n_counted for run in runs)
     # What a free run leaves persists: as many parameters take more of it away than of white errors.
-    paid = min(len(root) * persistence(free_run_errors(model, runs)), 0.5 * counted)
-    noise = Noise(free_run=remaining(model, runs).free_run * counted / (counted - paid), one_step=known.noise_variance)
-    return Posterior(factor=factor, noise=noise)
+    paid = min(parameters * persistence(free_run_errors(model, runs)), 0.5 * counted)
+    left = remaining(model, runs)
+    white = counted / max(counted - parameters, 0.5 * counted)
+    return Noise(free_run=left.free_run * counted / (counted - paid), one_step=left.one_step * white)
 
 
 def transfer_function_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:

@@ -144,6 +144,15 @@ class ARXModel(AbstractModel):
         """The same model with another constant and other coefficients, in this order."""
         return replace(self, intercept=float(theta[0]), coefficients=theta[1:])
 
+    def innovation_responses(self, steps: int) -> NDArray[np.float64]:
+        """Of the outputs to an innovation: ``1 / A``; see the base class."""
+        found = np.zeros(steps)
+        found[0] = 1.0
+        for k in range(1, steps):
+            past = found[max(k - self.orders.na, 0) : k][::-1]
+            found[k] = self.a[: len(past)] @ past
+        return found.reshape(-1, 1, 1)
+
     def ratio(self, j: int) -> Ratio:
         """From one input to the output, in ``1/z``; all inputs share the denominator."""
         return Ratio(

@@ -283,11 +283,28 @@ class AbstractModel(ABC):
         """
         return trace.columns([self.mapping.output])[:, 0]
 
+    @property
+    def vector(self) -> NDArray[np.float64] | None:
+        """Flat parameters, as :meth:`with_theta` takes them; ``None`` for a model that has none."""
+        return getattr(self.recursion, "theta", None)
+
+    def innovation_responses(self, steps: int) -> NDArray[np.float64] | None:
+        """What an innovation does to the outputs over some steps, in their units.
+
+        Args:
+            steps: How many, the first is the innovation's own sample.
+
+        Returns:
+            Shape ``(steps, n_outputs, n_outputs)``; ``None`` for a model that is not linear, or has none of its noise.
+        """
+        del steps
+        return None
+
     def with_theta(self, theta: NDArray[np.float64]) -> AbstractModel | None:
         """The same model with other parameters.
 
         Args:
-            theta: Flat parameters, as its recursion has them.
+            theta: Flat parameters, as :attr:`vector` has them.
 
         Returns:
             The model; ``None`` for one that has no flat parameters.

@@ -54,6 +54,17 @@ class Innovations:
         return cls(**parts)
 
     @property
+    def entries(self) -> Array:
+        """Every entry of every matrix, row by row: ``A``, ``B``, ``C``, ``D``, ``K``, the constant."""
+        return np.concatenate([getattr(self, name).ravel() for name in _NAMES])
+
+    def at(self, entries: Array) -> Innovations:
+        """The system of this size with other entries, in the order of :attr:`entries`."""
+        shapes = [getattr(self, name).shape for name in _NAMES]
+        parts = np.split(entries, np.cumsum([int(np.prod(shape)) for shape in shapes])[:-1])
+        return Innovations(**{name: part.reshape(s) for name, part, s in zip(_NAMES, parts, shapes, strict=True)})
+
+    @property
     def n_state(self) -> int:
         """Length of the state."""
         return len(self.A)

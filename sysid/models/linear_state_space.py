@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import fields as dataclass_fields
 from functools import cached_property
 from typing import Annotated, Any
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
+from sysid.models.history import History
+from sysid.models.innovation_moves import prediction_moves, responses_to_innovations
 from sysid.models.innovations import Innovations
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
@@ -138,6 +140,31 @@ class LinearStateSpaceModel(AbstractModel):
         return StateSpace.of(self.system, self.scaling, noise=self.orders.noise)
 
     @property
+    def vector(self) -> NDArray[np.float64]:
+        """Every entry of its matrices, in scaled numbers, as :attr:`Innovations.entries`."""
+        return self.system.entries
+
+    def with_theta(self, theta: NDArray[np.float64]) -> LinearStateSpaceModel:
+        """The same model with other numbers, in the order of :attr:`vector`."""
+        return replace(self, system=self.system.at(theta))
+
+    def output_moves(
+        self,
+        factor: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        history: History,
+        measured: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """How free run and prediction move with its numbers; see the base class."""
+        return prediction_moves(self, factor, inputs, history, measured)
+
+    def innovation_responses(self, steps: int) -> NDArray[np.float64] | None:
+        """Of the outputs to innovations over some steps; see the base class."""
+        if not self.orders.noise:
+            return None
+        return responses_to_innovations(self.system.A, self.system.C, self.system.K, steps)
+
+    @property
     def poles(self) -> NDArray[np.complex128]:
         """Poles in the z plane, shape ``(states,)``."""
         return self.system.poles()
@@ -259,6 +286,33 @@ class VectorStateSpaceModel(SeveralOutputs):
     def recursion(self) -> StateSpace:
         """The form that is run."""
         return StateSpace.of(self.system, self.scaling, noise=self.orders.noise)
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """Every entry of its matrices, in scaled numbers, as :attr:`Innovations.entries`."""
+        return self.system.entries
+
+    def with_theta(self, theta: NDArray[np.float64]) -> VectorStateSpaceModel:
+        """The same model with other numbers, in the order of :attr:`vector`."""
+        return replace(self, system=self.system.at(theta))
+
+    def output_moves(
+        self,
+        factor: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        history: History,
+        measured: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """How free run and prediction move with its numbers; see the base class."""
+        return prediction_moves(self, factor, inputs, history, measured)
+
+    def innovation_responses(self, steps: int) -> NDArray[np.float64] | None:
+        """Of the outputs to innovations over some steps; see the base class."""
+        if not self.orders.noise:
+            return None
+        scale = np.array(self.scaling.output_scale)
+        found = responses_to_innovations(self.system.A, self.system.C, self.system.K, steps)
+        return np.asarray(scale[:, np.newaxis] * found / scale)
 
     @property
     def poles(self) -> NDArray[np.complex128]:

@@ -16,6 +16,8 @@ def moves_of(
     theta: NDArray[np.float64],
     factor: NDArray[np.float64],
     shape: tuple[int, ...],
+    *,
+    largest: float = np.inf,
 ) -> NDArray[np.float64]:
     """Derivatives of an output along directions of the parameters.
 
@@ -24,6 +26,8 @@ def moves_of(
         theta: The parameters, shape ``(n_parameters,)``.
         factor: The directions, one standard deviation each, shape ``(n_parameters, n_directions)``.
         shape: Of the output.
+        largest: Step of any parameter that is not exceeded, for parameters whose standard deviations may be beyond
+            where the output still follows a line.
 
     Returns:
         Shape ``(*shape, n_directions)``.
@@ -34,5 +38,6 @@ def moves_of(
     """
     found = np.zeros((*shape, factor.shape[1]))
     for at, column in enumerate(factor.T):
-        found[..., at] = (run(theta + APART * column) - run(theta - APART * column)) / (2.0 * APART)
+        step = min(APART, largest / max(float(np.abs(column).max(initial=0.0)), np.finfo(np.float64).tiny))
+        found[..., at] = (run(theta + step * column) - run(theta - step * column)) / (2.0 * step)
     return found

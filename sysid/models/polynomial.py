@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any, cast
 
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.history import History
+from sysid.models.innovation_moves import prediction_moves, responses_to_innovations
 from sysid.models.innovations import Innovations
 from sysid.models.lags import per_input, whole
 from sysid.models.mapping import Mapping
@@ -387,6 +389,41 @@ class PolynomialModel(AbstractModel):
     def recursion(self) -> StateSpace:
         """The form that is run."""
         return StateSpace.of(self.system, self.scaling, noise=self.orders.noise)
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """Its coefficients in scaled numbers."""
+        return self.theta
+
+    def with_theta(self, theta: NDArray[np.float64]) -> PolynomialModel:
+        """The same model with other numbers, in the order of :attr:`vector`."""
+        return replace(self, theta=theta)
+
+    def output_moves(
+        self,
+        factor: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        history: History,
+        measured: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """How free run and prediction move with its numbers; see the base class."""
+        return prediction_moves(self, factor, inputs, history, measured)
+
+    def innovation_responses(self, steps: int) -> NDArray[np.float64] | None:
+        """Of the outputs to innovations over some steps; see the base class."""
+        if not self.orders.noise:
+            return None
+        return responses_to_innovations(self.system.A, self.system.C, self.system.K, steps)
+
+    @property
+    def gains(self) -> Array:
+        """What each of its scaled coefficients is multiplied with in the channels' units."""
+        found, first = np.ones(len(self.theta)), 0
+        for j, nb in enumerate(self.orders.nb):
+            found[first : first + nb] = self.scaling.output_scale / self.scaling.input_scale[j]
+            first += nb
+        found[len(found) - self.orders.level :] = self.scaling.output_scale
+        return found
 
     @property
     def poles(self) -> NDArray[np.complex128]:

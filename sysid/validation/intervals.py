@@ -150,7 +150,13 @@ class CaseIntervals:
 
 
 def predict_interval(
-    fit: FitResult, trace: Trace, level: float = LEVEL, *, loop: Loop = Loop.CLOSED, start: Start | None = None
+    fit: FitResult,
+    trace: Trace,
+    level: float = LEVEL,
+    *,
+    loop: Loop = Loop.CLOSED,
+    steps: int = 1,
+    start: Start | None = None,
 ) -> OutputInterval:
     """A fitted model's output over a trace, with the interval in which the measured output is expected.
 
@@ -161,6 +167,8 @@ def predict_interval(
         trace: The trace; a free run reads its measured output only as the start allows.
         level: Probability that the interval holds the measured output at a sample, between 0 and 1.
         loop: ``CLOSED`` for the free run, ``OPEN`` for one step ahead.
+        steps: How far ahead, with ``loop=Loop.OPEN``; beyond one step of ARX models and of linear ones with a model of
+            the noise, whose innovations say what is added from step to step.
         start: What stands before the trace; as the fit was made where it knows (``sysid.fit``), else at rest.
 
     Returns:
@@ -168,7 +176,8 @@ def predict_interval(
 
     Raises:
         ChannelError: If the trace lacks a channel of the mapping.
-        ConfigError: If the fit has no posterior, or the level is not between 0 and 1.
+        ConfigError: If the fit has no posterior, the level is not between 0 and 1, or the model does not say what its
+            noise does over so many steps.
 
     Example:
         >>> from sysid.estimation import Training, fit_narx
@@ -199,8 +208,52 @@ def predict_interval(
     experiment = Experiment.for_model(trace, fit.model, start or _start_of(fit))
     closed = loop is Loop.CLOSED
     model, inputs, history = fit.model, experiment.inputs, experiment.history
+    if steps != 1:
+        return _ahead((fit.posterior, model), experiment, level, _steps(model, steps, loop))
     output = model.simulate(inputs, history) if closed else model.predict(inputs, experiment.output, history)
     return _interval((fit.posterior, model), experiment, output, loop, level)
+
+
+def _steps(model: AbstractModel, steps: int, loop: Loop) -> int:
+    """The steps, if there is an interval so far ahead."""
+    if loop is Loop.CLOSED or steps < 1:
+        raise ConfigError(
+            "a free run is not so many steps ahead" if loop is Loop.CLOSED else "not a number of steps",
+            where="steps",
+            expected="1, or with loop=Loop.OPEN a whole number from 1 on",
+            got=steps,
+            remedy="give loop=Loop.OPEN and steps=2, or leave steps out",
+        )
+    if model.innovation_responses(1) is None:
+        raise ConfigError(
+            "the model does not say what its noise does over several steps",
+            where="steps",
+            expected="an ARX model, or a linear one with a model of the noise",
+            got=model.structure.label,
+            remedy="leave steps out, or fit SS, ARMAX, BJ or ARX",
+        )
+    return steps
+
+
+def _ahead(fitted: tuple[Posterior, AbstractModel], experiment: Experiment, level: float, steps: int) -> OutputInterval:
+    """The interval some steps ahead of a model that says what its innovations do; as far as one step's is wrong."""
+    posterior, model = fitted
+    inputs, output, history = experiment.inputs, experiment.output, experiment.history
+    responses, sizes = model.innovation_responses(steps), np.atleast_1d(posterior.noise.one_step)
+    assert responses is not None  # noqa: S101 - asked before
+    errors = (output - model.predict(inputs, output, history)).reshape(len(output), -1)
+    counted = np.isfinite(errors).all(axis=1) & (True if experiment.weights is None else experiment.weights > 0.0)
+    # Errors of one sample hang together; how, the trace itself shows, where there are two outputs or more.
+    together = np.corrcoef(errors[counted].T) if len(sizes) > 1 and counted.sum() > len(sizes) else np.eye(len(sizes))
+    covariance = together * np.sqrt(np.outer(sizes, sizes))
+    noise = np.einsum("kij,jl,kil->i", responses, covariance, responses)
+    return OutputInterval(
+        output=model.predict(inputs, output, history, steps=steps),
+        parameter_deviation=np.sqrt(posterior.parameter_variance(model, experiment, Loop.OPEN, steps=steps)),
+        noise_deviation=np.sqrt(noise) if model.structure.several_outputs else float(np.sqrt(noise[0])),
+        spread=posterior.spread.one_step,
+        level=level,
+    )
 
 
 def _start_of(fit: FitResult) -> Start:

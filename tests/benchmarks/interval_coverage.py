@@ -20,10 +20,15 @@ import numpy as np
 
 from sysid.estimation import JointTraining, Training
 from sysid.estimation.estimators import fit
+from sysid.estimation.result import Loop
 from sysid.models import (
+    ARMAX,
     ARX,
+    BJ,
     NARX,
+    OE,
     AbstractStructure,
+    LinearStateSpace,
     Mapping,
     NeuralStateSpace,
     Start,
@@ -31,13 +36,15 @@ from sysid.models import (
     TransferFunction,
     VectorNARX,
     VectorNeuralStateSpace,
+    VectorStateSpace,
 )
 from sysid.traces import Channel, Role, Trace
+from sysid.validation import predict_interval
 from sysid.validation.evaluate import case_results
 from tests.benchmarks._findings import found
 from tests.estimation.linear_systems import trace_of
 
-SAMPLES = 300
+SAMPLES, AHEAD = 300, 5
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
 MAPPING, BOTH = Mapping.parse("u1 -> y"), Mapping.parse("u1 -> y+z")
 QUICK = Training(starts=1, max_iterations=60)
@@ -45,6 +52,12 @@ STRUCTURES: dict[str, tuple[AbstractStructure, Training | JointTraining | None, 
     "ARX": (ARX(na=2, nb=(1,), nk=(1,)), None, True),
     "TF": (TransferFunction(poles=(2,), zeros=(0,), delays=(1,)), None, False),
     "continuous TF": (TransferFunction(poles=(2,), zeros=(1,), delays=(0,), domain="continuous"), None, False),
+    "OE": (OE(nb=(1,), nf=(2,), nk=(1,)), None, False),
+    "BJ": (BJ(nb=(1,), nc=0, nd=1, nf=(2,), nk=(1,)), None, False),
+    "ARMAX": (ARMAX(na=2, nb=(1,), nc=1, nk=(1,)), None, True),
+    "SS": (LinearStateSpace(states=2), None, True),
+    "SS without noise model": (LinearStateSpace(states=2, noise=False), None, False),
+    "SS of two outputs": (VectorStateSpace(states=2), None, False),
     "NARX": (NARX(input_delays=1, output_delays=2, neurons=1), QUICK, True),
     "NSS": (NeuralStateSpace(states=2, neurons=1), QUICK, False),
     "NSS of two outputs": (VectorNeuralStateSpace(states=2, neurons=1), QUICK, False),
@@ -77,14 +90,14 @@ def record(rng: np.random.Generator, *, inside: bool) -> Trace:
 
 
 def shares(name: str, records: int) -> dict[str, list[float]]:
-    """Share of the samples that the intervals hold, record by record, of the free run and one step ahead.
+    """Share of the samples that the intervals hold, record by record, of the free run, one step and some steps ahead.
 
     Args:
         name: Of the structure.
         records: How many.
     """
     structure, training, inside = STRUCTURES[name]
-    held: dict[str, list[float]] = {"free run": [], "one step ahead": []}
+    held: dict[str, list[float]] = {"free run": [], "one step ahead": [], f"{AHEAD} steps ahead": []}
     for seed in range(records):
         rng = np.random.default_rng([seed, len(name)])
         estimation, other = record(rng, inside=inside), record(rng, inside=inside)
@@ -92,6 +105,10 @@ def shares(name: str, records: int) -> dict[str, list[float]]:
         fitted = fit([estimation], mapping, structure, training, start=ESTIMATED, stability=None)
         if fitted.posterior is None:
             continue
+        if fitted.model.innovation_responses(1) is not None:
+            ahead = predict_interval(fitted, other, loop=Loop.OPEN, steps=AHEAD, start=ESTIMATED)
+            for name_of, interval in zip(mapping.outputs, ahead.of_outputs(), strict=True):
+                held[f"{AHEAD} steps ahead"].append(interval.coverage(other[name_of][-len(interval.output) :]).share)
         cases = case_results(fitted.model, other, Role.VALIDATION, ESTIMATED, 1, posterior=fitted.posterior)
         for case in cases.values():
             if case.intervals is not None:

@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid.estimation import Posterior
+from sysid.errors import ConfigError
+from sysid.estimation import Posterior, StateSpaceTraining
 from sysid.estimation.estimators import fit
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.result import Loop
-from sysid.models import ARX, Mapping, Start, TransferFunction
+from sysid.models import ARMAX, ARX, LinearStateSpace, Mapping, Start, TransferFunction
 from sysid.models.transfer_function import TransferFunctionModel
 from sysid.validation import predict_interval
-from tests.benchmarks.interval_coverage import ESTIMATED, STRUCTURES, record, shares
+from tests.benchmarks.interval_coverage import BOTH, ESTIMATED, STRUCTURES, record, shares
 from tests.estimation.linear_systems import trace_of
 
 MAPPING = Mapping.parse("u1 -> y")
@@ -41,6 +42,72 @@ def test_polynomials_move_the_output_as_the_model_itself_does(domain: str) -> No
     larger = replace(model, taps=tuple(1.01 * taps for taps in model.taps))
     expected = (larger.simulate(run.inputs, run.history) - model.simulate(run.inputs, run.history)) / 0.01
     np.testing.assert_allclose(moves, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["OE", "BJ", "ARMAX", "SS", "SS of two outputs"])
+@pytest.mark.parametrize("loop", Loop)
+def test_runs_of_drawn_parameters_spread_as_the_interval_says(name: str, loop: Loop) -> None:
+    structure, _, inside = STRUCTURES[name]
+    trace = record(np.random.default_rng(5), inside=inside)
+    mapping = BOTH if structure.several_outputs else MAPPING
+    found = fit([trace], mapping, structure, start=ESTIMATED, stability=None)
+    model, run = found.model, Experiment.for_model(trace, found.model, ESTIMATED)
+    assert found.posterior is not None
+    assert model.vector is not None
+    if loop is Loop.OPEN and not model.recursion.predicts:
+        assert np.isnan(found.posterior.parameter_variance(model, run, loop)).all()
+        return
+    variance, rng, drawn = found.posterior.parameter_variance(model, run, loop), np.random.default_rng(6), []
+    for _ in range(200):
+        other = model.with_theta(
+            model.vector + found.posterior.factor @ rng.normal(size=found.posterior.factor.shape[1])
+        )
+        assert other is not None
+        if loop is Loop.CLOSED:
+            drawn.append(other.simulate(run.inputs, run.history))
+        else:
+            drawn.append(other.predict(run.inputs, run.output, run.history))
+    ratio = np.var(drawn, axis=0).mean() / variance.mean()
+    assert 0.7 < ratio < 1.4
+
+
+@pytest.mark.parametrize("name", ["ARX", "BJ", "ARMAX", "SS", "SS of two outputs"])
+def test_some_steps_ahead_the_innovations_add_up(name: str) -> None:
+    structure, _, inside = STRUCTURES[name]
+    trace, other = (record(np.random.default_rng(seed), inside=inside) for seed in (7, 8))
+    mapping = BOTH if structure.several_outputs else MAPPING
+    found = fit([trace], mapping, structure, start=ESTIMATED, stability=None)
+    one, many = (predict_interval(found, other, loop=Loop.OPEN, steps=k, start=ESTIMATED) for k in (1, 4))
+    assert np.all(np.asarray(many.noise_deviation) > one.noise_deviation)
+    measured = other.columns(mapping.outputs)[-len(many.output) :]
+    errors = many.output.reshape(measured.shape) - measured
+    np.testing.assert_allclose(errors.std(axis=0), many.noise_deviation, rtol=0.25)
+    # An innovation that is added to a measured output moves the predictions after it by the responses.
+    run, responses = Experiment.for_model(other, found.model, ESTIMATED), found.model.innovation_responses(3)
+    assert responses is not None
+    pushed = run.output.copy()
+    pushed[100] += 1.0  # of every output
+    before, after = (found.model.predict(run.inputs, y, run.history) for y in (run.output, pushed))
+    np.testing.assert_allclose((after - before)[101], np.squeeze(responses[1].sum(axis=1)), atol=1e-9)
+
+
+def test_steps_beyond_what_a_model_says_of_its_noise_are_refused() -> None:
+    trace = record(np.random.default_rng(9), inside=False)
+    found = fit([trace], MAPPING, STRUCTURES["OE"][0], start=ESTIMATED, stability=None)
+    with pytest.raises(ConfigError, match="what its noise does over several steps"):
+        predict_interval(found, trace, loop=Loop.OPEN, steps=3, start=ESTIMATED)
+    with pytest.raises(ConfigError, match="free run"):
+        predict_interval(found, trace, steps=3, start=ESTIMATED)
+
+
+def test_of_a_noise_that_drifts_and_of_a_subspace_method_there_is_none_and_it_says_so() -> None:
+    trace = record(np.random.default_rng(10), inside=True)
+    alone = StateSpaceTraining(method="subspace")
+    drifting = ARMAX(na=2, nb=(1,), nc=0, nk=(1,), integrated=True)
+    for structure, training, why in ((drifting, None, "drifts"), (LinearStateSpace(states=2), alone, "subspace")):
+        found = fit([trace], MAPPING, structure, training, start=ESTIMATED, stability=None)
+        assert found.posterior is None
+        assert any(note.startswith("No interval of the output") and why in note for note in found.notes)
 
 
 def test_of_a_plant_that_grows_without_bound_there_is_none_and_it_says_so() -> None:

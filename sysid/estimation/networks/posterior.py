@@ -56,6 +56,7 @@ from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.nonparametric.noise import persistence
 from sysid.estimation.result import Evidence, Loop
 from sysid.models import AbstractModel, Recursion
+from sysid.models.innovation_moves import prediction_moves
 
 CALIBRATED_AT = 0.95
 """The level at which the spread is found."""
@@ -108,13 +109,16 @@ class Posterior:
         """Of the flat parameters, shape ``(n_parameters, n_parameters)``."""
         return np.asarray(self.factor @ self.factor.T)
 
-    def parameter_variance(self, model: AbstractModel, experiment: Experiment, loop: Loop) -> NDArray[np.float64]:
+    def parameter_variance(
+        self, model: AbstractModel, experiment: Experiment, loop: Loop, *, steps: int = 1
+    ) -> NDArray[np.float64]:
         """The part of an output's variance that is due to the parameters.
 
         Args:
             model: The model that the posterior belongs to.
             experiment: Inputs, history and, one step ahead, the measured output.
             loop: ``CLOSED`` for the free run.
+            steps: How far ahead, where it is not the free run; beyond one of linear models.
 
         Returns:
             Of the output's shape, in its unit squared; NaN one step ahead where there is no such run.
@@ -124,7 +128,8 @@ class Posterior:
             return np.full(experiment.output.shape, np.nan)
         with np.errstate(all="ignore"):  # what the data leave open may move the output beyond all numbers
             measured = None if loop is Loop.CLOSED else experiment.output
-            moves = model.output_moves(self.factor, experiment.inputs, experiment.history, measured)
+            given = (self.factor, experiment.inputs, experiment.history, measured)
+            moves = model.output_moves(*given) if steps == 1 else prediction_moves(model, *given, steps=steps)
             if moves is not None:
                 variance = np.einsum("...j,...j->...", moves, moves)
                 return np.where(np.isfinite(variance), variance, np.inf)

@@ -251,11 +251,7 @@ def _differenced(piece: Segment) -> Segment:
 def _uncertainty(model: PolynomialModel, at: Linearisation, n: int, noise_variance: float) -> Uncertainty:
     """What the prediction errors say about the coefficients, in the channels' units."""
     names, P = model.orders.names(model.mapping.inputs), len(model.theta)
-    gains, first = np.ones(P), 0
-    for j, nb in enumerate(model.orders.nb):
-        gains[first : first + nb] = model.scaling.output_scale / model.scaling.input_scale[j]
-        first += nb
-    gains[P - model.orders.level :] = model.scaling.output_scale
+    gains = model.gains
     values = gains * model.theta
     values[P - model.orders.level :] += model.scaling.output_offset
     root, scaled = at.scaled()

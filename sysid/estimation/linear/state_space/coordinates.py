@@ -41,7 +41,8 @@ class Chart:
 
     Args:
         base: The system at zero.
-        basis: Directions of all matrices, in the order of :func:`flat`, shape ``(n_entries, n_parameters)``.
+        basis: Directions of all matrices, in the order of :attr:`Innovations.entries`, shape ``(n_entries,
+            n_parameters)``.
     """
 
     base: Innovations
@@ -68,7 +69,7 @@ class Chart:
                 E[a, b] = 1.0
                 of_A, of_C = E @ base.A - base.A @ E, -base.C @ E
                 changes.append(_joined(of_A, E @ base.B, of_C, 0.0 * base.D, E @ base.K, 0.0 * base.constant)[fitted])
-        directions = np.eye(len(flat(base)))[:, fitted]
+        directions = np.eye(len(base.entries))[:, fitted]
         if not changes:
             return cls(base=base, basis=directions)
         Q, R, _ = linalg.qr(np.array(changes).T, pivoting=True)
@@ -91,7 +92,7 @@ class Chart:
 
     def system(self, theta: Array) -> Innovations:
         """The system at a vector."""
-        return split(flat(self.base) + self.basis @ theta, self.base)
+        return self.base.at(self.base.entries + self.basis @ theta)
 
     def directions(self, theta: Array) -> Directions:
         """Derivatives of each matrix with respect to the vector: the basis, wherever one stands."""
@@ -114,19 +115,6 @@ class Directions:
     D: Array
     K: Array
     constant: Array
-
-
-def flat(system: Innovations) -> Array:
-    """Every entry of every matrix, row by row: ``A``, ``B``, ``C``, ``D``, ``K``, the constant."""
-    return _joined(system.A, system.B, system.C, system.D, system.K, system.constant)
-
-
-def split(entries: Array, like: Innovations) -> Innovations:
-    """The system with these entries."""
-    shapes = [part.shape for part in (like.A, like.B, like.C, like.D, like.K, like.constant)]
-    parts = np.split(entries, np.cumsum([int(np.prod(shape)) for shape in shapes])[:-1])
-    A, B, C, D, K, constant = (part.reshape(shape) for part, shape in zip(parts, shapes, strict=True))
-    return Innovations(A=A, B=B, C=C, D=D, K=K, constant=constant)
 
 
 def _joined(*parts: Array) -> Array:

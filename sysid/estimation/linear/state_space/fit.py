@@ -7,13 +7,14 @@ from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, side_by_side
-from sysid.estimation.linear.state_space.search import METHODS, Found, StateSpaceTraining, search
-from sysid.estimation.linear.state_space.uncertainty import state_space_uncertainty
+from sysid.estimation.linear.state_space.search import METHODS, Found, StateSpaceTraining, around, search
+from sysid.estimation.linear.state_space.uncertainty import coordinates_root, state_space_uncertainty
 from sysid.estimation.result import FitResult, Loop
 from sysid.models import (
     LinearStateSpace,
@@ -156,6 +157,25 @@ def records_of(
     scalings = [scaling_of(experiments, constant=orders.intercept) for experiments in each]
     segments = side_by_side([segments_of(e, scaling) for e, scaling in zip(each, scalings, strict=True)])
     return scalings, segments
+
+
+def matrices_root(
+    model: LinearStateSpaceModel | VectorStateSpaceModel, traces: Sequence[Trace], start: Start
+) -> NDArray[np.float64]:
+    """A factor of the covariance of a fitted model's matrices, along what changes the system.
+
+    Args:
+        model: The model, at the least prediction error of the traces.
+        traces: Estimation traces.
+        start: What stands before each.
+
+    Returns:
+        Shape ``(n_entries, n_directions)``, entries as :attr:`sysid.models.innovations.Innovations.entries`.
+    """
+    rests = tuple(float(rest) for rest in model.ends.rest_outputs)
+    _, segments = records_of(traces, model.mapping, model.orders, start=start, rests=rests)
+    found = around(model.system, segments, model.orders)
+    return np.asarray(found.chart.basis @ coordinates_root(found))
 
 
 def _result(

@@ -137,9 +137,7 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         TraceError: If no record is long enough.
         FitDivergedError: If no start gives a finite prediction.
     """
-    began = time.perf_counter()
-    whole = tuple(piece for segment in segments for piece in segment.pieces()) if orders.noise else tuple(segments)
-    whole = tuple(piece for piece in whole if len(piece) > orders.states)
+    began, whole = time.perf_counter(), _whole(segments, orders)
     # BLAS threads that wake for matrices of this size cost more than they give.
     with threadpool_limits(1, "blas"):
         subspace = Subspace.of(
@@ -162,6 +160,27 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         errors = None if orders.noise else problem.around_errors(found.system)
     told = slow_poles.notes(found.system.radius, problem.lengths, errors)
     return replace(found, singular_values=subspace.singular_values(), notes=told)
+
+
+def around(system: Innovations, segments: Sequence[Segment], orders: LinearStateSpace) -> Found:
+    """A system that was found, linearised again on its records.
+
+    Args:
+        system: In scaled numbers.
+        segments: The records, in scaled numbers.
+        orders: The structure.
+
+    Returns:
+        What :func:`search` found, but for how it went.
+    """
+    with threadpool_limits(1, "blas"):
+        return _Problem(segments=_whole(segments, orders), orders=orders, stable=False).at(system)
+
+
+def _whole(segments: Sequence[Segment], orders: LinearStateSpace) -> tuple[Segment, ...]:
+    """The records that errors are counted on; a filter begins anew after a gap."""
+    whole = tuple(piece for segment in segments for piece in segment.pieces()) if orders.noise else tuple(segments)
+    return tuple(piece for piece in whole if len(piece) > orders.states)
 
 
 def _better(inside: Found, beyond: Found, problem: _Problem) -> Found:
@@ -310,21 +329,24 @@ class _Problem:
             if status in {Status.TIME_LIMIT, Status.INTERRUPTED} or gained <= 1e-6 * solution.curve[0].mse:
                 break
             whitening = self._whitening(system)
-        system = system.balanced()
+        if status in {Status.NOT_IMPROVED, Status.STALLED} and curve:
+            status = Status.CONVERGED  # a later chart found nothing more to gain
+        found = self.at(system.balanced(), minimised=iterations > 0)
+        return replace(found, status=status, curve=tuple(curve) or found.curve)
+
+    def at(self, system: Innovations, *, minimised: bool = True) -> Found:
+        """A system with its linearisation; where nothing was minimised, nothing is said of uncertainty."""
         chart = self.around(system)
         errors = self.errors(chart, self._whitening(system))
         zero = np.zeros(chart.n_parameters)
-        if iterations == 0:  # nothing was minimised, and nothing is said of uncertainty
-            at = Linearisation(loss=errors.loss(zero), gradient=zero, gauss_newton=np.eye(len(zero)))
-        else:
+        if minimised:
             at = errors.linearise(zero)
-        if status in {Status.NOT_IMPROVED, Status.STALLED} and curve:
-            status = Status.CONVERGED  # a later chart found nothing more to gain
+        else:
+            at = Linearisation(loss=errors.loss(zero), gradient=zero, gauss_newton=np.eye(len(zero)))
         mse = 2.0 * at.loss / max(errors.n_samples, 1)
-        if not curve:
-            curve = [Iteration(iteration=0, mse=mse, damping=0.0, effective_parameters=np.nan, elapsed_s=0.0)]
+        curve = (Iteration(iteration=0, mse=mse, damping=0.0, effective_parameters=np.nan, elapsed_s=0.0),)
         return Found(
-            system=system, chart=chart, n_samples=errors.n_samples, at=at, status=status, curve=tuple(curve),
+            system=system, chart=chart, n_samples=errors.n_samples, at=at, status=Status.EXACT, curve=curve,
             covariance=errors.covariance(system), weighting=Weighting.CVA, singular_values=np.zeros(0),
         )  # fmt: skip
 

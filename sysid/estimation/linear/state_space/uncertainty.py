@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.estimation.linear.state_space.coordinates import flat, split
 from sysid.estimation.linear.state_space.search import Found
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import LinearStateSpaceModel, VectorStateSpaceModel
@@ -20,6 +19,9 @@ Array = NDArray[np.float64]
 STEP = 1e-30
 """Of a derivative along the imaginary axis, which has no rounding."""
 
+LEFT_OPEN = 1e-14
+"""Curvature of a direction, relative to the largest, below which the data leave it open."""
+
 
 def coordinates_covariance(found: Found) -> Array:
     """Covariance of the local coordinates at the least prediction error; NaN where the data leave one open.
@@ -30,14 +32,24 @@ def coordinates_covariance(found: Found) -> Array:
     Returns:
         Shape ``(n_parameters, n_parameters)``.
     """
-    P = found.chart.n_parameters
-    variance = 2.0 * found.at.loss / max(found.n_samples - P, 1)
+    half, P = coordinates_root(found), found.chart.n_parameters
+    return np.asarray(half @ half.T) if half.shape[1] == P else np.full((P, P), np.nan)
+
+
+def coordinates_root(found: Found) -> Array:
+    """A factor of that covariance, over the directions that the data determine.
+
+    Args:
+        found: The fit.
+
+    Returns:
+        Shape ``(n_parameters, n_directions)``.
+    """
+    deviation = np.sqrt(2.0 * found.at.loss / max(found.n_samples - found.chart.n_parameters, 1))
     root, scaled = found.at.scaled()
     sizes, vectors = linalg.eigh(scaled)
-    if not sizes[0] > 1e-14 * sizes[-1]:
-        return np.full((P, P), np.nan)
-    half = vectors / np.sqrt(sizes) / root[:, np.newaxis]
-    return np.asarray(variance * (half @ half.T))
+    kept = sizes > LEFT_OPEN * sizes[-1]
+    return np.asarray(deviation * vectors[:, kept] / np.sqrt(sizes[kept]) / root[:, np.newaxis])
 
 
 def derivatives(found: Found, function: Callable[[Innovations], NDArray[np.complex128]]) -> Array:
@@ -50,10 +62,8 @@ def derivatives(found: Found, function: Callable[[Innovations], NDArray[np.compl
     Returns:
         Shape ``(n_numbers, n_parameters)``.
     """
-    base = flat(found.system)
-    columns = [
-        function(split(base + 1j * STEP * direction, found.system)).imag / STEP for direction in found.chart.basis.T
-    ]
+    base = found.system.entries
+    columns = [function(found.system.at(base + 1j * STEP * direction)).imag / STEP for direction in found.chart.basis.T]
     return np.column_stack(columns)
 
 

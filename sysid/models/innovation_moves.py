@@ -1,0 +1,79 @@
+"""How predictions of linear models move with their parameters, and what innovations add to them over some steps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models.moves import moves_of
+
+if TYPE_CHECKING:
+    from sysid.models.base import AbstractModel
+    from sysid.models.history import History
+
+LARGEST = 1e-4
+"""Step of an entry of a scaled system: poles near the unit circle do not follow a line much farther."""
+
+
+def prediction_moves(
+    model: AbstractModel,
+    factor: NDArray[np.float64],
+    inputs: NDArray[np.float64],
+    history: History,
+    measured: NDArray[np.float64] | None,
+    *,
+    steps: int = 1,
+) -> NDArray[np.float64]:
+    """Derivatives of a model's output along directions of its flat parameters, the state before found anew for each.
+
+    Args:
+        model: A model with :attr:`~sysid.models.base.AbstractModel.vector` and ``with_theta``.
+        factor: The directions, shape ``(n_parameters, n_directions)``.
+        inputs: Shape ``(n_samples, n_inputs)``.
+        history: The samples before.
+        measured: Output from which it is predicted, of its shape; ``None`` for the free run.
+        steps: How far ahead.
+
+    Returns:
+        Shape ``(n_samples, n_directions)``, of several outputs ``(n_samples, n_outputs, n_directions)``.
+    """
+    theta = model.vector
+    assert theta is not None  # noqa: S101 - of such models alone
+
+    def run(moved: NDArray[np.float64]) -> NDArray[np.float64]:
+        other = model.with_theta(moved)
+        assert other is not None  # noqa: S101
+        if measured is None:
+            return other.simulate(inputs, history)
+        return other.predict(inputs, measured, history, steps=steps)
+
+    outputs = (len(model.mapping.outputs),) if model.structure.several_outputs else ()
+    return moves_of(run, theta, factor, (len(inputs), *outputs), largest=LARGEST)
+
+
+def responses_to_innovations(
+    A: NDArray[np.float64], C: NDArray[np.float64], K: NDArray[np.float64], steps: int
+) -> NDArray[np.float64]:
+    r"""What an innovation does to the outputs now and later: :math:`I, CK, CAK, CA^2K, \dots`.
+
+    Args:
+        A: Shape ``(n_state, n_state)``.
+        C: Shape ``(n_outputs, n_state)``.
+        K: Shape ``(n_state, n_outputs)``.
+        steps: How many.
+
+    Returns:
+        Shape ``(steps, n_outputs, n_outputs)``. The variance of a prediction ``k`` steps ahead is that of the first
+        ``k`` of them (Ljung 1999, "System Identification", section 3.2).
+
+    Example:
+        >>> responses_to_innovations(np.array([[0.5]]), np.eye(1), np.array([[0.5]]), 3).ravel().tolist()
+        [1.0, 0.5, 0.25]
+    """
+    found, state = [np.eye(len(C))], K
+    for _ in range(steps - 1):
+        found.append(C @ state)
+        state = A @ state
+    return np.array(found)
