@@ -25,18 +25,21 @@ WORDS = (
 )
 """What is imported when it is first used: ``sysid --help`` loads none of it."""
 
-SEARCH = "auto"
-"""The word that stands on a pipeline: it is above the others."""
+ABOVE = {
+    "auto": "sysid.workbench.auto.python",
+    "experiment": "sysid.workbench.experiments.python",
+}
+"""Words that stand on a pipeline, which is above the others, and where each is."""
 
 
 def __getattr__(name: str) -> Any:
     """A word of the short way, imported now."""
-    if name not in (*WORDS, SEARCH):
+    if name not in (*WORDS, *ABOVE):
         raise AttributeError(f"module 'sysid' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module("sysid.workbench.auto.python" if name == SEARCH else "sysid.api"), name)
+    return getattr(import_module(ABOVE.get(name, "sysid.api")), name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *WORDS, SEARCH})
+    return sorted({*globals(), *WORDS, *ABOVE})

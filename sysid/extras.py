@@ -29,6 +29,7 @@ EXTRAS = {
     "psycopg": "postgres",
     "ziglang": "fmu-cross",
     "casadi": "casadi",
+    "fmpy": "fmu",
 }
 """Our extra by the name that is imported."""
 

@@ -91,6 +91,9 @@ KINDS: dict[str, Kind] = {
         program="sysid.workbench.assembly.runner:program",
     ),
     "auto": Kind(config="sysid.workbench.auto.config:AutoConfig", program="sysid.workbench.auto.run:program"),
+    "experiment": Kind(
+        config="sysid.workbench.experiments.config:ExperimentConfig", program="sysid.workbench.experiments.run:program"
+    ),
     "sweep": Kind(config="sysid.workbench.sweep.config:SweepConfig", program="sysid.workbench.sweep.run:program"),
 }
 """The kinds by name."""

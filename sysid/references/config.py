@@ -1,0 +1,192 @@
+"""What a reference is, as it stands in YAML: what it is run by, its ports, its sample time and its limits."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from sysid.errors import UnitError
+from sysid.units import check_unit
+from sysid.yaml_files import FieldError
+
+MOST_SAMPLES = 5_000_000
+"""Of one run."""
+
+
+def _unit(text: str) -> str:
+    try:
+        return check_unit(text)
+    except UnitError as error:
+        raise FieldError(
+            error.what, expected=error.expected, got=error.got, remedy=error.remedy or "correct the unit"
+        ) from None
+
+
+def _range(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] < pair[1]:
+        raise FieldError(
+            "not a range", expected="two rising numbers, as [0, 10]", got=str(list(pair)), remedy="correct the range"
+        )
+    return pair
+
+
+Unit = Annotated[str, AfterValidator(_unit)]
+Span = Annotated[tuple[float, float], AfterValidator(_range)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class InputPort(_Strict):
+    """An input that experiments move.
+
+    Args:
+        unit: Its unit.
+        range: Levels, never left.
+        rate: Largest change in a second, in its unit; ``None`` for steps.
+        levels: The only levels that it may have, where it cannot have all in its range.
+        start: Where every experiment begins; the middle of the range by default.
+    """
+
+    unit: Unit = "1"
+    range: Span
+    rate: Annotated[float, Field(gt=0.0)] | None = None
+    levels: tuple[float, ...] | None = None
+    start: float | None = None
+
+    @model_validator(mode="after")
+    def _within(self) -> InputPort:
+        low, high = self.range
+        inside = [*(self.levels or ()), *([] if self.start is None else [self.start])]
+        outside = [value for value in inside if not low <= value <= high]
+        if outside or self.levels == ():
+            raise FieldError(
+                "a level or the start is outside the range" if outside else "no level is allowed",
+                expected=f"numbers from {low:g} to {high:g}", got=", ".join(f"{v:g}" for v in outside) or "none",
+                remedy="correct levels, start or range",
+            )  # fmt: skip
+        return self
+
+    @property
+    def begin(self) -> float:
+        """Where experiments begin: one of the levels where there are some."""
+        wish = 0.5 * sum(self.range) if self.start is None else self.start
+        return wish if self.levels is None else min(self.levels, key=lambda level: abs(level - wish))
+
+
+class ParameterPort(_Strict):
+    """A parameter that differs from experiment to experiment; a constant input of the surrogate.
+
+    Args:
+        unit: Its unit.
+        range: Its values.
+    """
+
+    unit: Unit = "1"
+    range: Span
+
+
+class OutputPort(_Strict):
+    """An output that the surrogate is to have.
+
+    Args:
+        unit: Its unit.
+    """
+
+    unit: Unit = "1"
+
+
+class ReferenceConfig(_Strict):
+    """A slow model that can be run. One of ``fmu``, ``python`` and ``program`` says by what.
+
+    Args:
+        fmu: File of an FMU, version 2.0 or 3.0. **It is code**, and runs with your rights.
+        interface: Which half of an FMU is run, where it has both.
+        python: A function as ``package.module:function``. It is called as ``function(time, inputs, parameters)``: times
+            of the samples in seconds, shape ``(n,)``; inputs, shape ``(n, n_inputs)``; parameters by name. It gives the
+            outputs, shape ``(n, n_outputs)``, each of the instant at which its inputs hold.
+        program: A command line as a list; ``{inputs}`` and ``{outputs}`` in it stand for the files that are passed, and
+            ``{name}`` for a parameter. No shell is in between.
+        format: Of the files of a program.
+        files: Further files that a result depends on, such as the program's own input: a change of them runs anew.
+        folder: Where modules are found and programs run, relative to the YAML; the YAML's folder by default.
+        sample_time: Seconds between samples.
+        inputs: By name.
+        parameters: By name; those that vary.
+        constants: Parameters that are set and do not vary, by name.
+        outputs: By name.
+        settling: Seconds that the reference is run at the start of its inputs before a record begins.
+        time_limit: Seconds that one run may take.
+        cost: Processor seconds that one run takes, where that is known before any is made.
+    """
+
+    fmu: str | None = None
+    interface: Literal["co-simulation", "model-exchange"] | None = None
+    python: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")] | None = None
+    program: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    format: Literal["csv", "parquet"] = "csv"
+    files: tuple[str, ...] = ()
+    folder: str = "."
+    sample_time: Annotated[float, Field(gt=0.0)]
+    inputs: dict[str, InputPort] = Field(default_factory=dict)
+    parameters: dict[str, ParameterPort] = Field(default_factory=dict)
+    constants: dict[str, float] = Field(default_factory=dict)
+    outputs: Annotated[dict[str, OutputPort], Field(min_length=1)]
+    settling: Annotated[float, Field(ge=0.0)] = 0.0
+    time_limit: Annotated[float, Field(gt=0.0)] = 60.0
+    cost: Annotated[float, Field(gt=0.0)] | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ReferenceConfig:
+        named = [name for name in ("fmu", "python", "program") if getattr(self, name) is not None]
+        if len(named) != 1:
+            raise FieldError(
+                "a reference is run by one thing", expected="one of fmu, python and program",
+                got=" and ".join(named) or "none of them", remedy="name what is run, and nothing else",
+            )  # fmt: skip
+        names = [*self.inputs, *self.parameters, *self.constants, *self.outputs]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise FieldError(
+                f"{twice[0]} is named twice", expected="a name for each port", got=", ".join(names),
+                remedy="an input, a parameter, a constant or an output: say which it is",
+            )  # fmt: skip
+        if not self.inputs and not self.parameters:
+            raise FieldError(
+                "nothing of the reference can be varied", expected="an input or a parameter", got="neither",
+                remedy="name an input under inputs, or a parameter that varies under parameters, with its range",
+            )  # fmt: skip
+        return self
+
+    @property
+    def kind(self) -> str:
+        """By what it is run: ``fmu``, ``python`` or ``program``."""
+        return next(name for name in ("fmu", "python", "program") if getattr(self, name) is not None)
+
+    @property
+    def begin(self) -> NDArray[np.float64]:
+        """Where inputs begin, shape ``(n_inputs,)``."""
+        return np.array([port.begin for port in self.inputs.values()])
+
+    def at(self, folder: Path) -> ReferenceConfig:
+        """The same with its folder and its FMU as whole paths.
+
+        Args:
+            folder: Of the YAML.
+
+        Returns:
+            It.
+        """
+        place = (Path(folder) / self.folder).resolve()
+        fmu = None if self.fmu is None else str((place / self.fmu).resolve())
+        return self.model_copy(update={"folder": str(place), "fmu": fmu})
+
+
+PLACEHOLDER = re.compile(r"\{([^{}]*)\}")
+"""In the command line of a program."""

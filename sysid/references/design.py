@@ -1,0 +1,249 @@
+"""Which experiments to run: excitations within ranges and rates, parameters spread evenly over theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from scipy.stats import qmc
+
+from sysid.excitation import excite
+from sysid.excitation.kinds import KINDS, kind_of
+from sysid.references.config import InputPort, ReferenceConfig
+from sysid.references.runs import Case
+from sysid.yaml_files import FieldError
+
+OWN = ("events",)
+"""Signals that are drawn here, beside those of :mod:`sysid.excitation`."""
+USUAL = ("aprbs", "ramps", "multisine", "events", "aprbs", "staircase")
+PREFIX = {"estimation": "EST", "selection": "SEL", "test": "TST"}
+
+
+class Excited(BaseModel):
+    """A kind of signal.
+
+    Args:
+        kind: Of :mod:`sysid.excitation` (``aprbs``, ``prbs``, ``multisine``, ``noise``, ``chirp``, ``staircase``,
+            ``ramps``, ``sine``, ``pulses``), or ``events``: away from the start to random levels, with rest between.
+        options: Of the kind, as :func:`sysid.excite` takes them.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    kind: str
+    options: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _known(self) -> Excited:
+        if self.kind not in {*KINDS, *OWN} or (self.kind in OWN and self.options):
+            raise FieldError(
+                "there is no such excitation, or it has no options", expected=", ".join([*KINDS, *OWN]), got=self.kind,
+                remedy="name one of these; events follow hold and have no options",
+            )  # fmt: skip
+        return self
+
+
+class Counts(BaseModel):
+    """How many experiments of each role.
+
+    Args:
+        estimation: That are fitted.
+        selection: That choose between models.
+        test: That neither is done on.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    estimation: Annotated[int, Field(ge=1, le=100_000)] = 12
+    selection: Annotated[int, Field(ge=0, le=100_000)] = 4
+    test: Annotated[int, Field(ge=0, le=100_000)] = 4
+
+
+class Design(BaseModel):
+    """What is run.
+
+    Args:
+        duration: Seconds of each experiment.
+        runs: How many, by role.
+        excitations: Signals, dealt in turn; each as its name, or with options.
+        hold: Shortest and longest time in seconds at a level; a fiftieth and a tenth of the duration by default.
+        lead: Seconds at the start of the inputs before anything moves; one sample at least, half the shortest hold by
+            default.
+        sampling: How parameters are spread: ``sobol`` or ``latin-hypercube``.
+        seed: Of everything random.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    duration: Annotated[float, Field(gt=0.0)]
+    runs: Counts = Counts()
+    excitations: tuple[Excited, ...] = tuple(Excited(kind=kind) for kind in USUAL)
+    hold: tuple[float, float] | None = None
+    lead: Annotated[float, Field(ge=0.0)] | None = None
+    sampling: Literal["sobol", "latin-hypercube"] = "sobol"
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short(cls, values: Any) -> Any:
+        given = values.get("excitations") if isinstance(values, dict) else None
+        if isinstance(given, list | tuple):
+            short = [{"kind": one} if isinstance(one, str) else one for one in given]
+            return {**values, "excitations": short}
+        return values
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Design:
+        if not self.excitations or (self.hold is not None and not 0.0 < self.hold[0] <= self.hold[1]):
+            raise FieldError(
+                "no excitation, or no times to hold", expected="an excitation; hold as two rising seconds, above 0",
+                got=str(self.hold), remedy="correct excitations or hold",
+            )  # fmt: skip
+        return self
+
+    def holds(self, sample_time: float) -> tuple[int, int]:
+        """Shortest and longest time at a level in samples."""
+        low, high = self.hold or (self.duration / 50.0, self.duration / 10.0)
+        shortest = max(1, round(low / sample_time))
+        return shortest, max(shortest, round(high / sample_time))
+
+
+def designed(config: ReferenceConfig, design: Design) -> dict[str, list[Case]]:
+    """The experiments of a design.
+
+    Args:
+        config: The reference.
+        design: What is run.
+
+    Returns:
+        By role; no two have the same random numbers.
+    """
+    counts = {role: getattr(design.runs, role) for role in PREFIX}
+    return {
+        role: drawn(config, design, count, seed=(design.seed, place), prefix=PREFIX[role])
+        for place, (role, count) in enumerate(counts.items())
+        if count
+    }
+
+
+def drawn(config: ReferenceConfig, design: Design, count: int, *, seed: Sequence[int], prefix: str) -> list[Case]:
+    """Some experiments.
+
+    Args:
+        config: The reference.
+        design: What each is.
+        count: How many.
+        seed: Of everything random; others give others.
+        prefix: Of their names.
+
+    Returns:
+        The experiments.
+    """
+    parameters = _spread(config, design, count, np.random.default_rng([*seed, 1]))
+    seeds = np.random.default_rng([*seed, 2]).integers(2**31, size=count)
+    width = max(3, len(str(count)))
+    cases = []
+    for k in range(count):
+        kind = design.excitations[k % len(design.excitations)]
+        values = {name: float(x) for name, x in zip(config.parameters, parameters[k], strict=True)}
+        said = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
+        cases.append(
+            Case(
+                name=f"{prefix}{k + 1:0{width}d}",
+                inputs=moved(config, design, kind, int(seeds[k])),
+                parameters=values,
+                told=f"{kind.kind}, seed {seeds[k]}" + (f", {said}" if said else ""),
+            )
+        )
+    return cases
+
+
+def _spread(config: ReferenceConfig, design: Design, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    ranges = np.array([port.range for port in config.parameters.values()]).reshape(-1, 2)
+    if not len(ranges):
+        return np.zeros((count, 0))
+    if design.sampling == "sobol":
+        power = int(np.ceil(np.log2(max(count, 1))))
+        unit = qmc.Sobol(len(ranges), rng=rng).random_base2(power)[:count]
+    else:
+        unit = qmc.LatinHypercube(len(ranges), rng=rng).random(count)
+    return np.asarray(ranges[:, 0] + unit * (ranges[:, 1] - ranges[:, 0]))
+
+
+def moved(config: ReferenceConfig, design: Design, excited: Excited, seed: int) -> NDArray[np.float64]:
+    """The inputs of an experiment.
+
+    Args:
+        config: The reference.
+        design: Its length and times.
+        excited: The kind of signal.
+        seed: Of everything random.
+
+    Returns:
+        Shape ``(n_samples, n_inputs)``: within the ranges, rates and levels, and at the start before anything moves.
+    """
+    h, ports = config.sample_time, list(config.inputs.values())
+    samples = max(4, round(design.duration / h))
+    shortest, longest = design.holds(h)
+    lead = min(samples - 2, max(1, shortest // 2 if design.lead is None else round(design.lead / h)))
+    if not ports:
+        return np.zeros((samples, 0))
+    rest, length = np.array([port.begin for port in ports]), samples - lead
+    low, high = (np.array([port.range[k] for port in ports]) for k in (0, 1))
+    if excited.kind in OWN:
+        rngs = [np.random.default_rng([seed, k]) for k in range(len(ports))]
+        x = np.column_stack([_events(r, length, shortest, longest, p) for r, p in zip(rngs, ports, strict=True)])
+    else:
+        kind = kind_of(excited.kind, {**_usual(excited.kind, length, shortest, longest, h), **excited.options})
+        names = [f"u{k}" for k in range(len(ports))]
+        x = excite(
+            kind, sample_time=h, samples=length, low=low.tolist(), high=high.tolist(), names=names, seed=seed
+        ).values
+    whole = np.concatenate([np.tile(rest, (lead, 1)), x])
+    return np.column_stack([_kept_to(column, port, h) for column, port in zip(whole.T, ports, strict=True)])
+
+
+def _usual(kind: str, length: int, shortest: int, longest: int, h: float) -> Mapping[str, Any]:
+    """Options that follow from the times at a level."""
+    shortest = min(shortest, length)
+    fastest = min(0.5 / (shortest * h), 0.5 / h)
+    band = (1.0 / (length * h), fastest)
+    known: dict[str, Mapping[str, Any]] = {
+        "aprbs": {"hold": shortest, "longest": max(shortest, longest)},
+        "prbs": {"clock": shortest},
+        "pulses": {"hold": shortest, "longest": max(shortest, longest)},
+        "ramps": {
+            **{"rise": max(1, shortest // 4), "longest_rise": max(shortest, longest)},
+            **{"hold": shortest, "longest_hold": max(shortest, longest)},
+        },
+        "staircase": {"levels": int(np.clip(length // max(longest, 1), 2, 9)), "direction": "random"},
+    }
+    if kind in {"multisine", "noise", "chirp"}:
+        found: dict[str, Any] = {"band": band} if band[0] < band[1] else {}
+        # A low peak takes iterations, and says nothing where there are many experiments.
+        return found | {"iterations": 0} if kind == "multisine" else found
+    return known.get(kind, {})
+
+
+def _events(rng: np.random.Generator, length: int, shortest: int, longest: int, port: InputPort) -> NDArray[np.float64]:
+    """Rest, then away from it to a random level, and back: single events, and some in quick succession."""
+    x, at = np.full(length, port.begin), 0
+    while at < length:
+        at += int(rng.integers(shortest, 2 * longest + 1))
+        held = int(rng.integers(shortest, longest + 1))
+        x[at : at + held] = rng.uniform(*port.range)
+        at += held
+    return x
+
+
+def _kept_to(x: NDArray[np.float64], port: InputPort, h: float) -> NDArray[np.float64]:
+    """A signal within what its port allows: levels first, then the rate, which a level must then be reached at."""
+    if port.levels is not None:
+        levels = np.sort(np.array(port.levels))
+        x = levels[np.argmin(np.abs(x[:, np.newaxis] - levels), axis=1)]
+    if port.rate is not None:
+        most, y = port.rate * h, x.copy()
+        for k in range(1, len(y)):
+            y[k] = y[k - 1] + min(max(x[k] - y[k - 1], -most), most)
+        x = y
+    return np.clip(x, *port.range)

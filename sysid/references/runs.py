@@ -1,0 +1,374 @@
+"""Many runs of a reference: in processes beside each other, each with its own time limit, kept by their content.
+
+A run that fails, hangs, ends its process or gives what is no record is an :class:`Outcome` with a reason. What has been
+run is never run again, in whatever study, as long as reference, inputs, parameters and sample time are the same; that
+holds for runs that gave no record too, until they are asked for anew.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import queue
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.atomic import replacing
+from sysid.errors import ConfigError
+from sysid.ingest import TraceCache, content_key, default_cache_folder
+from sysid.references.config import ReferenceConfig
+from sysid.references.kinds import FORMAT
+from sysid.traces import Channel, Trace
+
+STARTING_S = 120.0
+"""Seconds that loading a reference may take."""
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """One experiment.
+
+    Args:
+        name: Of the record that comes of it.
+        inputs: Held from sample to sample, shape ``(n_samples, n_inputs)``.
+        parameters: Those that vary, by name.
+        told: How it was drawn, for people.
+    """
+
+    name: str
+    inputs: NDArray[np.float64] = field(repr=False)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    told: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """What came of an experiment.
+
+    Args:
+        case: The experiment.
+        trace: Inputs, parameters and outputs; ``None`` where there is no record.
+        before: The outputs before its first sample, by name.
+        reason: Why there is none.
+        cpu_s: Processor time of the run.
+        wall_s: Its time by the clock.
+        stored: Whether an earlier run's record was taken.
+    """
+
+    case: Case
+    trace: Trace | None
+    before: Mapping[str, float] = field(default_factory=dict)
+    reason: str | None = None
+    cpu_s: float = float("nan")
+    wall_s: float = float("nan")
+    stored: bool = False
+
+
+class _Process:
+    """A worker and the lines between it and us."""
+
+    def __init__(self, config: ReferenceConfig) -> None:
+        self.answers: queue.Queue[str] = queue.Queue()
+        self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
+        # Our own module, and nothing of a user's but the configuration that names what is run.
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "sysid.references.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=self.errors, text=True, encoding="utf-8", start_new_session=True, env=_environment(),
+        )  # fmt: skip
+        threading.Thread(target=self._listen, daemon=True).start()
+        self.send(config.model_dump_json())
+        self.hello = self.receive(STARTING_S)
+
+    def _listen(self) -> None:
+        assert self.process.stdout is not None  # noqa: S101 - it is a pipe
+        for line in self.process.stdout:
+            self.answers.put(line)
+        self.answers.put("")
+
+    def send(self, line: str) -> None:
+        """Pass a line on; one that has ended is found out when it does not answer."""
+        assert self.process.stdin is not None  # noqa: S101 - it is a pipe
+        with contextlib.suppress(OSError):
+            self.process.stdin.write(line + "\n")
+            self.process.stdin.flush()
+
+    def receive(self, limit_s: float) -> dict[str, Any] | None:
+        """The answer; ``None`` if the process has ended. ``TimeoutError`` if none came in time."""
+        try:
+            line = self.answers.get(timeout=limit_s)
+        except queue.Empty:
+            raise TimeoutError from None
+        return dict(json.loads(line)) if line else None
+
+    def end(self) -> str:
+        """End it and all that it started; gives how it ended, in words."""
+        code = self.process.poll()
+        if hasattr(os, "killpg"):
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.process.pid, signal.SIGKILL)
+        else:
+            self.process.kill()
+        code = self.process.wait() if code is None else code
+        self.errors.seek(0)
+        said = self.errors.read()[-2000:].decode(errors="replace").strip().splitlines()[-1:]
+        for one in (self.process.stdin, self.process.stdout, self.errors):
+            with contextlib.suppress(OSError):
+                one.close()  # type: ignore[union-attr]
+        how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+        return how + (f": {said[0]}" if said else "")
+
+
+def _environment() -> dict[str, str]:
+    """One thread a run: there are as many runs as processors."""
+    return {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+@dataclass(kw_only=True, eq=False)
+class ReferenceRuns:
+    """Runs of one reference.
+
+    Args:
+        config: What it is, with whole paths.
+        workers: Processes.
+        folder: Where records are kept; the cache of data sets by default.
+        fresh: Whether everything is run again, whatever is kept.
+    """
+
+    config: ReferenceConfig
+    workers: int = 2
+    folder: Path = field(default_factory=default_cache_folder)
+    fresh: bool = False
+    _idle: list[_Process] = field(default_factory=list, repr=False)
+    _digest: str = field(default="", repr=False)
+
+    def __enter__(self) -> ReferenceRuns:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End all processes."""
+        while self._idle:
+            self._idle.pop().end()
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what runs; it is loaded for that, in a process of its own.
+
+        Raises:
+            ConfigError: If it cannot be loaded.
+        """
+        if not self._digest:
+            self._idle.append(self._start())
+        return self._digest
+
+    def _start(self) -> _Process:
+        process = _Process(self.config)
+        hello = process.hello
+        if hello is None:
+            how = process.end()
+            raise ConfigError(
+                "the reference ended its process while it was loaded", where=self.config.kind,
+                expected="a reference that can be loaded", got=how, remedy="run it in its own tool first",
+            )  # fmt: skip
+        if "digest" not in hello:
+            process.end()
+            raise ConfigError(hello.pop("what"), **hello)
+        self._digest = self._digest or str(hello["digest"])
+        return process
+
+    def key(self, case: Case) -> str:
+        """The digest of all that a run depends on.
+
+        Args:
+            case: The experiment.
+
+        Returns:
+            64 hexadecimal digits.
+        """
+        config = self.config
+        return content_key(
+            {
+                "reference": [FORMAT, config.kind, self.digest],
+                "inputs": [[k, p.unit] for k, p in config.inputs.items()],
+                "outputs": [[k, p.unit] for k, p in config.outputs.items()],
+                "values": hashlib.sha256(np.ascontiguousarray(case.inputs).tobytes()).hexdigest(),
+                "samples": len(case.inputs),
+                "parameters": sorted({**config.constants, **case.parameters}.items()),
+                "sample_time": config.sample_time,
+                "settling": config.settling,
+                "format": config.format if config.kind == "program" else "",
+            }
+        )
+
+    def kept(self, cases: Sequence[Case]) -> int:
+        """How many of some experiments have been run.
+
+        Args:
+            cases: The experiments.
+
+        Returns:
+            Their number.
+        """
+        return sum(self._note(self.key(case)).is_file() for case in cases)
+
+    def seconds_each(self) -> tuple[float | None, str]:
+        """How long one run takes, and where that is known from."""
+        measured = TraceCache(folder=self.folder).mean_time(self._timed_as)
+        if measured is not None:
+            return measured, "the mean of the runs so far"
+        return (None, "nothing has been run yet") if self.config.cost is None else (self.config.cost, "as declared")
+
+    @property
+    def _timed_as(self) -> str:
+        return f"reference-{self.digest[:16]}-{self.config.sample_time!r}"
+
+    def run(self, cases: Sequence[Case], progress: Progress | None = None) -> list[Outcome]:
+        """Run experiments, or find them where they have been run.
+
+        Args:
+            cases: The experiments.
+            progress: Told of each that is done: its name, how many are, and of how many.
+
+        Returns:
+            What came of each, in their order.
+
+        Raises:
+            ConfigError: If the reference cannot be loaded.
+        """
+        found: dict[int, Outcome] = {}
+        _ = self.digest
+        with ThreadPoolExecutor(max(1, self.workers)) as threads:
+            waiting = {threads.submit(self._one, case): k for k, case in enumerate(cases)}
+            try:
+                for done in as_completed(waiting):
+                    found[waiting[done]] = done.result()
+                    if progress is not None:
+                        progress(found[waiting[done]].case.name, len(found), len(cases))
+            except BaseException:
+                for one in waiting:
+                    one.cancel()
+                raise
+        made = [one for one in found.values() if not one.stored and one.trace is not None]
+        if made:
+            TraceCache(folder=self.folder).note_time(self._timed_as, float(np.mean([one.wall_s for one in made])))
+        return [found[k] for k in range(len(cases))]
+
+    def _one(self, case: Case) -> Outcome:
+        key = self.key(case)
+        kept = None if self.fresh else self._kept(case, key)
+        if kept is not None:
+            return kept
+        process = self._idle.pop() if self._idle else self._start()
+        began, wall = time.perf_counter(), float("nan")
+        with _exchange() as (given, made):
+            np.save(given, case.inputs, allow_pickle=False)
+            parameters = {**self.config.constants, **case.parameters}
+            process.send(json.dumps({"inputs": str(given), "outputs": str(made), "parameters": parameters}))
+            try:
+                answer = process.receive(self.config.time_limit)
+                wall = time.perf_counter() - began
+            except TimeoutError:
+                process.end()
+                answer = {"reason": f"it was not done after {self.config.time_limit:g} s, its time limit"}
+            else:
+                if answer is None:
+                    answer = {"reason": f"it ended its process {process.end()}"}
+                else:
+                    self._idle.append(process)
+            values = np.load(made, allow_pickle=False) if answer["reason"] is None else None
+        trace = None if values is None else self._trace(case, values[1:])
+        before = {} if values is None else dict(zip(self.config.outputs, values[0].tolist(), strict=True))
+        outcome = Outcome(
+            case=case, trace=trace, before=before, reason=answer["reason"], cpu_s=answer.get("cpu_s", float("nan")),
+            wall_s=wall,
+        )  # fmt: skip
+        self._keep(key, outcome)
+        return outcome
+
+    def _trace(self, case: Case, outputs: NDArray[np.float64]) -> Trace:
+        config, constant = self.config, np.ones((len(outputs), 1))
+        columns = [case.inputs, *(constant * case.parameters[name] for name in config.parameters), outputs]
+        return Trace(
+            name=case.name,
+            sample_time=config.sample_time,
+            channels=channels_of(config),
+            values=np.hstack(columns),
+            provenance=(case.told,) if case.told else (),
+        )
+
+    def _note(self, key: str) -> Path:
+        return self.folder / "references" / f"{key}.json"
+
+    def _kept(self, case: Case, key: str) -> Outcome | None:
+        try:
+            note = json.loads(self._note(key).read_text(encoding="utf-8"))
+            trace = None if note["reason"] else TraceCache(folder=self.folder).load(key)
+            if trace is None and not note["reason"]:
+                return None
+            # The same experiment may have had another name in another study.
+            named = None if trace is None else self._trace(case, trace.columns(tuple(self.config.outputs)))
+            return Outcome(
+                case=case, trace=named, before=note["before"], reason=note["reason"], cpu_s=_number(note["cpu_s"]),
+                wall_s=_number(note["wall_s"]), stored=True,
+            )  # fmt: skip
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    def _keep(self, key: str, outcome: Outcome) -> None:
+        """The record first, the note that it is there last."""
+        if outcome.trace is not None:
+            TraceCache(folder=self.folder).store(key, outcome.trace)
+        note = {
+            "reason": outcome.reason,
+            "before": dict(outcome.before),
+            "cpu_s": outcome.cpu_s if np.isfinite(outcome.cpu_s) else None,
+            "wall_s": outcome.wall_s if np.isfinite(outcome.wall_s) else None,
+        }
+        with contextlib.suppress(OSError), replacing(self._note(key)) as draft:
+            draft.write_text(json.dumps(note), encoding="utf-8")
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else float(value)
+
+
+def channels_of(config: ReferenceConfig) -> tuple[Channel, ...]:
+    """The channels of the records of a reference.
+
+    Args:
+        config: What it is.
+
+    Returns:
+        Inputs, parameters, outputs.
+    """
+    units = [(name, port.unit) for name, port in config.inputs.items()]
+    units += [(name, port.unit) for name, port in config.parameters.items()]
+    units += [(name, port.unit) for name, port in config.outputs.items()]
+    return tuple(Channel(name=name, unit=unit) for name, unit in units)
+
+
+@contextlib.contextmanager
+def _exchange() -> Iterator[tuple[Path, Path]]:
+    place = Path(tempfile.mkdtemp(prefix="sysid-exchange-"))
+    try:
+        yield place / "inputs.npy", place / "outputs.npy"
+    finally:
+        shutil.rmtree(place, ignore_errors=True)

@@ -1,0 +1,257 @@
+"""Experiments on a reference as steps: the runs, which keep themselves, then the data set, written and loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sysid.errors import ConfigError
+from sysid.ingest import load_dataset, write_csv
+from sysid.references.config import ReferenceConfig
+from sysid.references.design import designed
+from sysid.references.runs import Case, Outcome, ReferenceRuns, channels_of
+from sysid.traces import Channel, TraceSet
+from sysid.units import is_pressure
+from sysid.workbench.experiments.config import ExperimentConfig
+from sysid.workbench.runner.events import Warned
+from sysid.workbench.runner.program import Closing, Program
+from sysid.workbench.runner.run import Run
+from sysid.workbench.runner.steps import Estimate, NotKnownError, Outlined, Step, Work
+from sysid.workbench.runner.store import write_bytes, write_json
+from sysid.yaml_files import check, read_yaml, yaml_text
+
+if TYPE_CHECKING:
+    from sysid.workbench.kinds import RunRequest
+
+DATASET, RECORD, TRACES = "dataset.yaml", "experiment.json", "traces"
+TITLE = "Running the reference"
+LOADING = Outlined(name="data", title="Loading the traces")
+SHOWN = 5
+"""Reasons that are listed at the end."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Experimented:
+    """What came of experiments.
+
+    Args:
+        traces: The records, with their roles.
+        outcomes: What came of each, by role.
+        before: The outputs before the first sample, by name: the middle over all records.
+        spread: How far that differs between records, by name.
+    """
+
+    traces: TraceSet
+    outcomes: Mapping[str, Sequence[Outcome]]
+    before: Mapping[str, float]
+    spread: Mapping[str, float]
+
+    @property
+    def failed(self) -> list[Outcome]:
+        """The experiments without a record."""
+        return [one for some in self.outcomes.values() for one in some if one.trace is None]
+
+
+def program(request: RunRequest) -> Program[Experimented]:
+    """What ``sysid run`` does of a pipeline of kind ``experiment``.
+
+    Args:
+        request: What was asked.
+
+    Returns:
+        The program.
+
+    Raises:
+        UserError: If the pipeline cannot be used.
+    """
+    config = check(ExperimentConfig, read_yaml(request.path), where=request.path)
+    return program_of(config, text=request.path.read_text(encoding="utf-8-sig"), folder=request.path.resolve().parent)
+
+
+def program_of(config: ExperimentConfig, *, text: str, folder: Path) -> Program[Experimented]:
+    """Experiments as a program.
+
+    Args:
+        config: The checked fields.
+        text: The YAML as written.
+        folder: Of the YAML: paths in it are relative to it.
+
+    Returns:
+        The program.
+    """
+    work = _Experiments(config=config, reference=config.reference.at(folder))
+    return Program(
+        name=config.name,
+        keep=lambda place: write_bytes(place / "pipeline.yaml", text.encode()),
+        steps=work.run,
+        outline=lambda: [Outlined(name="runs", title=TITLE, how_long=work.estimate), LOADING],
+        closing=closing,
+        tracked=False,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Experiments:
+    config: ExperimentConfig
+    reference: ReferenceConfig
+
+    def cases(self) -> dict[str, list[Case]]:
+        return designed(self.reference, self.config.experiment)
+
+    def run(self, run: Run) -> Experimented:
+        outcomes = run.do(self._running(run)).value
+        return run.do(self._loading(run, outcomes)).value
+
+    def estimate(self) -> Estimate:
+        """Wall time of what has yet to be run."""
+        cases = [case for some in self.cases().values() for case in some]
+        with ReferenceRuns(config=self.reference, workers=self.config.workers) as runs:
+            left = len(cases) - runs.kept(cases)
+            each, basis = runs.seconds_each()
+        said = f"{left} of {len(cases)} runs to make"
+        if each is None:
+            limit = self.reference.time_limit
+            return Estimate(seconds=None, basis=f"{said}, none measured: give cost; at most {limit:g} s each")
+        return Estimate(seconds=each * left / self.config.workers, basis=f"{said}, {each:.3g} s each, {basis}")
+
+    def _running(self, run: Run) -> Step[dict[str, list[Outcome]]]:
+        return Step(
+            name="runs",
+            title=TITLE,
+            make=lambda work: self._ran(run, work),
+            how_long=self.estimate,
+            was_found=lambda found: all(one.stored for some in found.values() for one in some),
+            peek=self._peeked,
+            outcome=_said,
+        )
+
+    def _peeked(self) -> dict[str, list[Outcome]]:
+        cases = self.cases()
+        flat = [case for some in cases.values() for case in some]
+        with ReferenceRuns(config=self.reference, workers=1) as runs:
+            if runs.kept(flat) < len(flat):
+                raise NotKnownError
+            return _by_role(cases, runs.run(flat))
+
+    def _ran(self, run: Run, work: Work) -> dict[str, list[Outcome]]:
+        cases = self.cases()
+        flat = [case for some in cases.values() for case in some]
+        with ReferenceRuns(config=self.reference, workers=self.config.workers, fresh=run.fresh) as runs:
+            done = runs.run(flat, lambda name, n, count: work.say(f"{name} ({n} of {count})", n / count))
+        return _by_role(cases, done)
+
+    def _loading(self, run: Run, outcomes: Mapping[str, Sequence[Outcome]]) -> Step[Experimented]:
+        """Write the data set and load its traces, which shows that it can be used."""
+
+        def make(_: Work) -> Experimented:
+            file = self._written(run, outcomes)
+            traces, (before, spread) = load_dataset(file), _before(self.reference, outcomes)
+            found = Experimented(traces=traces, outcomes=outcomes, before=before, spread=spread)
+            for one in found.failed[:SHOWN]:
+                run.tell(Warned(text=f"{one.case.name} gave no record: {one.reason}"))
+            return found
+
+        return Step(
+            name=LOADING.name, title=LOADING.title, make=make,
+            outcome=lambda found: f"{len(found.traces)} cases of {found.traces.name}",
+        )  # fmt: skip
+
+    def _written(self, run: Run, outcomes: Mapping[str, Sequence[Outcome]]) -> Path:
+        there = {role: [one for one in some if one.trace is not None] for role, some in outcomes.items()}
+        if not there.get("estimation"):
+            reasons = sorted({str(one.reason) for some in outcomes.values() for one in some if one.reason})
+            raise ConfigError(
+                "no run of the reference gave a record to fit", where=self.config.name,
+                expected="one record at least", got="; ".join(reasons[:SHOWN]),
+                remedy="run the reference in its own tool with these inputs first, or raise time_limit",
+            )  # fmt: skip
+        for some in there.values():
+            for one in some:
+                assert one.trace is not None  # noqa: S101 - those without are left out above
+                write_csv(one.trace, run.store.path / TRACES / f"{one.case.name}.csv")
+        cases = {
+            one.case.name: {"role": role, "file": f"{TRACES}/{one.case.name}.csv"}
+            for role, some in there.items()
+            for one in some
+        }
+        fields = {
+            "name": self.config.name,
+            "description": self.config.description or f"Designed experiments on a reference ({self.reference.kind})",
+            "sample_time": self.reference.sample_time,
+            "channels": [_channel(one) for one in channels_of(self.reference)],
+            "source": {"files": {}, "repairs": {"constant": "accept"}},
+            "cases": cases,
+            "provenance": f"Made by {run.command}; each input is held from sample to sample, outputs are at its end.",
+        }
+        write_json(run.store.path / RECORD, _record(outcomes))
+        file = run.store.path / DATASET
+        write_bytes(file, f"# Made by: {run.command}\n\n{yaml_text(fields)}".encode())
+        return file
+
+
+def _channel(channel: Channel) -> dict[str, str]:
+    """A pressure has to say what it is measured from; a slow model says nothing of it."""
+    told = {"reference": "none"} if is_pressure(channel.unit) else {}
+    return {"name": channel.name, "unit": channel.unit, **told}
+
+
+def _by_role(cases: Mapping[str, Sequence[Case]], done: Sequence[Outcome]) -> dict[str, list[Outcome]]:
+    left = list(done)
+    return {role: [left.pop(0) for _ in some] for role, some in cases.items()}
+
+
+def _before(
+    reference: ReferenceConfig, outcomes: Mapping[str, Sequence[Outcome]]
+) -> tuple[dict[str, float], dict[str, float]]:
+    known = [one.before for one in outcomes["estimation"] if one.trace is not None]
+    values = {name: np.array([one[name] for one in known]) for name in reference.outputs}
+    return {k: float(np.median(v)) for k, v in values.items()}, {k: float(np.ptp(v)) for k, v in values.items()}
+
+
+def _record(outcomes: Mapping[str, Sequence[Outcome]]) -> dict[str, Any]:
+    def plain(value: float) -> float | None:
+        return value if np.isfinite(value) else None
+
+    return {
+        one.case.name: {
+            "role": role, "drawn": one.case.told, "reason": one.reason, "cpu_s": plain(one.cpu_s),
+            "wall_s": plain(one.wall_s), "before": dict(one.before),
+        }
+        for role, some in outcomes.items()
+        for one in some
+    }  # fmt: skip
+
+
+def _said(outcomes: Mapping[str, Sequence[Outcome]]) -> str:
+    every = [one for some in outcomes.values() for one in some]
+    failed, stored = sum(one.trace is None for one in every), sum(one.stored for one in every)
+    return f"{len(every)} runs, {stored} of them stored" + (f", {failed} without a record" if failed else "")
+
+
+def closing(found: Experimented, folder: Path) -> Closing:
+    """What is said at the end: the traces, what gave none and why, and how they are used.
+
+    Args:
+        found: What came of the experiments.
+        folder: The run folder.
+
+    Returns:
+        The lines.
+    """
+    file = folder.resolve() / DATASET
+    roles = ", ".join(f"{sum(o.trace is not None for o in some)} {role}" for role, some in found.outcomes.items())
+    failed = [f"no record of {one.case.name}: {one.reason}" for one in found.failed]
+    more = [f"and {len(failed) - SHOWN} more, in {RECORD}"] if len(failed) > SHOWN else []
+    return Closing(
+        lines=[
+            f"{len(found.traces)} traces: {roles}",
+            *failed[:SHOWN],
+            *more,
+            f"Data set: {file}",
+            f"Find a model of it with: sysid auto {file}",
+        ]
+    )

@@ -1,0 +1,123 @@
+"""Slow models for the tests and benchmarks: named in a configuration as ``slow_models:thermal`` and so on."""
+
+from __future__ import annotations
+
+import os
+import time as clock
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+Array = NDArray[np.float64]
+STATES = 200
+
+
+def first_order(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """A lag of the first order with an exact step: ``tau y' = u - y``."""
+    a = float(np.exp(-(time[1] - time[0]) / parameters.get("tau", 1.0)))
+    y, at = np.empty(len(time)), float(inputs[0, 0])
+    for k, u in enumerate(inputs[:, 0]):
+        at = a * at + (1.0 - a) * u
+        y[k] = at
+    return y
+
+
+def thermal(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """A wall of 200 layers, heated on one side and cooled by radiation and convection on the other: stiff.
+
+    Inputs: heat in W, surroundings in K. Outputs: temperature in K of the heated face and of the middle.
+    """
+    h, kelvin = time[1] - time[0], 293.15
+    capacity = np.geomspace(1.0, 60.0, STATES)
+    conduct = np.full(STATES - 1, 400.0) * parameters.get("conductivity", 1.0)
+    area, film = 2.0e-8 * 0.9, 1.5
+
+    def slope(_: float, x: Array, heat: float, air: float) -> Array:
+        flow = conduct * (x[:-1] - x[1:])
+        d = np.zeros(STATES)
+        d[:-1] -= flow
+        d[1:] += flow
+        d[0] += heat - film * (x[0] - air)
+        d[-1] -= film * (x[-1] - air) + area * (x[-1] ** 4 - air**4)
+        return d / capacity
+
+    def jacobian(_: float, x: Array, heat: float, air: float) -> Array:
+        j = np.zeros((STATES, STATES))
+        i = np.arange(STATES - 1)
+        j[i, i] -= conduct
+        j[i, i + 1] += conduct
+        j[i + 1, i + 1] -= conduct
+        j[i + 1, i] += conduct
+        j[0, 0] -= film
+        j[-1, -1] -= film + 4.0 * area * x[-1] ** 3
+        return j / capacity[:, np.newaxis]
+
+    x, found = np.full(STATES, kelvin), np.empty((len(time), 2))
+    for k, (heat, air) in enumerate(inputs):
+        done = solve_ivp(slope, (0.0, h), x, "BDF", args=(heat, air), jac=jacobian, rtol=1e-6, atol=1e-6)
+        x = done.y[:, -1]
+        found[k] = x[0], x[STATES // 2]
+    return found
+
+
+def cylinder(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """A hydraulic cylinder behind a proportional valve, with friction and end stops; input in V, output in mm."""
+    h, mass, supply, stroke, area = time[1] - time[0], parameters.get("mass", 200.0), 100e5, 0.3, 1.2e-3
+    volume, bulk, gain, steps = 4e-4, 1.2e9, 1.5e-7, max(1, round((time[1] - time[0]) / 1e-4))
+    position, speed, pressure, found, dt = 0.15, 0.0, 0.0, np.empty(len(time)), h / steps
+    for k, volts in enumerate(inputs[:, 0]):
+        for _ in range(steps):
+            flow = gain * volts * np.sqrt(max(supply - np.sign(volts) * pressure, 0.0)) * 0.1
+            pressure += dt * 4.0 * bulk / volume * (flow - area * speed - 3e-13 * pressure)
+            stop = 1e8 * (max(-position, 0.0) - max(position - stroke, 0.0))
+            stop -= 1e5 * speed if not 0.0 < position < stroke else 0.0
+            friction = 400.0 * np.tanh(speed / 2e-3) + 2500.0 * speed
+            speed += dt * (area * pressure - friction + stop) / mass
+            position += dt * speed
+        found[k] = 1e3 * position
+    return found
+
+
+def hangs(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Is never done where the input goes above 1."""
+    while inputs.max() > 1.0:
+        clock.sleep(0.05)
+    return inputs[:, :1]
+
+
+def crashes(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Takes its process down where the input goes above 1."""
+    if inputs.max() > 1.0:
+        os.abort()
+    return inputs[:, :1]
+
+
+def leaves_numbers(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Is not a number from 10 s on where the input goes above 1."""
+    y = inputs[:, 0].copy()
+    if inputs.max() > 1.0:
+        y[time >= 10.0] = np.nan
+    return y
+
+
+def rubbish(time: Array, inputs: Array, parameters: Mapping[str, float]) -> object:
+    """Gives words where the input goes above 1."""
+    return "rubbish" if inputs.max() > 1.0 else inputs[:, :1]
+
+
+def raises(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Fails where the input goes above 1, and prints on the way."""
+    print('{"reason": null, "cpu_s": 0}')  # noqa: T201 - not to be taken for an answer
+    if inputs.max() > 1.0:
+        raise ValueError("valve jammed")
+    return inputs[:, :1]
+
+
+def counted(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Writes down that it was run, once a run, and takes its time."""
+    with open(os.environ["SYSID_TEST_COUNT"], "a", encoding="utf-8") as file:  # noqa: PTH123
+        file.write(f"{inputs.sum():.12g}\n")
+    clock.sleep(0.05)
+    return inputs[:, :1]

@@ -1,0 +1,69 @@
+"""Designed experiments: within ranges, rates and levels, from the start, each on its own, and spread evenly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sysid.excitation import KINDS
+from sysid.references.config import ReferenceConfig
+from sysid.references.design import OWN, Counts, Design, designed, drawn
+
+INPUTS = {
+    "valve": {"unit": "1", "range": [0, 10], "rate": 4.0, "start": 2.0},
+    "gear": {"range": [1, 4], "levels": [1, 2, 4]},
+}
+CONFIG = ReferenceConfig.model_validate(
+    {
+        **{"python": "a:b", "sample_time": 0.1, "inputs": INPUTS, "outputs": {"y": {}}},
+        "parameters": {"mass": {"unit": "kg", "range": [1, 3]}, "gain": {"range": [-1, 1]}},
+    }
+)
+
+
+@pytest.mark.parametrize("kind", [*KINDS, *OWN])
+def test_every_signal_stays_within_range_rate_and_levels_and_begins_at_the_start(kind: str) -> None:
+    design = Design.model_validate({"duration": 60.0, "excitations": [kind], "lead": 1.0})
+    for case in designed(CONFIG, design)["estimation"]:
+        valve, gear = case.inputs.T
+        assert case.inputs.shape == (600, 2)
+        assert (case.inputs[:10] == [2.0, 2.0]).all()
+        assert valve.min() >= 0.0
+        assert valve.max() <= 10.0
+        assert np.abs(np.diff(valve)).max() <= 0.4 + 1e-12
+        assert set(gear) <= {1.0, 2.0, 4.0}
+        assert np.ptp(valve) > 0.0
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube"])
+def test_parameters_fill_their_ranges_evenly(sampling: str) -> None:
+    design = Design.model_validate({"duration": 5.0, "sampling": sampling})
+    cases = drawn(CONFIG, design, 16, seed=(0, 0), prefix="N")
+    for name, (low, high) in {"mass": (1.0, 3.0), "gain": (-1.0, 1.0)}.items():
+        strips = np.floor(16 * (np.array([case.parameters[name] for case in cases]) - low) / (high - low))
+        assert sorted(strips) == list(range(16))
+
+
+def test_no_two_roles_share_an_experiment_and_a_seed_repeats_them_all() -> None:
+    design = Design(duration=20.0, runs=Counts(estimation=6, selection=6, test=6))
+    first, again = designed(CONFIG, design), designed(CONFIG, design)
+    other = designed(CONFIG, design.model_copy(update={"seed": 1}))
+    alike = [one.inputs.tobytes() for cases in first.values() for one in cases]
+    assert alike == [one.inputs.tobytes() for cases in again.values() for one in cases]
+    assert len({*alike, *(one.inputs.tobytes() for cases in other.values() for one in cases)}) == 36
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"), [({"excitations": ["wobble"]}, "no such excitation"), ({"hold": [2, 1]}, "hold")]
+)
+def test_a_design_that_cannot_be_drawn_is_refused(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        Design.model_validate({"duration": 5.0, **fields})
+
+
+def test_whole_paths_are_those_of_the_yaml(tmp_path: Path) -> None:
+    config = ReferenceConfig.model_validate({**CONFIG.model_dump(), "python": None, "fmu": "a.fmu", "folder": "models"})
+    assert config.at(tmp_path).fmu == str(tmp_path / "models" / "a.fmu")
