@@ -41,6 +41,17 @@ def check_text(text: str, what: str) -> None:
         ) from None  # fmt: skip
 
 
+def _is_given_away(values: object) -> bool:
+    """Whether an array can be kept without a copy: float64, row by row, read-only, and nobody else's view."""
+    return (
+        type(values) is np.ndarray
+        and values.dtype == np.float64
+        and values.flags.c_contiguous
+        and values.flags.owndata
+        and not values.flags.writeable
+    )
+
+
 class Role(enum.Enum):
     """What a trace may be used for. Scores on a trace count only if nothing was chosen on it."""
 
@@ -88,7 +99,8 @@ class Trace:
         name: Name of the case (``"EST01"``).
         sample_time: Seconds between samples.
         channels: What the columns of ``values`` are.
-        values: Shape ``(n_samples, n_channels)``, float64; copied and made read-only.
+        values: Shape ``(n_samples, n_channels)``, float64; copied and made read-only. An array that is read-only and
+            owns its memory is given away: it is kept as it is, since a long record would be in memory twice.
         start_time: Time of the first sample in seconds.
         usable: Shape ``(n_samples,)``, bool; ``False`` marks samples (gaps) that count in no loss and
             in no figure of merit. ``None`` means that all count.
@@ -115,8 +127,10 @@ class Trace:
     weights: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
-        values = np.array(self.values, dtype=np.float64, order="C")
-        values.setflags(write=False)
+        values = self.values
+        if not _is_given_away(values):
+            values = np.array(values, dtype=np.float64, order="C")
+            values.setflags(write=False)
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "channels", tuple(self.channels))
         object.__setattr__(self, "provenance", tuple(self.provenance))

@@ -98,6 +98,7 @@ def assemble(
     gridded, record = _onto_grid(record, wanted, grid, repairs)
     values, usable, notes = _close_gaps(gridded, repairs, source=source, sample_time=wanted.sample_time)
     values, rounded = round_channels(values, wanted.channels, wanted.decimals)
+    values.setflags(write=False)  # ours alone, and given away: a long record is not copied
     return Trace(
         name=wanted.name,
         sample_time=wanted.sample_time,
@@ -126,7 +127,6 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
         notes += [note] if note else []
     return Record(
         table=replace(table, columns=(RawColumn(name="", values=stamps),), others=(), records=()),
-        rows=np.arange(len(table), dtype=np.int32),
         stamps=stamps,
         names=tuple(channel.name for channel in wanted.channels),
         values=np.column_stack(columns),

@@ -19,7 +19,7 @@ class Record:
 
     Args:
         table: The file they came from.
-        rows: Shape ``(n,)``: row of the file that each sample was.
+        rows: Shape ``(n,)``: row of the file that each sample was; ``None`` while it is all of them, in their order.
         stamps: Shape ``(n,)``, seconds.
         names: Channel names.
         values: Shape ``(n, n_channels)``.
@@ -28,7 +28,7 @@ class Record:
     """
 
     table: RawTable
-    rows: NDArray[np.int32]
+    rows: NDArray[np.intp] | None = None
     stamps: NDArray[np.float64]
     names: tuple[str, ...]
     values: NDArray[np.float64]
@@ -37,7 +37,7 @@ class Record:
 
     def at(self, index: int) -> str:
         """Where a sample is in the file, for messages."""
-        return self.table.place(int(self.rows[index]))
+        return self.table.place(index if self.rows is None else int(self.rows[index]))
 
     def where(self, index: int, channel: str | None = None) -> str:
         """File, channel and sample, for messages."""
@@ -46,9 +46,10 @@ class Record:
 
     def keep(self, chosen: NDArray[np.intp] | NDArray[np.bool_], note: str | None = None) -> Record:
         """Some of the samples, in the order given."""
+        taken = np.arange(len(self.stamps))[chosen]
         return replace(
             self,
-            rows=self.rows[chosen],
+            rows=taken if self.rows is None else self.rows[taken],
             stamps=self.stamps[chosen],
             values=self.values[chosen],
             marked=self.marked[chosen],
