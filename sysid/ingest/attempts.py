@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import ReaderError, UserError
 from sysid.ingest.numbers import usually_missing
@@ -20,6 +21,8 @@ from sysid.ingest.words import PAIRS, TRUTH, known_states
 _LONG_SHARE = 0.6
 _CHANGE_SHARE = 0.5
 _FEW_TEXTS = 3
+_FAR = 5.0  # times the range of all other values
+_MISSING_NUMBERS = (-9999.0, -999.0, -999.25, -99999.0, -32768.0, -1e30, 9999.0, 99999.0, 32767.0, 1e30, 9.9e37)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,14 +114,31 @@ def _thousands(table: RawTable) -> dict[str, Any] | None:
 def _missing(table: RawTable) -> dict[str, Any] | None:
     """Texts that stand for a missing value, where they are all that a column of numbers holds beside them.
 
-    Those that usually do, and a few others without a digit: what an instrument writes in place of a number.
+    Those that usually do, and a few others without a digit: what an instrument writes in place of a number. Numbers
+    such as -9999 too.
     """
     found: dict[str, None] = {}
     for column in table.columns:
         few = len(column.strange) <= _FEW_TEXTS
         if column.strange and all(usually_missing(text) or (few and _is_remark(text)) for text in column.strange):
             found |= dict.fromkeys(column.strange)
+        elif table.reader == "csv" and column.problem is None and column.name != table.time:
+            found |= dict.fromkeys(_marks(column.values))
     return {"missing": tuple(found)} if found else None
+
+
+def _marks(values: NDArray[np.float64]) -> list[str]:
+    """Numbers that loggers write for want of one, where they lie far outside everything else in the column."""
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return []
+    ends = (float(finite.min()), float(finite.max()))
+    found = [mark for mark in _MISSING_NUMBERS if mark in ends]
+    others = finite[~np.isin(finite, found)] if found else finite
+    if not found or 2 * len(others) < len(finite) or np.ptp(others) == 0.0:
+        return []
+    low, high, reach = float(others.min()), float(others.max()), _FAR * float(np.ptp(others))
+    return [f"{mark:.15g}" for mark in found if mark < low - reach or mark > high + reach]
 
 
 def _is_remark(text: str) -> bool:

@@ -18,6 +18,7 @@ from sysid.ingest.clocks import clock_of
 from sysid.ingest.headers import is_unit, split_reference
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.readers.records import role_of
+from sysid.ingest.restarts import finer_than_clock, records_by_clock
 from sysid.ingest.table import RawColumn, RawTable, is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert, is_pressure
@@ -129,7 +130,7 @@ class FileFinding:
         found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
         timing = self.timing
         if timing is None:
-            found += ["no time stamps"] if self.time_guessed else []
+            found += [self.time_told if self.table.time else "no time stamps"] if self.time_guessed else []
         else:
             found += [_count(len(timing.backward), "backward time stamp")] if len(timing.backward) else []
             found += [_count(len(timing.duplicates), "duplicate time stamp")] if len(timing.duplicates) else []
@@ -184,6 +185,14 @@ def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileF
     attempt = read_somehow(Path(path), files or FileOptions())
     attempt = replace(attempt, files=_written_down(attempt.files, attempt.table))
     found = _finding(attempt.table, attempt)
+    if (
+        not attempt.table.records
+        and found.timing is not None
+        and len(found.timing.backward)
+        and attempt.files.rows is None
+    ):
+        stamps = stamps_in_seconds(attempt.table, attempt.files.model_copy(update={"time": found.time}))
+        attempt = replace(attempt, table=replace(attempt.table, records=records_by_clock(attempt.table, stamps)))
     return _of_records(found, attempt) if attempt.table.records else found
 
 
@@ -196,6 +205,7 @@ def _written_down(files: FileOptions, table: RawTable) -> FileOptions:
 def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
     files, repairs = attempt.files, attempt.repairs
     time, told = _time(table, files)
+    clock = time.column
     if "zone" in attempt.guessed:
         told = f"guessed: the clock on the wall of {time.zone}, as it jumps by an hour"
     timing, unstamped, step = None, 0, time.step or 1.0
@@ -207,8 +217,12 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         timing = survey(known) if len(known) else None
         if timing is not None:
             step, needs = _needs(known, timing)
+            finer = None if unstamped else finer_than_clock(known, timing)
+            if finer is not None:
+                step, needs, timing = finer[0], {}, None
+                time, told = TimeOptions(step=step), f"guessed: {finer[1]}"
     others = tuple(replace(_column(column), problem=_other(column, len(table))) for column in table.others)
-    columns = tuple(_column(column) for column in table.columns if column.name != time.column) + others
+    columns = tuple(_column(column) for column in table.columns if column.name != clock) + others
     channels = [column for column in columns if not column.problem and not column.aside]
     needed = {
         "ragged": repairs.ragged,

@@ -92,6 +92,13 @@ class NumberFormat:
             text = text.replace(self.thousands, "")
         return _float(text.replace(self.decimal, "."))
 
+    @property
+    def missing_numbers(self) -> tuple[float, ...]:
+        """Those of the texts that stand for a missing value that are numbers themselves."""
+        bare = NumberFormat(decimal=self.decimal, thousands=self.thousands)
+        parsed = [bare.parse(text) for text in self.missing]
+        return tuple(value for value in parsed if value is not None and np.isfinite(value))
+
     def column(self, cells: Sequence[str]) -> NDArray[np.float64] | int:
         """A whole column.
 

@@ -16,6 +16,7 @@ from sysid.errors import ReaderError
 from sysid.ingest.calendar import Calendar
 from sysid.ingest.headers import Header, parse_header, split_reference
 from sysid.ingest.options import FileOptions, RepairOptions
+from sysid.ingest.rates import said_step
 from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
 from sysid.ingest.readers.csv_cells import Kind, unit_text
 from sysid.ingest.readers.csv_layout import Layout, recognise
@@ -53,11 +54,17 @@ def _read_as(file: TextFile, options: FileOptions, repairs: RepairOptions) -> Ra
     raw, guess = _finished(headers, columns, layout, path, notes, calendar=time)
     if layout.numbers.decimal != ".":
         notes.append("decimal comma")
+    clock = headers[time].name if time is not None else recognise_time(raw)
+    above = [*layout.comments, *(layout.separator.join(row.cells) for row in layout.preamble)]
+    step = said_step(above) if clock is None else None
+    if step is not None:
+        notes.append(f"sample time {step:g} s, from the lines above the table")
     return RawTable(
         source=path,
         reader="csv",
         columns=raw,
-        time=headers[time].name if time is not None else recognise_time(raw),
+        time=clock,
+        step=step,
         lines=rows,
         notes=tuple(notes),
         metadata=dict(_metadata(layout)),
@@ -240,6 +247,8 @@ def _stamps(header: Header, column: Stamps, where: str, *, is_time: bool) -> tup
 
 def _numbers(header: Header, column: Numbers | Counts, layout: Layout, path: Path) -> RawColumn:
     values = column.values.whole()
+    for number in layout.numbers.missing_numbers:  # however they are written: -9999 and -9999.00 are one
+        values[values == number - (column.origin or 0 if isinstance(column, Counts) else 0)] = np.nan
     problem = None
     if column.strange:
         cell, line = next(iter(column.strange.items()))

@@ -17,6 +17,7 @@ LONGEST_LINE = 1_000_000
 
 _BLOCK = 4 << 20
 _NEWLINE = ord("\n")
+_MINUS = "\N{MINUS SIGN}".encode()  # what a word processor or a locale makes of a hyphen before a number
 _COUNTED = 1 << 17
 _HEAD = 1 << 18
 _ASCII_INSIDE = {"utf-8", "utf-8-sig", "cp1252", "iso8859-1", "iso8859-15", "ascii"}
@@ -184,6 +185,8 @@ def _in_utf8(path: Path, encoding: str, size: int) -> Generator[bytes]:
             # ASCII is as it is in these encodings, and need not be decoded.
             as_is = plain and chunk.isascii() and not decoder.getstate()[0]
             data = chunk if as_is and chunk else decoder.decode(chunk, final=not chunk).encode()
+            if not as_is:
+                data = data.replace(_MINUS, b"-")
             if b"\x00" in data:
                 raise ZeroBytesError("it holds zero bytes")
             # An encoding that was asked for may leave the byte-order mark in the text.
