@@ -33,3 +33,13 @@ def test_half_a_character_is_refused_where_it_enters_and_the_remedy_is_whole(mad
 def test_a_trace_is_named_in_whole_characters():
     with pytest.raises(TraceError, match="half a character"):
         Trace(name="\udcff", sample_time=0.1, channels=TRACE.channels, values=TRACE.values)
+
+
+def test_an_array_is_copied_unless_it_is_given_away_read_only() -> None:
+    kept = np.zeros((3, 1))
+    assert Trace(name="a", sample_time=0.1, channels=TRACE.channels, values=kept).values is not kept
+    kept.setflags(write=False)
+    assert Trace(name="a", sample_time=0.1, channels=TRACE.channels, values=kept).values is kept
+    view = np.zeros((3, 2))[:, :1]
+    view.setflags(write=False)
+    assert Trace(name="a", sample_time=0.1, channels=TRACE.channels, values=view).values is not view

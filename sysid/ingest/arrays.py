@@ -90,6 +90,7 @@ def data(
         channels = [*(wanted_inputs or ()), *(wanted_outputs or ())]
         marks.append(_taken_out(columns, split, channels, where=label))
         table = _table(columns, name=label)
+        _check_lengths(table, channels)
         trace = _trace(
             table,
             channels or [column for column in table.names if column != table.time],
@@ -135,6 +136,7 @@ def _columns(
     if named is not None:
         return named
     if isinstance(one, tuple) and len(one) == 2:
+        _check_indexes(one, where=where)
         u, y = (_two_dimensional(part, where=where) for part in one)
         return dict(zip([*_given(inputs, u, "u"), *_given(outputs, y, "y")], [*u.T, *y.T], strict=True))
     return _of_matrix(_two_dimensional(one, where=where), inputs, outputs, where=where)
@@ -262,8 +264,37 @@ def _two_dimensional(values: Any, *, where: str) -> NDArray[Any]:
     return array
 
 
+def _check_indexes(pair: tuple[Any, Any], *, where: str) -> None:
+    """Two tables of a pair go side by side row by row: their labels must not say otherwise."""
+    indexes = [getattr(part, "index", None) for part in pair]
+    first, second = indexes
+    if first is not None and second is not None and hasattr(first, "equals") and not first.equals(second):
+        raise ConfigError(
+            "u and y have different indexes",
+            where=where,
+            expected="the same label in each row: samples of a pair are taken in the order in which they stand",
+            got=f"{[str(label) for label in first[:3]]} ... and {[str(label) for label in second[:3]]} ...",
+            remedy="put them into one frame, which joins them by their labels, or give u.to_numpy(), y.to_numpy()",
+        )
+
+
+def _check_lengths(table: RawTable, channels: Sequence[str]) -> None:
+    """Columns of another length are no channels: said here, not that they are missing."""
+    wanted = [one for one in table.others if (not channels or one.name in channels) and len(one.values) > 1]
+    if wanted:
+        raise ConfigError(
+            "the channels of a record differ in length",
+            where=str(table.source),
+            expected=f"{len(table)} samples in each, as in {', '.join(table.names)}",
+            got=", ".join(f"{len(one.values)} in {one.name}" for one in wanted),
+            remedy="cut them to the same span of time; experiments of different lengths are a list of records",
+        )
+
+
 def _array(values: Any) -> NDArray[Any]:
-    """Any array-like as NumPy: a tensor that carries gradients lets go of them first."""
+    """Any array-like as NumPy: a tensor lets go of its gradients, what a masked array masks is missing."""
+    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "buif":
+        return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))
     return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
 
 

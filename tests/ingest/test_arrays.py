@@ -183,3 +183,26 @@ def test_a_share_cuts_a_record_in_two_and_loses_nothing(n: int, share: float) ->
 def test_inputs_stand_in_the_order_of_the_mapping() -> None:
     assert_array_equal(inputs_of({"b": [2.0], "a": [1.0]}, ("a", "b")), [[1.0, 2.0]])
     assert inputs_of(7, ()).shape == (7, 0)
+
+
+def test_what_a_masked_array_masks_is_missing_and_not_its_number() -> None:
+    y = np.ma.masked_equal(np.where(np.arange(30) == 7, -1, np.arange(30)), -1)
+    with pytest.raises(TraceError, match="1 values are missing"):
+        data((np.arange(30.0) % 4, y), sample_time=0.1)
+    (trace,) = data((np.arange(30.0) % 4, y), sample_time=0.1, repairs={"nan": "interpolate"})
+    assert trace["y"].tolist() == list(range(30))
+
+
+@pytest.mark.parametrize("give", [lambda u, y: (u, y), lambda u, y: {"u": u, "y": y}])
+def test_channels_of_different_lengths_are_said_to_be_so(give: Callable[..., object]) -> None:
+    with pytest.raises(ConfigError, match="differ in length") as caught:
+        data(give(np.arange(30.0), np.arange(29.0)), sample_time=0.1)
+    assert "29 in y" in str(caught.value)
+
+
+def test_two_series_whose_labels_differ_are_not_put_side_by_side() -> None:
+    u, y = pd.Series(np.arange(30.0)), pd.Series(np.arange(30.0), index=np.arange(30)[::-1])
+    with pytest.raises(ConfigError, match="different indexes"):
+        data((u, y), sample_time=0.1)
+    (trace,) = data(pd.DataFrame({"u": u, "y": y}), sample_time=0.1)
+    assert trace["y"].tolist() == list(range(29, -1, -1))
