@@ -20,6 +20,7 @@ WORDS = (
     *("advise", "excite", "frequency_response", "impulse_response"),
     *("OrderSearch", "ARX", "ARMAX", "OE", "BJ", "LinearStateSpace", "VectorStateSpace", "TransferFunction"),
     *("NARX", "NeuralStateSpace", "VectorNARX", "VectorNeuralStateSpace", "GreyBox", "VectorGreyBox"),
+    *("HammersteinWiener", "WienerHammerstein", "PolynomialNARX"),
     *("Training", "JointTraining", "TransferFunctionTraining", "StateSpaceTraining", "PolynomialTraining"),
     *("StabilityOptions", "Start", "Role"),
 )

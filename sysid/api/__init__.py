@@ -39,14 +39,17 @@ from sysid.models import (
     NARX,
     OE,
     GreyBox,
+    HammersteinWiener,
     LinearStateSpace,
     NeuralStateSpace,
+    PolynomialNARX,
     Start,
     TransferFunction,
     VectorGreyBox,
     VectorNARX,
     VectorNeuralStateSpace,
     VectorStateSpace,
+    WienerHammerstein,
 )
 from sysid.traces import Role
 
@@ -63,7 +66,7 @@ __all__ = [
     "Start",
 ]
 __all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining", "VectorStateSpace"]
-__all__ += ["VectorGreyBox", "VectorNeuralStateSpace"]
+__all__ += ["HammersteinWiener", "PolynomialNARX", "VectorGreyBox", "VectorNeuralStateSpace", "WienerHammerstein"]
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
 __all__ += ["advise", "excite", "frequency_response", "impulse_response"]
 __all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]

@@ -14,6 +14,11 @@ from collections.abc import Mapping as Dict
 from typing import Any
 
 from sysid.errors import ConfigError
+from sysid.estimation.blocks.fit import STARTS as BLOCK_STARTS
+from sysid.estimation.blocks.fit import check_training as check_block_training
+from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
+from sysid.estimation.blocks.polynomial_narx import check_training as check_polynomial_narx
+from sysid.estimation.blocks.polynomial_narx import fit_polynomial_narx
 from sysid.estimation.estimator import Estimator, Options
 from sysid.estimation.grey_box.fit import STARTS as GREY_STARTS
 from sysid.estimation.grey_box.fit import check_training as check_grey_training
@@ -56,15 +61,18 @@ from sysid.models import (
     AbstractModel,
     AbstractStructure,
     GreyBox,
+    HammersteinWiener,
     LinearStateSpace,
     Mapping,
     NeuralStateSpace,
+    PolynomialNARX,
     Start,
     TransferFunction,
     VectorGreyBox,
     VectorNARX,
     VectorNeuralStateSpace,
     VectorStateSpace,
+    WienerHammerstein,
 )
 from sysid.traces import Trace
 
@@ -126,6 +134,31 @@ ESTIMATORS: dict[str, Estimator] = {
                 (GreyBox, "a grey box", fit_grey_box),
                 (VectorGreyBox, "a grey box of several outputs", fit_vector_grey_box),
             )
+        ),
+        *(
+            Estimator(
+                structure=structure,
+                name=name,
+                fit=fit,
+                training=Training,
+                check_training=check_block_training,
+                no_posterior=ENDED,
+                begins="a block-oriented model begins at the best linear one",
+                starts=BLOCK_STARTS,
+            )
+            for structure, name, fit in (
+                (HammersteinWiener, "a Hammerstein-Wiener model", fit_hammerstein_wiener),
+                (WienerHammerstein, "a Wiener-Hammerstein model", fit_wiener_hammerstein),
+            )
+        ),
+        Estimator(
+            structure=PolynomialNARX,
+            name="a polynomial NARX model",
+            fit=fit_polynomial_narx,
+            training=Training,
+            check_training=check_polynomial_narx,
+            no_posterior=ENDED,
+            begins="a polynomial NARX model begins at the terms that explain most one step ahead",
         ),
         Estimator(
             structure=TransferFunction,

@@ -3,6 +3,8 @@
 from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
 from sysid.models.beginning import Beginning, beginning
+from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
+from sysid.models.built_model import BuiltModel
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_batch import simulate_family
 from sysid.models.cascade_program import Limit
@@ -33,6 +35,7 @@ from sysid.models.neural_state_space import (
 )
 from sysid.models.orthonormal_basis import Domain
 from sysid.models.polynomial import ARMAX, BJ, OE, PolynomialModel
+from sysid.models.polynomial_narx import PolynomialNARX
 from sysid.models.recursion import Recursion, parameter_count
 from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_space import StateSpace
@@ -54,6 +57,7 @@ __all__ = [
     "AbstractStructure",
     "Activity",
     "Beginning",
+    "BuiltModel",
     "Cascade",
     "CascadeRun",
     "Domain",
@@ -62,6 +66,7 @@ __all__ = [
     "EquationModel",
     "GreyBox",
     "GreyBoxModel",
+    "HammersteinWiener",
     "History",
     "InitialState",
     "Innovations",
@@ -79,6 +84,7 @@ __all__ = [
     "NeuralStateSpaceModel",
     "Parameter",
     "PolynomialModel",
+    "PolynomialNARX",
     "Recursion",
     "Scaling",
     "SeveralOutputs",
@@ -97,6 +103,7 @@ __all__ = [
     "VectorScaling",
     "VectorStateSpace",
     "VectorStateSpaceModel",
+    "WienerHammerstein",
     "Wiring",
     "beginning",
     "cascade_from_dict",

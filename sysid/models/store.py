@@ -8,6 +8,7 @@ from typing import Any
 from sysid.errors import ConfigError, shortened
 from sysid.models.arx import ARX, ARXModel
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.built_model import BUILT, BuiltModel
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_program import Limit
 from sysid.models.grey_box import GreyBox, VectorGreyBox
@@ -41,6 +42,7 @@ _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
     (VectorStateSpace, VectorStateSpaceModel),
     *((structure, PolynomialModel) for structure in POLYNOMIALS.values()),
     (VectorNARX, VectorNARXModel),
+    *((structure, BuiltModel) for structure in BUILT),
 )
 
 _KINDS = {structure.kind: (structure, model) for structure, model in _PAIRS}

@@ -40,7 +40,10 @@ def test_a_structure_of_one_output_refuses_several() -> None:
 def test_a_row_says_what_its_function_knows() -> None:
     assert {kind for kind, row in ESTIMATORS.items() if row.selects} == {
         "GreyBox",
+        "HammersteinWiener",
+        "PolynomialNARX",
         "VectorGreyBox",
+        "WienerHammerstein",
         "NARX",
         "NSS",
         "TransferFunction",

@@ -51,6 +51,9 @@ GREY = {
     "equations": "doutlet/dt = (gain*(valve + inlet) - outlet + level)/lag",
     "parameters": {"gain": {"start": 1, "low": 0}, "level": 80, "lag": {"start": 2, "low": 0.1}},
 }
+HW = {"kind": "HammersteinWiener", "states": 1, "input": ["saturation", "none"], "output": "polynomial 2"}
+WH = {"kind": "WienerHammerstein", "first": 1, "second": 1, "curve": "network 2"}
+POLYNOMIAL_NARX = {"kind": "PolynomialNARX", "input_delays": 1, "output_delays": 1, "terms": 4}
 VECTOR_GREY = GREY | {"kind": "VectorGreyBox"}
 TF = {"kind": "TransferFunction", "poles": [1, 1], "zeros": [0, 0], "delays": [1, 1]}
 
@@ -78,6 +81,9 @@ FITS = [
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
     pytest.param(GREY, {"seed": 7, "max_iterations": 12, "starts": 2}, ALONE, id="GreyBox"),
     pytest.param(VECTOR_GREY, {"seed": 7, "max_iterations": 12, "starts": 1}, ALONE, id="VectorGreyBox, of one"),
+    pytest.param(HW, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="HammersteinWiener"),
+    pytest.param(WH, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="WienerHammerstein"),
+    pytest.param(POLYNOMIAL_NARX, {"seed": 7, "max_iterations": 4}, ALONE, id="PolynomialNARX"),
     pytest.param(VECTOR_SS, None, ALONE, id="VectorSS, of one"),
     pytest.param(VECTOR_NSS, {"seed": 7, "max_iterations": 4, "starts": 1}, ALONE, id="VectorNSS, of one"),
     pytest.param(VECTOR, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="NARX of several outputs, of one"),

@@ -35,7 +35,8 @@ from sysid.estimation.networks.multistart_result import multistart_result, multi
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.result import FitResult
-from sysid.models import Mapping, Start
+from sysid.models import AbstractStructure, Mapping, Start
+from sysid.models.built_model import BuiltModel
 from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
 from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
@@ -98,7 +99,7 @@ def fit_grey_box(
         output_unit=traces[0].channel(mapping.output).unit,
         rest_output=rest,
     )
-    return _fit(
+    return fit_equations(
         template, experiments, training, (traces, selection, start or Start()), vet=vet, on_progress=on_progress
     )
 
@@ -147,22 +148,75 @@ def fit_vector_grey_box(
         output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
         rest_outputs=rests,
     )
-    return _fit(
+    return fit_equations(
         template, experiments, training, (traces, selection, start or Start()), vet=vet, on_progress=on_progress
     )
 
 
-def _fit(
+def built_template(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    grey: GreyBox,
+    *,
+    built_of: AbstractStructure,
+    start: Start,
+    rest_output: float | None,
+) -> tuple[BuiltModel, tuple[Experiment, ...]]:
+    """A model of equations that were built of a structure, before its fit, and the records.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Which channels go in, which comes out.
+        grey: The equations.
+        built_of: The structure.
+        start: What stands before each trace.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+
+    Returns:
+        The model and the records.
+    """
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    experiments = experiments_of(traces, mapping, start, rest)
+    n = len(mapping.inputs)
+    template = BuiltModel(
+        **_common(traces[0], mapping, grey),
+        built_of=built_of,
+        scaling=replace(unit_range(experiments), input_offset=(0.0,) * n, input_scale=(1.0,) * n),
+        output_unit=traces[0].channel(mapping.output).unit,
+        rest_output=rest,
+    )
+    return template, experiments
+
+
+def fit_equations(
     template: GreyBoxModel | VectorGreyBoxModel,
     experiments: Sequence[Experiment],
     training: Training | None,
     data: tuple[Sequence[Trace], Sequence[Trace], Start],
     *,
+    others: Sequence[Array] = (),
+    scattered: frozenset[str] | None = None,
+    began: float | None = None,
     vet: Callable[[starts.Network], bool] | None,
     on_progress: Callable[[FitProgress], None],
 ) -> FitResult:
-    """Fit a model of any number of outputs."""
-    began = time.perf_counter()
+    """Fit equations of any number of outputs.
+
+    Args:
+        template: The model before its fit.
+        experiments: The records.
+        training: How to train.
+        data: Estimation traces, those that choose between starts, and what stands before each.
+        others: Where starts after the first begin: other parameters of those that are estimated.
+        scattered: Parameters around which later starts are drawn; ``None`` for all.
+        began: When the fit began, where that was before.
+        vet: Whether a model's free run is stable.
+        on_progress: Called after every iteration.
+
+    Returns:
+        The fit.
+    """
+    began = time.perf_counter() if began is None else began
     training = (training or Training()).with_starts(STARTS)
     check_training(training)
     ready = _ready(template, experiments)
@@ -170,7 +224,12 @@ def _fit(
     multistart = starts.Multistart(
         training=training,
         layout=EquationLayout(
-            parameters=template.grey.free, nets=ready.template.lowered.nets, provider=ready.provider, begun=ready.theta
+            parameters=template.grey.free,
+            nets=ready.template.lowered.nets,
+            provider=ready.provider,
+            begun=ready.theta,
+            others=tuple(others),
+            scattered=scattered,
         ),
         provider=ready.provider,
         to_plain=ready.to_plain,

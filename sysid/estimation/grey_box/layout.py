@@ -39,12 +39,16 @@ class EquationLayout(AbstractLayout):
         nets: The networks.
         provider: The records.
         begun: What is trained where the fit starts: declared starts, networks that do nothing, and initial states.
+        others: Where the starts after the first begin: other values of the parameters.
+        scattered: Names of the parameters around which the starts after these are drawn; ``None`` for all.
     """
 
     parameters: tuple[Parameter, ...]
     nets: tuple[Net, ...]
     provider: EquationProvider
     begun: Array
+    others: tuple[Array, ...] = ()
+    scattered: frozenset[str] | None = None
 
     @property
     def _first_weight(self) -> int:
@@ -127,6 +131,10 @@ class EquationLayout(AbstractLayout):
         begun = self.draw(rng, self.begun)
         if number == 0:
             return begun, self.begun
+        if number <= len(self.others):
+            w = self._first_weight
+            begun[:w] = self.others[number - 1] / self.provider.scale[:w]
+            return self.provider.with_states(begun, self.provider.states(begun, WINDOW)), self.begun
         for _ in range(TRIES):
             theta = self._scattered(begun, rng)
             theta = self.provider.with_states(theta, self.provider.states(theta, WINDOW))
@@ -139,6 +147,8 @@ class EquationLayout(AbstractLayout):
         moved, (low, high) = theta.copy(), self.provider.bounds
         for i, one in enumerate(self.parameters):
             z = APART * rng.standard_normal()
+            if self.scattered is not None and one.name not in self.scattered:
+                continue
             if one.prior is not None:
                 moved[i] += z
             elif one.start != 0.0:

@@ -1,0 +1,1 @@
+"""Structures that become equations: block-oriented models and polynomial NARX, started from linear fits."""

@@ -1,0 +1,129 @@
+"""Block-oriented structures as equations of a grey box, their parameters where the linear start has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid.estimation.blocks.linear_start import LinearStart
+from sysid.estimation.blocks.sections import Block
+from sysid.models import GreyBox, HammersteinWiener, Mapping, WienerHammerstein
+from sysid.models.curves import NONE, Curve, Text, number, quoted
+
+
+def hammerstein_wiener(
+    structure: HammersteinWiener, mapping: Mapping, begun: LinearStart, block: Block
+) -> tuple[GreyBox, frozenset[str]]:
+    """The equations of a Hammerstein-Wiener model.
+
+    Args:
+        structure: The structure.
+        mapping: Which channels go in, which comes out.
+        begun: The linear model.
+        block: The same as a block.
+
+    Returns:
+        The grey box, and the names of the parameters of curves.
+    """
+    text = Text(taken=frozenset((*mapping.inputs, *mapping.outputs)))
+    scaling = begun.scaling
+    inputs = _inputs(text, structure.curves(len(mapping.inputs)), mapping, begun, structure.lags(len(mapping.inputs)))
+    linear = write_block(text, block, inputs, "g")
+    level = text.estimated("level", begun.level)
+    inside = text.define("inside", f"{linear} + {level}")
+    in_units = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}"
+    curve, tag = structure.output, "h"
+    if curve.given:
+        right = text.curve(curve, text.define("unbent", f"{in_units}*{inside}"), tag)
+    else:
+        right = f"{in_units}*({text.curve(curve, inside, tag)})"
+    text.lines.append(f"{quoted(mapping.output)} = {right}")
+    return _grey(text), frozenset(text.curved)
+
+
+def wiener_hammerstein(
+    structure: WienerHammerstein, mapping: Mapping, begun: LinearStart, blocks: tuple[Block, Block]
+) -> tuple[GreyBox, frozenset[str]]:
+    """The equations of a Wiener-Hammerstein model; see :func:`hammerstein_wiener`.
+
+    The largest gain of the first block is held: the curve and the second block say the same.
+    """
+    text = Text(taken=frozenset((*mapping.inputs, *mapping.outputs)))
+    n = len(mapping.inputs)
+    inputs = _inputs(text, (Curve(kind=NONE),) * n, mapping, begun, structure.lags(n))
+    before, behind = blocks
+    between = text.define("between", write_block(text, before, inputs, "g1", held=True))
+    bent = text.define("bent", text.curve(structure.curve, between, "f"))
+    level = text.estimated("level", begun.level)
+    linear = write_block(text, behind, [(bent, True)], "g2")
+    scaling = begun.scaling
+    right = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}*({linear} + {level})"
+    text.lines.append(f"{quoted(mapping.output)} = {right}")
+    return _grey(text), frozenset(text.curved)
+
+
+Input = tuple[str, bool]
+"""What a block reads, and whether within the sample."""
+
+
+def _inputs(
+    text: Text, curves: Sequence[Curve], mapping: Mapping, begun: LinearStart, lags: Sequence[int]
+) -> list[Input]:
+    """What each input is behind its curve, in scaled numbers."""
+    found, scaling = [], begun.scaling
+    for j, (name, curve, lag) in enumerate(zip(mapping.inputs, curves, lags, strict=True)):
+        tag = f"f{j + 1}" if len(mapping.inputs) > 1 else "f"
+        read = quoted(name) + (f"[k-{lag - 1}]" if lag > 1 else "")
+        offset, scale = scaling.input_offset[j], scaling.input_scale[j]
+        if curve.kind == "table":
+            values = np.array([y for _, y in curve.points])
+            offset, scale = float(values.max() + values.min()) / 2.0, float(np.ptp(values)) / 2.0
+        if curve.given:
+            read = text.curve(curve, read, tag)
+        scaled = text.define(f"{tag}_in", f"({read} - {number(offset)})/{number(scale)}")
+        found.append((scaled if curve.given else text.define(f"{tag}_out", text.curve(curve, scaled, tag)), lag == 0))
+    return found
+
+
+def write_block(text: Text, block: Block, inputs: Sequence[Input], tag: str, *, held: bool = False) -> str:
+    """Write a block; what its output is.
+
+    Args:
+        text: The equations.
+        block: The block.
+        inputs: What it reads.
+        tag: Part of the names of its states and parameters.
+        held: Whether its largest gain is a number, and not estimated.
+
+    Returns:
+        The expression.
+    """
+    states = [text.name(f"{tag}_x{i + 1}") for i in range(block.states)]
+    largest = np.unravel_index(int(np.argmax(np.abs(block.gains))), block.gains.shape) if held else ()
+    at = 0
+    for number_, section in enumerate(block.sections, start=1):
+        behind = states[at + len(section)] if at + len(section) < block.states else ""
+        for i, coefficient in enumerate(section):
+            name = text.estimated(f"{tag}_a{number_}_{i + 1}", coefficient)
+            own = f"{name}*{states[at]}" if len(section) == 1 else f"-{name}*{states[at]}"
+            terms = [own, states[at + 1] if i == 0 and len(section) > 1 else behind]
+            for j, (read, _) in enumerate(inputs):
+                gain = block.gains[at + i, j]
+                wanted = f"{tag}_b{at + i + 1}" + (f"_{j + 1}" if len(inputs) > 1 else "")
+                one = number(gain) if (at + i, j) == tuple(largest) else text.estimated(wanted, gain)
+                terms.append(f"{one}*{read}")
+            text.lines.append(f"{states[at + i]}[k+1] = {' + '.join(term for term in terms if term)}")
+        at += len(section)
+    direct = [
+        f"{text.estimated(f'{tag}_d{j + 1}' if len(inputs) > 1 else f'{tag}_d', block.direct[j])}*{read}"
+        for j, (read, now) in enumerate(inputs)
+        if now
+    ]
+    return " + ".join([states[0], *direct])
+
+
+def _grey(text: Text) -> GreyBox:
+    return GreyBox(
+        equations="\n".join(text.lines), parameters=tuple(text.parameters), tables={n: list(p) for n, p in text.tables}
+    )

@@ -1,0 +1,127 @@
+"""Block-oriented models of traces: equations from the best linear model, fitted as any grey box."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sysid.estimation.blocks.equations import hammerstein_wiener, wiener_hammerstein
+from sysid.estimation.blocks.linear_start import LinearStart, linear_start, parted, shifted, whole
+from sysid.estimation.grey_box.fit import built_template, fit_equations
+from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
+from sysid.estimation.result import FitResult
+from sysid.models import HammersteinWiener, Mapping, Start, WienerHammerstein
+from sysid.models.block_oriented import BlockStructure
+from sysid.traces import Trace
+
+STARTS = 4
+"""Starts of a fit that asks for none: for two blocks, ways to part the linear model; else draws of the curves."""
+
+check_training = partial(check_hidden_states, "a block-oriented model")
+"""Refuses options that do not apply to hidden states."""
+
+
+def fit_hammerstein_wiener(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    structure: HammersteinWiener,
+    training: Training | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    selection: Sequence[Trace] = (),
+    vet: Callable[[Any], bool] | None = None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> FitResult:
+    """Fit a linear block with curves around it by the least error of the free run.
+
+    Args:
+        traces: Estimation traces; never concatenated.
+        mapping: Which channels go in, which comes out.
+        structure: The structure.
+        training: How to train; options for lagged regressors do not apply.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        selection: Traces that choose between starts.
+        vet: Whether a model's free run is stable.
+        on_progress: Called after every iteration, from the threads that train.
+
+    Returns:
+        The fit, with the uncertainty of its parameters and the posterior of its output.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        ConfigError: If an option does not apply.
+        TraceError: If no sample counts, or there is no linear model to start from.
+    """
+    began = time.perf_counter()
+    rectified = structure.output.kind == "absolute"
+    begun = _begun(
+        traces, mapping, structure, structure.states, start=start, rest_output=rest_output, rectified=rectified
+    )
+    direct = [lag == 0 for lag in structure.lags(len(mapping.inputs))]
+    grey, curved = hammerstein_wiener(structure, mapping, begun, whole(begun, direct=direct))
+    template, experiments = built_template(
+        traces, mapping, grey, built_of=structure, start=start or Start(), rest_output=rest_output
+    )
+    return fit_equations(
+        template, experiments, (training or Training()).with_starts(STARTS), (traces, selection, start or Start()),
+        scattered=curved, began=began, vet=vet, on_progress=on_progress,
+    )  # fmt: skip
+
+
+def fit_wiener_hammerstein(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    structure: WienerHammerstein,
+    training: Training | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    selection: Sequence[Trace] = (),
+    vet: Callable[[Any], bool] | None = None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> FitResult:
+    """Fit a curve between two linear blocks; see :func:`fit_hammerstein_wiener`.
+
+    The starts are ways to part the best linear model around the curve, the most promising first.
+    """
+    began = time.perf_counter()
+    training = (training or Training()).with_starts(STARTS)
+    begun = _begun(traces, mapping, structure, structure.first + structure.second, start=start, rest_output=rest_output)
+    direct = [lag == 0 for lag in structure.lags(len(mapping.inputs))]
+    longest = max(shifted(traces, mapping, structure.lags(len(mapping.inputs))), key=len)
+    signals = (
+        begun.scaling.scale_inputs(longest.columns(mapping.inputs)),
+        begun.scaling.scale_output(longest[mapping.output]),
+    )
+    rng = np.random.default_rng(training.seed)
+    ways = parted(begun, structure.first, signals, direct=direct, rng=rng)[: training.n_starts]
+    greys = [wiener_hammerstein(structure, mapping, begun, pair)[0] for pair in ways]
+    template, experiments = built_template(
+        traces, mapping, greys[0], built_of=structure, start=start or Start(), rest_output=rest_output
+    )
+    others = [np.array([one.start for one in grey.free]) for grey in greys[1:]]
+    return fit_equations(
+        template, experiments, training, (traces, selection, start or Start()),
+        others=others, scattered=frozenset(), began=began, vet=vet, on_progress=on_progress,
+    )  # fmt: skip
+
+
+def _begun(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    structure: BlockStructure,
+    states: int,
+    *,
+    start: Start | None,
+    rest_output: float | None,
+    rectified: bool = False,
+) -> LinearStart:
+    late = shifted(traces, mapping, structure.lags(len(mapping.inputs)))
+    output = "absolute" if rectified else "plain"
+    return linear_start(late, mapping, states, start=start or Start(), rest_output=rest_output, output=output)

@@ -1,0 +1,192 @@
+"""Where block-oriented fits start: the best linear model, whole or parted around a curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.blocks.sections import Block, Poles, block_of, responses, samples_for, sections_of
+from sysid.estimation.networks.neural_state_space import fit_neural_state_space
+from sysid.estimation.networks.training import Training
+from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
+from sysid.traces import Trace
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 60
+ROUNDS, DRAWS = 20, 3
+"""Alternating least squares between two blocks, and beginnings of it for each way to part the poles."""
+KNOTS = 8
+"""Breakpoints of the curve with which ways to part the linear model are compared."""
+COMPARED, SETTLED = 20_000, 0.1
+"""Samples over which they are, and the share of these that the blocks take to forget that they began at 0."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearStart:
+    """The best linear model, in scaled numbers.
+
+    Args:
+        scaling: Between units and scaled numbers.
+        poles: Shape ``(n_states,)``.
+        response: Impulse response to each input, lag 0 first, shape ``(n_samples, n_inputs)``.
+        level: What the output has where the inputs are 0.
+    """
+
+    scaling: Scaling
+    poles: Poles
+    response: Array
+    level: float
+
+
+def shifted(traces: Sequence[Trace], mapping: Mapping, lags: Sequence[int]) -> list[Trace]:
+    """Traces whose inputs come later by all but a sample of their dead times, the first value held."""
+    found = []
+    for trace in traces:
+        names, values = [channel.name for channel in trace.channels], trace.values.copy()
+        for name, lag in zip(mapping.inputs, lags, strict=True):
+            j, late = names.index(name), max(0, lag - 1)
+            if late:
+                values[:, j] = np.concatenate([np.full(late, values[0, j]), values[:, j]])[: len(values)]
+        found.append(replace(trace, values=values))
+    return found
+
+
+def linear_start(
+    traces: Sequence[Trace], mapping: Mapping, states: int, *, start: Start, rest_output: float | None, output: str
+) -> LinearStart:
+    """The linear model of least error in free run.
+
+    Args:
+        traces: Estimation traces, their dead times taken away.
+        mapping: Which channels go in, which comes out.
+        states: Number of states.
+        start: What stands before each trace.
+        rest_output: Output at rest, in its unit.
+        output: ``plain``, or ``absolute``.
+
+    Returns:
+        The start.
+    """
+    training = Training(starts=1, max_iterations=ITERATIONS, choose_by="evidence")
+    structure = NeuralStateSpace(states=states, neurons=0, output=output)
+    fit = fit_neural_state_space(traces, mapping, structure, training, start=start, rest_output=rest_output)
+    model = fit.model
+    assert isinstance(model, NeuralStateSpaceModel)  # noqa: S101 - it is what that fits
+    sizes = model.recursion.sizes
+    M, L = (model.theta[part].reshape(-1, sizes.row) for part in (sizes.linear, sizes.output_linear))
+    A, B, drift = M[:, :states], M[:, states:-1], M[:, -1]
+    C, D = L[0, :states], L[0, states:-1]
+    poles = np.linalg.eigvals(A).astype(np.complex128)
+    response, row = np.zeros((samples_for(poles), B.shape[1])), C
+    response[0] = D
+    for k in range(1, len(response)):
+        response[k] = row @ B
+        row = row @ A
+    level = L[0, -1] + C @ np.linalg.lstsq(np.eye(states) - A, drift, rcond=None)[0]
+    return LinearStart(scaling=model.scaling, poles=poles, response=response, level=float(level))
+
+
+def whole(begun: LinearStart, *, direct: Sequence[bool]) -> Block:
+    """The linear model as one block."""
+    found = block_of(begun.poles, begun.response, direct=any(direct))
+    return replace(found, direct=np.where(direct, found.direct, 0.0))
+
+
+def parted(
+    begun: LinearStart, first: int, signals: tuple[Array, Array], *, direct: Sequence[bool], rng: np.random.Generator
+) -> list[tuple[Block, Block]]:
+    """Ways to part the linear model around a curve, the most promising first.
+
+    Which pole and zero belongs before the curve a linear model cannot say (Sjoberg and Schoukens 2012): every way to
+    part the poles is tried, the gains by alternating least squares, and judged by the best static curve between.
+
+    Args:
+        begun: The linear model.
+        first: States before the curve.
+        signals: Scaled inputs, shape ``(n_samples, n_inputs)``, and output of a record.
+        direct: Of each input whether it is read within the sample.
+        rng: Source of randomness.
+
+    Returns:
+        Pairs of blocks, what lies between scaled to -1 to 1.
+    """
+    found = []
+    for before, behind in _ways(begun.poles, first):
+        for _ in range(DRAWS):
+            pair = _factors(before, behind, begun.response, direct, rng)
+            found.append(_judged(pair, signals))
+    return [pair for _, pair in sorted(found, key=lambda one: one[0])]
+
+
+def _ways(poles: Poles, first: int) -> list[tuple[Poles, Poles]]:
+    """Every way to take so many of some poles, pairs staying together."""
+    units = [np.array([p, p.conjugate()]) for p in poles if p.imag > 0.0] + [
+        np.array([p]) for p in poles if p.imag == 0.0
+    ]
+    found = []
+    for n in range(len(units) + 1):
+        for taken in combinations(range(len(units)), n):
+            before = [units[i] for i in taken]
+            if sum(map(len, before)) == first:
+                rest = [one for i, one in enumerate(units) if i not in taken]
+                found.append((np.concatenate(before), np.concatenate(rest)))
+    if found:
+        return found
+    pair = min((one for one in units if len(one) == 2), key=lambda one: float(abs(one[0])))
+    real = np.array([abs(pair[0]), 0.9 * abs(pair[0])], dtype=np.complex128)  # a pair that has to be divided
+    others = [p for p in poles if p not in pair]
+    return _ways(np.array([*others, *real]), first)
+
+
+def _factors(
+    before: Poles, behind: Poles, response: Array, direct: Sequence[bool], rng: np.random.Generator
+) -> tuple[Block, Block]:
+    """Two blocks in a row with the impulse response of one."""
+    n, m = response.shape
+    now = np.eye(n)[:, :1]
+    P = np.concatenate([now, responses(sections_of(before), n)], axis=1)
+    Q = np.concatenate([now, responses(sections_of(behind), n)], axis=1)
+    size = 2 * n
+    T = np.fft.irfft(np.fft.rfft(P, size, axis=0)[:, :, None] * np.fft.rfft(Q, size, axis=0)[:, None, :], size, axis=0)[
+        :n
+    ]
+    open_ = np.ones((P.shape[1], m), dtype=np.bool_)
+    open_[0] = direct
+    q, p = rng.standard_normal(Q.shape[1]) / np.maximum(np.linalg.norm(Q, axis=0), 1e-12), np.zeros((P.shape[1], m))
+    for _ in range(ROUNDS):
+        each = T @ q
+        for j in range(m):
+            p[:, j] = 0.0
+            p[open_[:, j], j] = np.linalg.lstsq(each[:, open_[:, j]], response[:, j], rcond=1e-10)[0]
+        whole_ = np.einsum("kab,aj->kjb", T, p).reshape(n * m, -1)
+        q = np.linalg.lstsq(whole_, response.ravel(), rcond=1e-10)[0]
+    return (
+        Block(sections=sections_of(before), gains=p[1:], direct=p[0]),
+        Block(sections=sections_of(behind), gains=q[1:, None], direct=q[:1]),
+    )
+
+
+def _judged(pair: tuple[Block, Block], signals: tuple[Array, Array]) -> tuple[float, tuple[Block, Block]]:
+    """The squared error with the best curve between two blocks, and these with what lies between from -1 to 1."""
+    before, behind = pair
+    w, y = signals[0][:COMPARED], signals[1][:COMPARED]
+    between = before.filtered(w - w[0])
+    low, high = float(between.min()), float(between.max())
+    span = max(abs(low), abs(high))
+    if not np.isfinite(span) or span == 0.0:
+        return np.inf, pair
+    before = replace(before, gains=before.gains / span, direct=before.direct / span)
+    behind = replace(behind, gains=behind.gains * span, direct=behind.direct * span)
+    between = between / span
+    knots = np.linspace(low / span, high / span, KNOTS + 2)[1:-1]
+    columns = [between, *(np.maximum(between - at, 0.0) for at in knots)]
+    first = round(SETTLED * len(y))
+    design = np.column_stack([np.ones(len(y)), *(behind.filtered(column[:, None]) for column in columns)])[first:]
+    found = np.linalg.lstsq(design, y[first:], rcond=None)[0]
+    error = float(np.mean((y[first:] - design @ found) ** 2))
+    return (error if np.isfinite(error) else np.inf), (before, behind)

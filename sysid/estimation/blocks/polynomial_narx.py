@@ -1,0 +1,173 @@
+"""Polynomial NARX of traces: terms by orthogonal least squares, as many as the free run says, refined for it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import FitDivergedError
+from sysid.estimation.blocks.selection import Chosen, choose_terms
+from sysid.estimation.experiment import Experiment, experiments_of
+from sysid.estimation.grey_box.fit import built_template, fit_equations
+from sysid.estimation.linear.arx import first_output
+from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
+from sysid.estimation.result import FitResult
+from sysid.models import BuiltModel, GreyBox, Lags, Mapping, PolynomialNARX, Start
+from sysid.models.curves import Text, quoted
+from sysid.models.polynomial_narx import Term
+from sysid.traces import Trace
+
+Array = NDArray[np.float64]
+
+check_training = partial(check_hidden_states, "a polynomial NARX model")
+"""Refuses options that do not apply: its terms are chosen one step ahead, and refined for the free run."""
+
+
+def fit_polynomial_narx(
+    traces: Sequence[Trace],
+    mapping: Mapping,
+    structure: PolynomialNARX,
+    training: Training | None = None,
+    *,
+    start: Start | None = None,
+    rest_output: float | None = None,
+    selection: Sequence[Trace] = (),
+    vet: Callable[[Any], bool] | None = None,
+    on_progress: Callable[[FitProgress], None] = lambda _: None,
+) -> FitResult:
+    """Choose the terms of a polynomial and fit it to the free run.
+
+    Args:
+        traces: Estimation traces; never concatenated.
+        mapping: Which channels go in, which comes out.
+        structure: The structure.
+        training: How the coefficients are refined; options for lagged regressors do not apply.
+        start: What stands before each trace; at rest by default.
+        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        selection: Traces whose free run says how many terms; without them Schwarz's criterion over the fitted ones.
+        vet: Whether a model's free run is stable.
+        on_progress: Called after every iteration, from the threads that train.
+
+    Returns:
+        The fit, with the uncertainty of its coefficients.
+
+    Raises:
+        ChannelError: If a trace lacks a channel of the mapping.
+        FitDivergedError: If no number of terms has a free run.
+        TraceError: If no sample counts.
+    """
+    began = time.perf_counter()
+    training = (training or Training()).with_starts(1)
+    rest = first_output(traces, mapping) if rest_output is None else rest_output
+    start = start or Start()
+    lags = structure.lags(len(mapping.inputs))
+    X, y = _rows(experiments_of(traces, mapping, start, rest), lags)
+    found = choose_terms(X, y, structure.candidates(len(mapping.inputs)), structure.terms)
+    best = _best(found, structure, mapping, data=(traces, selection), start=start, rest=rest)
+    fitted = fit_equations(
+        *built_template(traces, mapping, best.grey, built_of=structure, start=start, rest_output=rest),
+        training, (traces, selection, start),
+        scattered=frozenset(), began=began, vet=vet, on_progress=on_progress,
+    )  # fmt: skip
+    model = fitted.model
+    assert isinstance(model, BuiltModel)  # noqa: S101 - the template is one
+    explained = ", ".join(
+        f"{_written(term, structure.regressors(mapping)) or 'constant'} {share:.2%}"
+        for term, share in zip(found.terms[: best.terms], found.reductions, strict=False)
+    )
+    notes = (f"{model.equations}", f"One step ahead the terms explain, in the order in which they came: {explained}.")
+    return replace(fitted, notes=(*fitted.notes, *notes))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Candidate:
+    terms: int
+    grey: GreyBox
+    criterion: float
+
+
+def _rows(experiments: Sequence[Experiment], lags: Lags) -> tuple[Array, Array]:
+    """Regressors and output of every row that counts, shapes ``(n_regressors, n_rows)`` and ``(n_rows,)``."""
+    found = []
+    for one in experiments:
+        e = one.from_measured(lags).one_step(lags)
+        past_u, past_y = e.history.padded(lags.depth)
+        u, y = np.concatenate([past_u, e.inputs]), np.concatenate([past_y, e.output])
+        n, depth = len(e.output), lags.depth
+        rows = [
+            u[depth - lag : depth - lag + n, j] for j, lag in zip(lags.input_channel, lags.input_lag, strict=True)
+        ] + [y[depth - lag : depth - lag + n] for lag in lags.output]
+        weights = np.ones(n) if e.weights is None else e.weights
+        counted = weights > 0.0
+        found.append((np.array(rows).reshape(len(rows), n)[:, counted], e.output[counted]))
+    return np.concatenate([x for x, _ in found], axis=1), np.concatenate([y for _, y in found])
+
+
+def _best(
+    found: Chosen,
+    structure: PolynomialNARX,
+    mapping: Mapping,
+    *,
+    data: tuple[Sequence[Trace], Sequence[Trace]],
+    start: Start,
+    rest: float,
+) -> _Candidate:
+    """The number of terms whose free run is best, over the traces that choose where there are any."""
+    traces, selection = data
+    tried: list[_Candidate] = []
+    for n, coefficients in enumerate(found.coefficients, start=1):
+        grey = equations(structure, mapping, found.terms[:n], coefficients)
+        template, _ = built_template(traces, mapping, grey, built_of=structure, start=start, rest_output=rest)
+        squares, count = 0.0, 0
+        with np.errstate(over="ignore", invalid="ignore"):  # polynomials explode
+            for trace in selection or traces:
+                e = Experiment.for_model(trace, template, start)
+                away = template.simulate(e.inputs, e.history) - e.output
+                weights = np.ones(len(away)) if e.weights is None else e.weights
+                squares, count = squares + float(weights @ away**2), count + int(np.count_nonzero(weights))
+        price = 0.0 if selection else n * math.log(max(count, 1)) / max(count, 1)
+        value = math.log(max(squares / max(count, 1), 1e-300)) + price if math.isfinite(squares) else math.inf
+        tried.append(_Candidate(terms=n, grey=grey, criterion=value))
+    usable = [one for one in tried if math.isfinite(one.criterion)]
+    if not usable:
+        raise FitDivergedError(
+            f"none of the polynomials of up to {len(tried)} terms has a free run that stays finite",
+            remedy="use a lower degree or fewer lags, remove what is noise, or fit a neural state space",
+        )
+    return min(usable, key=lambda one: one.criterion)
+
+
+def equations(
+    structure: PolynomialNARX, mapping: Mapping, terms: Sequence[Term], coefficients: Sequence[float]
+) -> GreyBox:
+    """A polynomial as equations, its coefficients to be estimated.
+
+    Args:
+        structure: The structure.
+        mapping: Which channels go in, which comes out.
+        terms: Its terms.
+        coefficients: Where they start, in units.
+
+    Returns:
+        The grey box.
+    """
+    text, names = Text(taken=frozenset((*mapping.inputs, *mapping.outputs))), structure.regressors(mapping)
+    parts = [
+        "*".join(filter(None, [text.estimated(f"c{i}", c), _written(term, names)]))
+        for i, (term, c) in enumerate(zip(terms, coefficients, strict=True), start=1)
+    ]
+    text.lines.append(f"{quoted(mapping.output)} = {' + '.join(parts)}")
+    return GreyBox(equations="\n".join(text.lines), parameters=tuple(text.parameters))
+
+
+def _written(term: Term, names: Sequence[str]) -> str:
+    """A product as equations have it, powers as powers."""
+    powers = {place: term.count(place) for place in dict.fromkeys(term)}
+    return "*".join(names[place] + (f"^{n}" if n > 1 else "") for place, n in powers.items())

@@ -1,0 +1,67 @@
+"""Models of structures that become equations: they run, and are exported, as the grey box that was built of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from typing import Any
+
+from sysid.models.base import AbstractStructure
+from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
+from sysid.models.grey_box import GreyBox
+from sysid.models.grey_box_model import GreyBoxModel
+from sysid.models.polynomial_narx import PolynomialNARX
+from sysid.models.scaling import Scaling
+
+BUILT: tuple[type[AbstractStructure], ...] = (HammersteinWiener, WienerHammerstein, PolynomialNARX)
+"""Structures that become equations when they are fitted."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BuiltModel(GreyBoxModel):
+    """A fitted model of such a structure; its other fields are those of :class:`GreyBoxModel`.
+
+    Args:
+        built_of: The structure that was asked for.
+    """
+
+    built_of: AbstractStructure
+
+    @property
+    def structure(self) -> AbstractStructure:  # type: ignore[override]  # any that becomes equations
+        """What was asked for."""
+        return self.built_of
+
+    @property
+    def equations(self) -> str:
+        """The equations with the numbers that were found, for people; weights of networks are not among them."""
+        text = self.grey.equations
+        for name in sorted(self.parameters, key=len, reverse=True):
+            text = _with_number(text, name, self.parameters[name])
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything needed to build the model again."""
+        found = super().to_dict()
+        return found | {"structure": self.built_of.to_dict(), "equations": self.grey.to_dict()}
+
+    @classmethod
+    def from_dict(cls, fields: Dict[str, Any]) -> BuiltModel:
+        """The model that :meth:`to_dict` wrote."""
+        kinds = {one.kind: one for one in BUILT}
+        structure, equations = (
+            {key: value for key, value in fields[name].items() if key != "kind"} for name in ("structure", "equations")
+        )
+        return cls(
+            built_of=kinds[fields["structure"]["kind"]](**structure),
+            grey=GreyBox(**equations),
+            scaling=Scaling.from_dict(fields["scaling"]),
+            output_unit=fields["output_unit"],
+            rest_output=fields["rest_output"],
+            **cls._read(fields),
+        )
+
+
+def _with_number(text: str, name: str, value: float) -> str:
+    return re.sub(rf'(?<![\w"]){re.escape(name)}(?![\w"\[])', f"{value:.6g}" if value >= 0 else f"({value:.6g})", text)

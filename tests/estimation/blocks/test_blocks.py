@@ -1,0 +1,207 @@
+"""Block-oriented models and polynomials of records whose truth is known."""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult
+from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
+from sysid.estimation.blocks.polynomial_narx import fit_polynomial_narx
+from sysid.estimation.blocks.sections import block_of, responses, sections_of
+from sysid.estimation.blocks.selection import choose_terms, products
+from sysid.estimation.networks.training import Training
+from sysid.models import BuiltModel, HammersteinWiener, Mapping, PolynomialNARX, WienerHammerstein, model_from_dict
+from sysid.models.curves import Curve
+from sysid.traces import Channel, Trace
+
+MAPPING = Mapping.parse("u -> y")
+ONE = Training(starts=1, max_iterations=80, workers=1)
+POLES = np.poly([0.85 * np.exp(0.2j), 0.85 * np.exp(-0.2j)]).real
+
+
+def a_trace(u: np.ndarray, y: np.ndarray) -> Trace:
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+    return Trace(name="record", sample_time=0.5, channels=channels, values=np.column_stack([u, y]))
+
+
+def steps(seed: int, n: int = 400) -> np.ndarray:
+    u = np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, n // 4), 4)
+    u[:20] = 0.0  # so that what began at 0 is at rest
+    return u
+
+
+def block(w: np.ndarray) -> np.ndarray:
+    return np.asarray(lfilter((0.0, 0.05, 0.04), POLES, w))
+
+
+def error(fit: FitResult, system: Any) -> float:
+    """Of the free run over another record, over the spread of its output."""
+    u = steps(99)
+    y = system(u)
+    return float(np.std(fit.model.simulate(u[:, None]) - y) / np.std(y))
+
+
+def saturated(u: np.ndarray) -> np.ndarray:
+    return block(np.clip(u, -0.6, 0.4))
+
+
+def bent(u: np.ndarray) -> np.ndarray:
+    z = block(u)
+    return np.asarray(z + 0.4 * z**2)
+
+
+def both(u: np.ndarray) -> np.ndarray:
+    return np.asarray(np.clip(block(u + 0.5 * u**3), -0.5, 0.5))
+
+
+def late(u: np.ndarray) -> np.ndarray:
+    return saturated(np.concatenate([np.zeros(3), u[:-3]]))
+
+
+@pytest.mark.parametrize(
+    ("system", "structure"),
+    [
+        pytest.param(saturated, {"input": "saturation"}, id="Hammerstein"),
+        pytest.param(saturated, {"input": {"saturation": [-0.6, 0.4]}}, id="Hammerstein, its limits known"),
+        pytest.param(saturated, {"input": {"table": [[-0.6, -6], [0.4, 4]]}}, id="Hammerstein, its curve known"),
+        pytest.param(late, {"input": "saturation", "delays": 4}, id="with a dead time"),
+        pytest.param(bent, {"output": "polynomial 2"}, id="Wiener"),
+        pytest.param(lambda u: np.abs(block(u)), {"output": "absolute"}, id="Wiener, no sign"),
+        pytest.param(both, {"input": "polynomial 3", "output": "saturation"}, id="Hammerstein-Wiener"),
+    ],
+)
+def test_blocks_and_curves_are_found(system: Any, structure: dict[str, Any]) -> None:
+    u = steps(1)
+    fit = fit_hammerstein_wiener([a_trace(u, system(u))], MAPPING, HammersteinWiener(states=2, **structure), ONE)
+    assert error(fit, system) < 2e-3
+
+
+def test_the_limits_of_a_saturation_have_intervals_that_hold_them() -> None:
+    u = steps(1)
+    y = saturated(u) + 0.005 * np.random.default_rng(0).standard_normal(len(u))
+    fit = fit_hammerstein_wiener([a_trace(u, y)], MAPPING, HammersteinWiener(states=2, input="saturation"), ONE)
+    known, middle, half = fit.uncertainty, (u.max() + u.min()) / 2.0, (u.max() - u.min()) / 2.0
+    assert known is not None
+    places = [known.names.index(name) for name in ("f_low", "f_high")]
+    away = known.values[places] * half + middle - [-0.6, 0.4]
+    assert (np.abs(away) < 3.0 * known.standard_deviations[places] * half).all()
+    assert (known.standard_deviations[places] < 0.05).all()
+
+
+def sandwich(u: np.ndarray) -> np.ndarray:
+    return np.asarray(lfilter([0.0, 0.5], [1.0, -0.5], block(u) + 2.0 * block(u) ** 3))
+
+
+def test_poles_are_parted_around_the_curve() -> None:
+    u = steps(1)
+    structure = WienerHammerstein(first=2, second=1, curve="polynomial 3")
+    fit = fit_wiener_hammerstein(
+        [a_trace(u, sandwich(u))], MAPPING, structure, Training(starts=3, max_iterations=80, workers=1)
+    )
+    assert error(fit, sandwich) < 2e-3
+    found = fit.model.parameters  # type: ignore[attr-defined]
+    assert [found["g1_a1_1"], found["g1_a1_2"], found["g2_a1_1"]] == pytest.approx([*POLES[1:], 0.5], abs=1e-3)
+
+
+def test_a_model_is_stored_and_read_again() -> None:
+    u = steps(1)
+    structure = HammersteinWiener(states=2, input="network 2")
+    fit = fit_hammerstein_wiener([a_trace(u, saturated(u))], MAPPING, structure, Training(starts=1, max_iterations=2))
+    again = model_from_dict(fit.model.to_dict())
+    assert isinstance(again, BuiltModel)
+    assert again.structure == structure
+    assert (again.simulate(u[:, None]) == fit.model.simulate(u[:, None])).all()
+
+
+@pytest.mark.parametrize("poles", [[0.5], [0.9, 0.9], [0.9 + 0.2j, 0.9 - 0.2j, 0.7], [0.99, 0.98, 0.97, 0.5]], ids=str)
+def test_sections_have_the_response_of_the_poles(poles: list[complex]) -> None:
+    impulse = np.eye(200)[0]
+    wanted = np.asarray(lfilter([0.3, *[0.1] * len(poles)], np.poly(poles).real, impulse))
+    found = block_of(np.array(poles, dtype=np.complex128), wanted[:, None], direct=True)
+    answer = responses(sections_of(np.array(poles, dtype=np.complex128)), 200) @ found.gains[:, 0]
+    answer[0] = found.direct[0]
+    assert answer == pytest.approx(wanted, abs=1e-7)
+    assert found.filtered(impulse[:, None]) == pytest.approx(wanted, abs=1e-6)
+
+
+def slow_choice(X: np.ndarray, y: np.ndarray, candidates: list[tuple[int, ...]], most: int) -> list[tuple[int, ...]]:
+    """The term that leaves least, again and again, by least squares over all that are chosen."""
+    taken: list[tuple[int, ...]] = []
+    for _ in range(most):
+        left = {}
+        for one in candidates:
+            if one not in taken:
+                P = products(X, [*taken, one]).T
+                left[one] = np.sum((y - P @ np.linalg.lstsq(P, y, rcond=None)[0]) ** 2)
+        taken.append(min(left, key=lambda one: left[one]))
+    return taken
+
+
+def test_terms_are_those_that_leave_least(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    X, y = 5.0 + rng.standard_normal((3, 60)), rng.standard_normal(60)
+    candidates = [term for d in range(3) for term in combinations_with_replacement(range(3), d)]
+    monkeypatch.setattr("sysid.estimation.blocks.selection.CHUNK", 180)
+    found = choose_terms(X, y, candidates, 6)
+    assert list(found.terms) == slow_choice(X, y, candidates, 6)
+    P = products(X, found.terms).T
+    best = np.linalg.lstsq(P, y, rcond=None)[0]
+    assert found.coefficients[-1] == pytest.approx(best, rel=1e-6)
+    assert sum(found.reductions) == pytest.approx(1.0 - np.sum((y - P @ best) ** 2) / (y @ y), abs=1e-9)
+
+
+def polynomial(u: np.ndarray) -> np.ndarray:
+    y = np.zeros(len(u))
+    for k in range(2, len(u)):
+        y[k] = 0.5 * y[k - 1] + 0.3 * y[k - 1] * u[k - 1] + 0.8 * u[k - 2] ** 2
+    return y
+
+
+def test_the_terms_of_a_polynomial_are_found_and_told() -> None:
+    u = steps(1)
+    y = polynomial(u) + 0.01 * np.random.default_rng(0).standard_normal(len(u))
+    fit = fit_polynomial_narx([a_trace(u, y)], MAPPING, PolynomialNARX(degree=2, terms=8))
+    model = fit.model
+    assert isinstance(model, BuiltModel)
+    assert error(fit, polynomial) < 0.01
+    assert sorted(model.parameters.values()) == pytest.approx([0.3, 0.5, 0.8], abs=0.01)
+    assert model.equations.count("*") == 4
+    assert model.equations in fit.notes
+    assert any("u[k-2]^2" in note and "%" in note for note in fit.notes)
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [("spline 4", "spline 4"), ("piecewise 0", "piecewise 0"), ({"saturation": [2, 1]}, "saturation"),
+     ({"table": [[0, 1], [0, 2]]}, "table"), (3, "3")],
+    ids=str,
+)  # fmt: skip
+def test_what_is_no_curve_is_refused(written: object, said: str) -> None:
+    with pytest.raises(ConfigError, match="not a static curve") as caught:
+        HammersteinWiener(states=1, input=written)
+    assert said in str(caught.value.got)
+
+
+def test_structures_refuse_what_does_not_fit_the_inputs() -> None:
+    two = Mapping.parse("u+v -> y")
+    with pytest.raises(ConfigError, match="the curves do not match the inputs"):
+        HammersteinWiener(states=1, input=["none", "none", "none"]).check_mapping(two)
+    with pytest.raises(ConfigError, match="the dead times do not match the inputs"):
+        WienerHammerstein(first=1, second=1, delays=[1]).check_mapping(two)
+    with pytest.raises(ConfigError, match="what lies between two blocks has no unit"):
+        WienerHammerstein(first=1, second=1, curve={"saturation": [0, 1]})
+    with pytest.raises(ConfigError, match="too many candidate terms"):
+        PolynomialNARX(input_delays=30, output_delays=30, degree=5).check_mapping(two)
+
+
+def test_a_known_curve_is_written_as_it_was_given() -> None:
+    structure = HammersteinWiener(states=1, input={"dead zone": [-1, 1]}, output="absolute")
+    assert structure.to_dict()["input"] == [{"dead zone": [-1, 1]}]
+    assert HammersteinWiener(**{k: v for k, v in structure.to_dict().items() if k != "kind"}) == structure
+    assert Curve.parse("network 5", "input").size == 5
