@@ -149,10 +149,10 @@ class Text:
         self.lines.append(f"{found} = {right}")
         return found
 
-    def estimated(self, wanted: str, start: float, *, curve: bool = False) -> str:
+    def estimated(self, wanted: str, start: float, *, curve: bool = False, prior: float | None = None) -> str:
         """A parameter; its name."""
         found = self.name(wanted)
-        self.parameters.append(Parameter(name=found, start=float(start)))
+        self.parameters.append(Parameter(name=found, start=float(start), prior=prior))
         if curve:
             self.curved.add(found)
         return found

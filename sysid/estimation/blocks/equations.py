@@ -47,13 +47,13 @@ def wiener_hammerstein(
 ) -> tuple[GreyBox, frozenset[str]]:
     """The equations of a Wiener-Hammerstein model; see :func:`hammerstein_wiener`.
 
-    The largest gain of the first block is held: the curve and the second block say the same.
+    How large what lies between is no record can say. The largest gain of the first block has a prior that does.
     """
     text = Text(taken=frozenset((*mapping.inputs, *mapping.outputs)))
     n = len(mapping.inputs)
     inputs = _inputs(text, (Curve(kind=NONE),) * n, mapping, begun, structure.lags(n))
     before, behind = blocks
-    between = text.define("between", write_block(text, before, inputs, "g1", held=True))
+    between = text.define("between", write_block(text, before, inputs, "g1", known=True))
     bent = text.define("bent", text.curve(structure.curve, between, "f"))
     level = text.estimated("level", begun.level)
     linear = write_block(text, behind, [(bent, True)], "g2")
@@ -86,7 +86,7 @@ def _inputs(
     return found
 
 
-def write_block(text: Text, block: Block, inputs: Sequence[Input], tag: str, *, held: bool = False) -> str:
+def write_block(text: Text, block: Block, inputs: Sequence[Input], tag: str, *, known: bool = False) -> str:
     """Write a block; what its output is.
 
     Args:
@@ -94,13 +94,13 @@ def write_block(text: Text, block: Block, inputs: Sequence[Input], tag: str, *, 
         block: The block.
         inputs: What it reads.
         tag: Part of the names of its states and parameters.
-        held: Whether its largest gain is a number, and not estimated.
+        known: Whether its largest gain has a prior, as wide as it is large.
 
     Returns:
         The expression.
     """
     states = [text.name(f"{tag}_x{i + 1}") for i in range(block.states)]
-    largest = np.unravel_index(int(np.argmax(np.abs(block.gains))), block.gains.shape) if held else ()
+    largest = float(np.abs(block.gains).max(initial=0.0)) if known else 0.0
     at = 0
     for number_, section in enumerate(block.sections, start=1):
         behind = states[at + len(section)] if at + len(section) < block.states else ""
@@ -111,8 +111,8 @@ def write_block(text: Text, block: Block, inputs: Sequence[Input], tag: str, *, 
             for j, (read, _) in enumerate(inputs):
                 gain = block.gains[at + i, j]
                 wanted = f"{tag}_b{at + i + 1}" + (f"_{j + 1}" if len(inputs) > 1 else "")
-                one = number(gain) if (at + i, j) == tuple(largest) else text.estimated(wanted, gain)
-                terms.append(f"{one}*{read}")
+                prior = largest if abs(gain) == largest > 0.0 else None
+                terms.append(f"{text.estimated(wanted, gain, prior=prior)}*{read}")
             text.lines.append(f"{states[at + i]}[k+1] = {' + '.join(term for term in terms if term)}")
         at += len(section)
     direct = [

@@ -134,7 +134,8 @@ class EquationLayout(AbstractLayout):
         if number <= len(self.others):
             w = self._first_weight
             begun[:w] = self.others[number - 1] / self.provider.scale[:w]
-            return self.provider.with_states(begun, self.provider.states(begun, WINDOW)), self.begun
+            begun = self.provider.with_states(begun, self.provider.states(begun, WINDOW))
+            return begun, begun
         for _ in range(TRIES):
             theta = self._scattered(begun, rng)
             theta = self.provider.with_states(theta, self.provider.states(theta, WINDOW))
