@@ -276,7 +276,7 @@ class StateSpace(AbstractForm):
         clean = level <= EXACT * max(float(np.mean(output**2)), np.finfo(np.float64).tiny)
         if (len(left) > rank and clean) or self._radius >= 1.0 - AT_ONE:
             return np.asarray(found / scale)
-        spread = self._covariance()
+        spread = self._covariance(level)
         with np.errstate(all="ignore"):
             seen = observed @ spread @ observed.T
         if not np.isfinite(seen).all():  # so near the edge that a covariance has no digits left
@@ -287,11 +287,16 @@ class StateSpace(AbstractForm):
             moved = spread @ observed.T @ linalg.lstsq(seen + level * np.eye(len(seen)), missing)[0]
         return np.asarray(moved if np.isfinite(moved).all() else found / scale)
 
-    def _covariance(self) -> NDArray[np.float64]:
-        """Covariance of the state under white inputs; the identity where the system is not stable."""
+    def _covariance(self, level: float) -> NDArray[np.float64]:
+        """Covariance of the state under white inputs and innovations; the identity where the system is not stable.
+
+        Args:
+            level: Variance of the innovations: what no input reaches, such as the level of a drift, they do.
+        """
         if self._radius >= 1.0:
             return np.eye(self.n_state)
-        return np.asarray(linalg.solve_discrete_lyapunov(self.A, self.B @ self.B.T))
+        drive = self.B @ self.B.T + level * (self.gain @ self.gain.T)
+        return np.asarray(linalg.solve_discrete_lyapunov(self.A, drive))
 
     def _checked(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         inputs = np.asarray(inputs, dtype=np.float64)

@@ -8,7 +8,7 @@ anew, and a new chart is laid there, until that changes nothing either.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import Chart
+from sysid.estimation.linear.state_space.free_runs import free_run_error
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import ENOUGH, Subspace
@@ -150,9 +151,13 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         def found_in(one: _Problem) -> Found:
             return one.best(subspace, training.weighting, iterations, began + training.max_time_s)
 
-        bounded = replace(problem, largest=slow_poles.largest_pole(problem.lengths))
-        if not stable or training.stable is not None:
+        bounded = replace(problem, stable=True, largest=slow_poles.largest_pole(problem.lengths))
+        if training.stable is not None or (orders.noise and not iterations):
             found = found_in(problem)
+        elif orders.noise:
+            found = found_in(problem)
+            if slow_poles.unseen(found.system.radius, problem.lengths):
+                found = _quieter(found, bounded, found_in)
         else:
             found = found_in(bounded)
             if slow_poles.unseen(found.system.radius, problem.lengths):
@@ -189,6 +194,20 @@ def _better(inside: Found, beyond: Found, problem: _Problem) -> Found:
     scale = float(np.mean([np.mean(segment.outputs**2) for segment in problem.segments]))
     size = beyond.chart.n_parameters
     return beyond if slow_poles.significantly_better(errors, than, parameters=size, scale=scale) else inside
+
+
+def _quieter(beyond: Found, bounded: _Problem, found_in: Callable[[_Problem], Found]) -> Found:
+    """What was found with a model of the noise, unless poles that the records can show do as well.
+
+    A state that only innovations drive takes a drift for its own: one step ahead that helps a little, and its free run
+    is lost. It is left where what is found without it is no worse but for chance, and its free run no worse either.
+    """
+    try:
+        inside = found_in(bounded)
+    except FitDivergedError:
+        return beyond
+    before, after = (free_run_error(one.system, bounded.segments) for one in (beyond, inside))
+    return inside if after <= before and _better(inside, beyond, bounded) is inside else beyond
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
