@@ -9,6 +9,7 @@ Nothing here knows a run folder, a screen or a tracker: a :class:`Keeper` is giv
 
 from sysid.composite.active_learning import ActiveLearned, Assessment, learn_actively, sequence_errors
 from sysid.composite.candidates import Candidate, Candidates, fit_candidates
+from sysid.composite.committee import DoubtFigures, committee, doubt_figures, doubt_threshold
 from sysid.composite.composite import Composite, FixedMember, Member, Standing
 from sysid.composite.fixed_members import fixed_model, with_fixed
 from sysid.composite.keeper import Keeper, MakeAll, Task
@@ -31,6 +32,7 @@ __all__ = [
     "Candidates",
     "Choice",
     "Composite",
+    "DoubtFigures",
     "FixedMember",
     "Holding",
     "JointRound",
@@ -52,7 +54,10 @@ __all__ = [
     "assembled",
     "check_limits",
     "choose_together",
+    "committee",
     "dealt",
+    "doubt_figures",
+    "doubt_threshold",
     "fit_candidates",
     "fit_member",
     "fixed_model",

@@ -91,8 +91,9 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
             "scale": scale,
             "sides": [_side(surrogate, side) for side in sides],
             "told": told,
+            "flag": "IN_DOUBT" if doubt else "AT_LIMIT",
         }
-        for name, unit, target, offset, scale, sides, told in zip(
+        for name, unit, target, offset, scale, sides, told, doubt in zip(
             ends.outputs,
             ends.output_units,
             stage.targets,
@@ -100,6 +101,7 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
             form.scale[n:],
             stage.limits,
             stage.told,
+            stage.doubts,
             strict=True,
         )
     ]

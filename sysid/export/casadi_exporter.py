@@ -98,7 +98,7 @@ class _Step:
                 beyond = held != value
                 outputs[j] = _choice(beyond, (held - form.offset[n + j]) / form.scale[n + j], bounded)
                 if stage.told[j]:
-                    self.raised[Flag.AT_LIMIT].append(reached)
+                    self.raised[Flag.IN_DOUBT if stage.doubts[j] else Flag.AT_LIMIT].append(reached)
             else:
                 outputs[j] = bounded
             for bound in (form.low, form.high):

@@ -28,6 +28,8 @@ class Flag(enum.IntFlag):
     """An input or an output is not a number: set the state anew before relying on what follows."""
     AT_LIMIT = 8
     """An output is held at a limit that was declared for it, such as a pressure that cannot be below atmosphere."""
+    IN_DOUBT = 16
+    """The models of a committee are further apart than they are where their answer is right: it may be wrong."""
 
 
 MEANING = {
@@ -35,6 +37,7 @@ MEANING = {
     Flag.AT_BOUND: "an output is held at one of its bounds; it is wrong",
     Flag.NOT_A_NUMBER: "an input or an output is not a number; set the state anew",
     Flag.AT_LIMIT: "an output is held at a limit that was declared for it",
+    Flag.IN_DOUBT: "the models of the committee disagree; the answer may be wrong",
 }
 """Each flag as a sentence, for the files and the model card."""
 
@@ -56,7 +59,7 @@ def expected_flags(
     outside = ((inputs < low) | (inputs > high)).any(axis=1)
     lost = np.isnan(inputs).any(axis=1) | np.isnan(computed).any(axis=1)
     n_inputs = inputs.shape[1]
-    bound, limited = (np.zeros(len(inputs), dtype=bool) for _ in range(2))
+    bound, limited, doubted = (np.zeros(len(inputs), dtype=bool) for _ in range(3))
     for stage in surrogate.stages:
         form, n = stage.form, len(stage.sources)
         for j, (target, told) in enumerate(zip(stage.targets, stage.told, strict=True)):
@@ -67,12 +70,14 @@ def expected_flags(
             for value in (form.low, form.high):
                 if np.isfinite(value):
                     bound |= ~reached & (output == value * scale + offset)
-            limited |= reached & told
+            limited |= reached & (told and not stage.doubts[j])
+            doubted |= reached & stage.doubts[j]
     flags = (
         outside * int(Flag.OUTSIDE_RANGE)
         + bound * int(Flag.AT_BOUND)
         + lost * int(Flag.NOT_A_NUMBER)
         + limited * int(Flag.AT_LIMIT)
+        + doubted * int(Flag.IN_DOUBT)
     )
     return np.asarray(flags, dtype=np.int32)
 
@@ -125,7 +130,7 @@ def limits_reached(surrogate: Surrogate, inputs: NDArray[np.float64], computed: 
     for stage in surrogate.stages:
         for j, (target, told) in enumerate(zip(stage.targets, stage.told, strict=True)):
             port = ports[target]
-            for side, there in _at_sides(stage, j, inputs, computed) if told else ():
+            for side, there in _at_sides(stage, j, inputs, computed) if told and not stage.doubts[j] else ():
                 share = float(np.mean(there)) if len(there) else 0.0
                 if share:
                     limit = f"{side.value:g} {port.unit}" if side.column is None else ports[side.column].name

@@ -91,14 +91,16 @@ class Units:
         raw: Rows of all groups, before declared limits.
         at_limit: Rows that are at a declared limit that is told; ``""`` for none.
         at_bound: Rows that are held at a bound of the model itself; ``""`` for none.
-        counts: Numbers of rows of these three.
+        limit_flags: What each row that is told raises.
+        counts: Numbers of rows of raw, and of those at a bound.
     """
 
     outputs: str
     raw: str
     at_limit: str
     at_bound: str
-    counts: tuple[int, int, int]
+    limit_flags: tuple[Flag, ...]
+    counts: tuple[int, int]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +119,10 @@ class _Row:
     @property
     def told(self) -> bool:
         return self.stage.told[self.output] and bool(self.sides)
+
+    @property
+    def limit_flag(self) -> Flag:
+        return Flag.IN_DOUBT if self.stage.doubts[self.output] else Flag.AT_LIMIT
 
     @property
     def bounded(self) -> bool:
@@ -177,8 +183,9 @@ def in_units(nodes: Nodes, form: WideForm, raw: str, u: str) -> Units:
         at_limits = limits.reached(bounded, "bounded")
         if at_limits:
             at_bound = nodes.add("And", [at_bound, nodes.add("Not", [at_limits], "free")], "at_bound")
-    counts = (int(starts[-1]), sum(row.told for row in rows.values()), len(bounded))
-    return Units(outputs=outputs, raw=raw, at_limit=at_limit, at_bound=at_bound, counts=counts)
+    flags = tuple(row.limit_flag for row in rows.values() if row.told)
+    counts = (int(starts[-1]), len(bounded))
+    return Units(outputs=outputs, raw=raw, at_limit=at_limit, at_bound=at_bound, limit_flags=flags, counts=counts)
 
 
 def _at_bound(nodes: Nodes, numbers: str, low: NDArray[np.float64], high: NDArray[np.float64]) -> str:
@@ -337,20 +344,20 @@ def flags_of(nodes: Nodes, surrogate: Surrogate, u: str, units: Units) -> str:
         The name.
     """
     ports, n = surrogate.inputs, len(surrogate.inputs)
-    causes: list[tuple[Flag, str, int]] = []
+    causes: list[tuple[str, Sequence[Flag]]] = []  # rows of causes, and the flag that each raises
     for operator, side in (("Less", "low"), ("Greater", "high")):
         limits = [getattr(port, side) for port in ports]
         if np.isfinite(limits).any():
             name = nodes.add(operator, [u, nodes.column(f"declared_{side}", limits)], f"u_{operator}".lower())
-            causes.append((Flag.OUTSIDE_RANGE, name, n))
-    rows, told, bounds = units.counts
-    causes += [(Flag.AT_BOUND, units.at_bound, bounds), (Flag.AT_LIMIT, units.at_limit, told)]
-    causes.append((Flag.NOT_A_NUMBER, nodes.add("IsNaN", [u], "u_lost"), n))
-    causes.append((Flag.NOT_A_NUMBER, nodes.add("IsNaN", [units.raw], "raw_lost"), rows))
-    causes = [cause for cause in causes if cause[1]]
-    which = [flag for flag, _, count in causes for _ in range(count)]
+            causes.append((name, [Flag.OUTSIDE_RANGE] * n))
+    rows, bounds = units.counts
+    causes += [(units.at_bound, [Flag.AT_BOUND] * bounds), (units.at_limit, units.limit_flags)]
+    causes.append((nodes.add("IsNaN", [u], "u_lost"), [Flag.NOT_A_NUMBER] * n))
+    causes.append((nodes.add("IsNaN", [units.raw], "raw_lost"), [Flag.NOT_A_NUMBER] * rows))
+    causes = [cause for cause in causes if cause[0]]
+    which = [flag for _, flags in causes for flag in flags]
     present = sorted(set(which))
-    numbers = nodes.add("Cast", [join(nodes, [name for _, name, _ in causes], "causes")], "marks", to=_kind(nodes))
+    numbers = nodes.add("Cast", [join(nodes, [name for name, _ in causes], "causes")], "marks", to=_kind(nodes))
     if nodes.trailing > 1:
         numbers = nodes.add("Reshape", [numbers, nodes.integers([len(which), -1])], "marks_in_rows")
     table = nodes.numbers("flag_of_cause", [[float(flag is one) for one in which] for flag in present])

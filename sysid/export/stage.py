@@ -97,6 +97,7 @@ class Stage:
         limits: For each of its outputs the declared limits: the upper before the lower, which wins where they cross.
         told: For each of its outputs whether it leaves the whole. Of one that does not, nobody is told that it is at a
             limit: what is between two limits by its nature, such as a switch, is at one nearly always.
+        doubts: For each of its outputs whether being at a limit says that the answer is in doubt; that is always told.
         first: Where its state begins in the state of the whole.
         first_remainder: Where its remainders begin among those of the whole, in float32.
     """
@@ -106,6 +107,7 @@ class Stage:
     targets: tuple[int, ...]
     limits: tuple[tuple[Side, ...], ...]
     told: tuple[bool, ...]
+    doubts: tuple[bool, ...]
     first: int
     first_remainder: int
 
@@ -191,7 +193,8 @@ def stages_of(
             sources=tuple(columns[name] for name in ends.inputs),
             targets=tuple(columns[name] for name in ends.outputs),
             limits=tuple(_sides(limits.get(name, Limit()), columns) for name in ends.outputs),
-            told=tuple(name in outputs for name in ends.outputs),
+            told=tuple(name in outputs or limits.get(name, Limit()).doubt for name in ends.outputs),
+            doubts=tuple(limits.get(name, Limit()).doubt for name in ends.outputs),
             first=first,
             first_remainder=remainder,
         )

@@ -264,6 +264,8 @@ class SurrogateStep(nn.Module):
         self.register_buffer("late_scale", torch.tensor([one.scale for one in late], dtype=dtype))
         self.outside_bit, self.bound_bit = int(Flag.OUTSIDE_RANGE), int(Flag.AT_BOUND)
         self.lost_bit, self.limit_bit = int(Flag.NOT_A_NUMBER), int(Flag.AT_LIMIT)
+        self.doubt_bit = int(Flag.IN_DOUBT)
+        self.doubtful = [any(stage.doubts) for stage in surrogate.stages]
 
     def forward(self, u: Tensor, state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """One step.
@@ -279,17 +281,22 @@ class SurrogateStep(nn.Module):
         states: list[Tensor] = []
         held: list[Tensor] = []
         limited: list[Tensor] = []
-        for stage in self.stages:
+        doubted = torch.zeros_like(u[:, :1], dtype=torch.bool)
+        for i, stage in enumerate(self.stages):
             y, following, at_bound, at_limit = stage(known, state)
             known = torch.cat([known, y], dim=1)
             states.append(following)
             held.append(at_bound)
+            if self.doubtful[i]:
+                doubted = doubted | at_limit
+                at_limit = torch.zeros_like(at_limit)
             limited.append(at_limit)
         outside = ((u < self.declared_low) | (u > self.declared_high)).any(dim=1, keepdim=True)
         flags = outside.to(torch.int32) * self.outside_bit
         flags = flags + torch.cat(held, dim=1).any(dim=1, keepdim=True).to(torch.int32) * self.bound_bit
         flags = flags + torch.isnan(known).any(dim=1, keepdim=True).to(torch.int32) * self.lost_bit
         flags = flags + torch.cat(limited, dim=1).any(dim=1, keepdim=True).to(torch.int32) * self.limit_bit
+        flags = flags + doubted.to(torch.int32) * self.doubt_bit
         n_inputs = u.size(1)
         following = torch.cat(states, dim=1)
         if self.circular:

@@ -25,6 +25,8 @@ class Limit:
     Args:
         low: Lower limit in the channel's unit, or the name of the channel that is the limit; ``None`` for none.
         high: Upper limit, likewise.
+        doubt: Whether an output that is there says that the whole does not know its answer: its exports raise a flag
+            of their own for it. See :func:`sysid.composite.committee`.
 
     Example:
         >>> Limit(low=0.0, high="BP").to_dict()
@@ -33,15 +35,17 @@ class Limit:
 
     low: float | str | None = None
     high: float | str | None = None
+    doubt: bool = False
 
     @property
     def channels(self) -> tuple[str, ...]:
         """The channels that it names."""
         return tuple(value for value in (self.low, self.high) if isinstance(value, str))
 
-    def to_dict(self) -> dict[str, float | str | None]:
+    def to_dict(self) -> dict[str, float | str | bool | None]:
         """The fields as JSON values."""
-        return {"low": self.low, "high": self.high}
+        sides: dict[str, float | str | bool | None] = {"low": self.low, "high": self.high}
+        return sides | ({"doubt": True} if self.doubt else {})
 
 
 def program_of(

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sysid.composite import committee
 from sysid.models import (
     NARX,
     Cascade,
@@ -132,11 +133,29 @@ def build_circle() -> Cascade:
     )
 
 
+def build_committee() -> Cascade:
+    """Three pairs of models of the same outputs: a channel limits an output in each, and one judges the first."""
+    structure = NARX(input_delays="0:1", output_delays=1, neurons=4)
+    wholes = [
+        Cascade(
+            models=(
+                wired_narx("STP -> BP", structure, seed),
+                wired_narx("BP+STP -> BC", structure, seed + 10, clamp=0.5),
+            ),
+            rest={"BP": "STP"},
+            limits={"BC": Limit(low=37.6, high="BP")},
+        )
+        for seed in (1, 2, 3)
+    ]
+    return committee(wholes, {"BC": 1.0})
+
+
 CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
     "three models": (build_cascade, None),
     "every kind, limits and levels": (build_limited, None),
     "in a circle": (build_circle, None),
     "some outputs, in another order": (build_limited, ("BC", "AR")),
     "one output of a circle": (build_circle, ("ER",)),
+    "a committee": (build_committee, ("BC",)),
 }
 """Models wired, and which outputs leave them."""

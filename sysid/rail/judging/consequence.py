@@ -21,7 +21,7 @@ from sysid.airbrake.variant import VARIANTS
 from sysid.code_digest import code_digest
 from sysid.content import content_folders
 from sysid.errors import ConfigError, SysidError
-from sysid.models import AbstractModel, Cascade
+from sysid.models import AbstractModel, Cascade, Interpolation
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.brake import ReferenceBrake
 from sysid.rail.dynamics.drive import Run
@@ -78,13 +78,15 @@ class PartOptions(BaseModel):
 
     Args:
         node: Of the valve that it was fitted at; left out for a model that stands at every car.
+        everywhere: Whether a whole from the handle on, which was made for one place, stands at every car all the same.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     node: int | None = Field(default=None, ge=3)
+    everywhere: bool = False
 
 
-Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade, Mapping[str, Any]]]]
+Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade | Interpolation, Mapping[str, Any]]]]
 """Models to judge, by the name of what they are together, each with what was said of it."""
 
 
@@ -130,7 +132,7 @@ class TrainJudge:
         scene = _Scene.of(options)
         steps = []
         for subject, models in subjects.items():
-            parts = [Part(model=model, node=PartOptions(**said).node) for model, said in models]
+            parts = [Part(model=model, **PartOptions(**said).model_dump()) for model, said in models]
             make = brake_of(parts, scene.consist)
             what = [{"model": part.model.to_dict(), "node": part.node} for part in parts]
             for name in scene.chosen:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
-from sysid.models import AbstractModel, Cascade, Mapping
+from sysid.models import AbstractModel, Cascade, Interpolation, Mapping
 from sysid.rail.dynamics.brake import AbstractBrake
-from sysid.rail.dynamics.cascade_brake import CascadeBrake
+from sysid.rail.dynamics.cascade_brake import CascadeBrake, LineBrake
 from sysid.rail.dynamics.surrogate import (
     COMMAND,
     CYLINDER,
@@ -30,10 +30,13 @@ class Part:
     Args:
         model: The model.
         node: Of the valve that it was fitted at; ``None`` for one that stands at every car.
+        everywhere: Whether a whole from the handle on stands at every car though it was made for one: its pressures are
+            those of one place, and a train of many has others everywhere else.
     """
 
-    model: AbstractModel | Cascade
+    model: AbstractModel | Cascade | Interpolation
     node: int | None = None
+    everywhere: bool = False
 
 
 def placed(parts: Sequence[Part], consist: Consist) -> Stage:
@@ -49,7 +52,7 @@ def placed(parts: Sequence[Part], consist: Consist) -> Stage:
     Raises:
         ConfigError: If several models of one mapping do not say where they stand, or differ in their structure.
     """
-    singles = (part.model.single for part in nearest(parts, consist))
+    singles = (part.model.single for part in nearest(parts, consist) if not isinstance(part.model, Interpolation))
     return Stage(models=tuple(model for model in singles if model is not None))
 
 
@@ -124,9 +127,11 @@ def ordered(parts: Sequence[Part]) -> list[list[Part]]:
 def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
     """How to make a brake of fitted models.
 
-    Models that begin at the handle (``STP``) are a brake of their own at every car, and so is a cascade that does.
-    Models that begin at the pipe stand on the reference's pipe, each with the pressures of its car; so do the members
-    of a cascade that begins there, if it holds none of them by limits.
+    Models that begin at the handle (``STP``) are a brake of their own at every car. A cascade that does was made for
+    one place: it stands at a train of one valve, or with others of other nodes, or where it is said that it is meant
+    everywhere. A line gives every car its own pressures. Models that begin at the pipe stand on the reference's pipe,
+    each with the pressures of its car; so do the members of a cascade that begins there, if it holds none of them by
+    limits.
 
     Args:
         parts: The models.
@@ -138,7 +143,10 @@ def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
     Raises:
         ConfigError: If the models do not add up to a brake.
     """
-    wholes = [part.model for part in parts if part.model.single is None]
+    lines = [part.model for part in parts if isinstance(part.model, Interpolation)]
+    if lines:
+        return _of_line(lines, len(parts), consist)
+    wholes = [part.model for part in parts if isinstance(part.model, Cascade)]
     if wholes and all(COMMAND in whole.inputs for whole in wholes):
         return _of_cascades(parts, consist)
     parts = [member for part in parts for member in _members(part)]
@@ -160,7 +168,7 @@ def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
 
 
 def _mapping(part: Part) -> Mapping:
-    model = part.model.single
+    model = None if isinstance(part.model, Interpolation) else part.model.single
     if model is None:
         raise ConfigError(
             "a cascade has no single mapping",
@@ -173,6 +181,15 @@ def _mapping(part: Part) -> Mapping:
 
 def _of_cascades(parts: Sequence[Part], consist: Consist) -> MakeBrake:
     """Cascades that begin at the handle, each at the cars nearest to its own."""
+    if len(parts) == 1 and consist.pairs > 1 and not parts[0].everywhere:
+        raise ConfigError(
+            "a whole that was made for one place is asked for every car of a train",
+            where="parts",
+            expected=f"a line, or a whole for each of several places, on {consist.pairs} brake valves",
+            got=f"one whole, {', '.join(parts[0].model.inputs)} -> {CYLINDER}",
+            remedy="give the line of an assembly with interpolation (line: reports/whole-train), several wholes with a "
+            "node each, or options: {everywhere: true} if the front cylinder is meant at every car",
+        )
     chosen = [part.model for part in nearest(parts, consist)]
     cascades = [model for model in chosen if isinstance(model, Cascade)]
     if len(cascades) < len(chosen):
@@ -190,9 +207,26 @@ def _of_cascades(parts: Sequence[Part], consist: Consist) -> MakeBrake:
     return make
 
 
+def _of_line(lines: Sequence[Interpolation], count: int, consist: Consist) -> MakeBrake:
+    """A line from the handle on: every valve at its own position."""
+    if len(lines) != count or count != 1:
+        raise ConfigError(
+            "a line stands beside other models",
+            where="parts",
+            expected="one line, which gives every car's pressures",
+            got=f"{len(lines)} of {count} parts",
+        )
+
+    def make() -> AbstractBrake:
+        return LineBrake(line=lines[0], consist=consist)
+
+    make()  # What does not fit is told before anything is run.
+    return make
+
+
 def _members(part: Part) -> list[Part]:
     """The part itself, or the members of a cascade that stands on the reference's pipe."""
-    if part.model.single is not None:
+    if not isinstance(part.model, Cascade):
         return [part]
     members = [model for model in part.model.models if len(model.mapping.outputs) == 1]
     if part.model.limits or len(members) < len(part.model.models):

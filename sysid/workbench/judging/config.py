@@ -11,13 +11,14 @@ from sysid.yaml_files import FieldError
 
 
 class PartConfig(BaseModel):
-    """One model, from where it lies: give one of ``run``, ``bundle`` and ``model``.
+    """One model, from where it lies: give one of ``run``, ``bundle``, ``model`` and ``line``.
 
     Args:
         run: A pipeline that was run, by name, or its run folder.
         fit: Name of a fit of that run, or ``best``.
         bundle: Folder or zip of an exported model.
         model: A registered model, such as ``models:/level@champion``.
+        line: Folder with the ``line.json`` that an assembly with ``interpolation`` leaves: ``reports/whole-train``.
         options: What the judge wants to know of it.
     """
 
@@ -27,15 +28,16 @@ class PartConfig(BaseModel):
     fit: str = "best"
     bundle: str | None = None
     model: str | None = None
+    line: str | None = None
     options: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _one(self) -> PartConfig:
-        given = [name for name in ("run", "bundle", "model") if getattr(self, name) is not None]
+        given = [name for name in ("run", "bundle", "model", "line") if getattr(self, name) is not None]
         if len(given) != 1 or (self.fit != "best" and self.run is None):
             raise FieldError(
                 "it is not said where a model lies",
-                expected="one of run (with fit), bundle and model",
+                expected="one of run (with fit), bundle, model and line",
                 got=", ".join(given) or "none of them",
                 remedy="write for example {run: tank, fit: best}",
             )

@@ -10,14 +10,14 @@ from typing import Any, Protocol
 
 from pydantic import BaseModel
 
-from sysid.models import AbstractModel, Cascade
+from sysid.models import AbstractModel, Cascade, Interpolation
 from sysid.workbench.plugins import find_plugin
 from sysid.workbench.runner.kept_steps import KeptStep
 
 GROUP = "sysid.judges"
 
-Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade, Mapping[str, Any]]]]
-"""Models and cascades by the name of what they are together, each with the options that its pipeline gives it."""
+Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade | Interpolation, Mapping[str, Any]]]]
+"""Models, cascades and lines by the name of what they are together, each with the options of its pipeline."""
 
 
 class Judge(Protocol):

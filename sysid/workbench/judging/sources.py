@@ -9,14 +9,18 @@ from pathlib import Path
 
 from sysid.errors import ConfigError
 from sysid.export.reading import read_bundle
-from sysid.models import AbstractModel, Cascade
+from sysid.models import AbstractModel, Cascade, Interpolation
 from sysid.reporting.results import read_results
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.judging.config import PartConfig
-from sysid.workbench.runner.store import RunFolder
+from sysid.workbench.runner.store import RunFolder, read_json
 
 Fetch = Callable[[str], "tuple[Path, str]"]
 """From a registered model's address to a folder with its bundle, and the run that tracks it."""
+
+
+LINE = "line.json"
+"""What an assembly with interpolation leaves in its run folder."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,7 +35,7 @@ class Found:
         tracked_as: Run of the tracking store, where that is known.
     """
 
-    model: AbstractModel | Cascade
+    model: AbstractModel | Cascade | Interpolation
     said: str
     run_folder: Path | None = None
     fit_key: str | None = None
@@ -55,6 +59,8 @@ def find_model(part: PartConfig, *, workspace: Path, fetch: Fetch) -> Found:
     """
     if part.run is not None:
         return _of_run(part, workspace)
+    if part.line is not None:
+        return _of_line(workspace, part.line)
     if part.bundle is not None:
         return _of_bundle((workspace / part.bundle).resolve(), part.bundle)
     address = str(part.model)
@@ -109,6 +115,19 @@ def _of_run(part: PartConfig, workspace: Path) -> Found:
         run_folder=store.path,
         fit_key=_key(store, f"scores-{fit.slug}"),
     )
+
+
+def _of_line(workspace: Path, given: str) -> Found:
+    file = run_folder_of(given, workspace) / LINE
+    if not file.is_file():
+        raise ConfigError(
+            f"there is no line {given}",
+            where="subjects",
+            expected=f"a folder with {LINE}, which an assembly with interpolation leaves",
+            got=file.parent,
+            remedy="give reports/whole-train, or run such a pipeline first: sysid run whole-train",
+        )
+    return Found(model=Interpolation.from_dict(read_json(file)), said=f"line {given}")
 
 
 def _of_bundle(folder: Path, given: str) -> Found:

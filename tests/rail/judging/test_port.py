@@ -1,12 +1,14 @@
 """Fitted models plug into a train by the channels that they speak of."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
-from sysid.models import ARX, ARXModel, Cascade, Limit, Mapping
-from sysid.rail.dynamics.cascade_brake import CascadeBrake
+from sysid.models import ARX, ARXModel, Cascade, Interpolation, Limit, Mapping
+from sysid.rail.dynamics.cascade_brake import CascadeBrake, LineBrake
 from sysid.rail.dynamics.surrogate import SurrogateBrake, ValveSurrogateBrake
 from sysid.rail.end_of_train.tail_unit import TwoEndedBrake
 from sysid.rail.judging.port import Part, brake_of, ordered, placed
@@ -107,7 +109,7 @@ def whole(pole: float = 0.5) -> Cascade:
 def test_a_cascade_in_pieces_is_its_free_run(pieces: int) -> None:
     """Moves of the handle in and between the pieces: what was run ahead is thrown away where it does not hold."""
     handle = np.repeat([90.0, 80.0, 64.0, 90.0, 70.0], [33, 200, 30, 900, 37])
-    brake = brake_of([Part(model=whole())], TRAIN)()
+    brake = brake_of([Part(model=whole(), everywhere=True)], TRAIN)()
     assert isinstance(brake, CascadeBrake)
     parts = [brake.advance(handle[k : k + pieces]).cylinders for k in range(0, len(handle), pieces)]
     free = whole().simulate(handle[:, None])["BC"]
@@ -134,7 +136,7 @@ def test_a_cascade_from_the_pipe_on_stands_on_the_reference_s_pipe() -> None:
 
 def test_a_cascade_that_knows_no_open_tail_says_so() -> None:
     with pytest.raises(ConfigError, match="open tail"):
-        brake_of([Part(model=whole())], TRAIN)().advance(np.full(3, 90.0), tail_vent=1e-4)
+        brake_of([Part(model=whole(), everywhere=True)], TRAIN)().advance(np.full(3, 90.0), tail_vent=1e-4)
 
 
 def test_a_cascade_beside_a_model_is_refused() -> None:
@@ -147,6 +149,51 @@ def test_a_cascade_is_charged_whatever_the_handle_does_first() -> None:
     charged = Cascade(
         models=(model("STP -> BP", rest=90.0, pole=0.9), model("BP -> BC", gain=-2.5)), rest={"BP": "STP"}
     )
-    output = brake_of([Part(model=charged)], TRAIN)().advance(np.full(3, 64.2))
+    output = brake_of([Part(model=charged, everywhere=True)], TRAIN)().advance(np.full(3, 64.2))
     assert output.head_pipe is not None
     assert output.head_pipe[0] > 80.0 * PSI_IN_PA
+
+
+def test_a_whole_that_was_made_for_one_place_is_refused_for_others() -> None:
+    with pytest.raises(ConfigError, match="made for one place is asked for every car"):
+        brake_of([Part(model=whole())], TRAIN)
+    assert isinstance(brake_of([Part(model=whole())], Consist(pairs=1))(), CascadeBrake)
+
+
+# --- lines
+
+
+def line(last: float = 4.0) -> Interpolation:
+    """A pipe that is quick at the first valve and slow at the last, and the same cylinder at each."""
+    front = model("STP -> BP", rest=90.0, pole=0.5)
+    rear = replace(model("STP -> BP", rest=90.0, pole=0.95), mapping=Mapping.parse("STP -> BP4"))
+    return Interpolation(
+        along=Cascade(models=(front, rear), rest={"BP": "STP", "BP4": "STP"}),
+        knots={"BP": 1.0, "BP4": last},
+        at_place=Cascade(
+            models=(model("BP -> BC", gain=-2.5),),
+        ),
+        channel="BP",
+    )
+
+
+@pytest.mark.parametrize("pieces", [1, 50, 300], ids=lambda n: f"in pieces of {n}")
+def test_a_line_gives_every_car_its_own_pressure(pieces: int) -> None:
+    handle = np.repeat([90.0, 80.0, 64.0, 90.0], [20, 150, 30, 100])
+    brake = brake_of([Part(model=line())], TRAIN)()
+    assert isinstance(brake, LineBrake)
+    outputs = [brake.advance(handle[k : k + pieces]) for k in range(0, len(handle), pieces)]
+    cylinders = np.concatenate([one.cylinders for one in outputs]) / PSI_IN_PA
+    run = line().simulate(handle[:, None], [1.0, 2.0, 3.0, 4.0])
+    np.testing.assert_allclose(cylinders[:, 2::2], np.maximum(run["BC"], 0.0).T, rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(cylinders[:, 1::2], cylinders[:, 2::2])
+    assert cylinders[22, 2] > 2.0 * cylinders[22, 8] > 0.0
+    tail = np.concatenate([one.tail_pipe for one in outputs if one.tail_pipe is not None]) / PSI_IN_PA
+    np.testing.assert_allclose(tail, run["BP"][3], rtol=0.0, atol=1e-9)
+
+
+def test_a_line_of_another_train_or_beside_other_models_is_refused() -> None:
+    with pytest.raises(ConfigError, match="not one of this train's brakes"):
+        brake_of([Part(model=line(9.0))], TRAIN)
+    with pytest.raises(ConfigError, match="beside other models"):
+        brake_of([Part(model=line()), Part(model=PIPE)], TRAIN)

@@ -1,0 +1,75 @@
+"""Published wholes of the brake on kinds of command that they never saw, and how many of their errors they doubt.
+
+    python -m tests.benchmarks doubt
+    python -m tests.benchmarks doubt --count=8 --first=100 --error=1
+
+* Each published whole of the service brake (``WHOLES``) alone on ``abdx-kinds-unseen``: per kind the share of the
+  sequences within 1 psi rms, and how many diverge. ``--count=`` takes so many of each kind from number ``--first=`` on.
+* Each of them as the first member of a committee with the others: the threshold of its doubt is found on
+  ``abdx-kinds-calibration`` (``--calibrate=`` sequences of each of its three kinds) so that 5 % of the right answers
+  are doubted there; then per unseen kind the share of samples with an error over ``--error=`` psi, how many of these
+  are in doubt, and how many of the others.
+
+Making the traces takes some 2 s of processor time each, once.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from sysid.composite import committee, doubt_figures, doubt_threshold, run_monte_carlo
+from sysid.export import read_bundle
+from sysid.ingest import load_dataset
+from sysid.models import Cascade
+from sysid.traces import Trace
+
+REPORTS = Path(__file__).parents[2] / "reports"
+WHOLES = ("service-cascade-grown", "combined-brake-grown", "combined-brake-held")
+UNSEEN = ("staircase", "ramps", "sine", "prbs", "minimum")
+CALIBRATION = ("noise", "multisine", "random")
+OUTPUT = "BC"
+
+
+def option(name: str, default: float) -> float:
+    """A number given as ``--name=value``."""
+    given = [word.partition("=")[2] for word in sys.argv[1:] if word.startswith(f"--{name}=")]
+    return float(given[-1]) if given else default
+
+
+def sequences(data: str, kinds: tuple[str, ...], first: int, count: int) -> dict[str, list[Trace]]:
+    """Traces by kind."""
+    return {
+        kind: list(load_dataset(data, cases=[f"{kind}-{k:03}" for k in range(first, first + count)])) for kind in kinds
+    }
+
+
+def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: float) -> None:
+    """Print both tables."""
+    wholes: dict[str, Cascade] = {}
+    for name in WHOLES:
+        model = read_bundle(REPORTS / name / "bundle").model
+        wholes[name] = model if isinstance(model, Cascade) else Cascade(models=(model,))
+    every = [trace for traces in unseen.values() for trace in traces]
+    for name, whole in wholes.items():
+        found = run_monte_carlo(whole, every, OUTPUT, 1.0)
+        print(f"{name}: {100 * found.within:.1f} % of {found.sequences} within 1 psi, {found.lost} diverge")
+        for kind, one in found.by_kind.items():
+            print(f"  {kind:<10} {100 * one.within:5.1f} %  median {one.quantiles[0.5]:.2f} psi, {one.lost} diverge")
+    calibration = [trace for traces in known.values() for trace in traces]
+    for name in WHOLES:
+        members = [wholes[name], *(whole for other, whole in wholes.items() if other != name)]
+        threshold = doubt_threshold(members, calibration, OUTPUT, error=error)
+        both = committee(members, {OUTPUT: threshold})
+        print(f"{name} first, in doubt from {threshold:.2f} psi: wrong, of these in doubt, of the others in doubt, %")
+        for kind, traces in {**{f"({kind})": of for kind, of in known.items()}, **unseen, "all unseen": every}.items():
+            of = doubt_figures(both, traces, OUTPUT, error=error)
+            print(f"  {kind:<12} {100 * of.wrong:5.1f} {100 * of.flagged:5.1f} {100 * of.false:5.1f}")
+
+
+if __name__ == "__main__":
+    main(
+        sequences("abdx-kinds-unseen", UNSEEN, int(option("first", 100)), int(option("count", 8))),
+        sequences("abdx-kinds-calibration", CALIBRATION, 0, int(option("calibrate", 10))),
+        option("error", 1.0),
+    )
