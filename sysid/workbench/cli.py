@@ -58,6 +58,22 @@ def run_cli(arguments: list[str]) -> int:
         return _run(arguments, debug=debug)
 
 
+def _with_commands_of_fields(words: list[str]) -> None:
+    """Add what installed packages bring, where a word is none of ours, or all are to be listed."""
+    known = {command.name or "" for command in app.registered_commands} | {
+        (command.callback.__name__ if command.callback else "").replace("_", "-") for command in app.registered_commands
+    }
+    first = next((word for word in words if not word.startswith("-")), None)
+    if first in known:
+        return
+    from importlib.metadata import entry_points
+
+    there = {group.name for group in app.registered_groups}
+    for entry in entry_points(group="sysid.commands"):
+        if entry.name not in there and first in {None, entry.name}:
+            app.add_typer(entry.load(), name=entry.name)
+
+
 def _note(message: Warning | str, *_: Any, **__: Any) -> None:
     """A warning as a person reads it: what is warned of, without the line of ours that found it."""
     _say(f"note: {message}")
@@ -65,6 +81,7 @@ def _note(message: Warning | str, *_: Any, **__: Any) -> None:
 
 def _run(arguments: list[str], *, debug: bool) -> int:
     try:
+        _with_commands_of_fields(arguments)
         code = app([word for word in arguments if word != "--debug"], prog_name="sysid", standalone_mode=False)
         return code if isinstance(code, int) else 0
     except KeyboardInterrupt:

@@ -1,0 +1,240 @@
+"""``sysid rail``: what a line does to a train, and automatic operation by a track card, as tables and pictures.
+
+Named in the entry-point group ``sysid.commands``, so that no other room knows of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sysid.errors import ConfigError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode="rich", help="Trains: terrain and handling, automatic operation."
+)
+
+Out = Annotated[Path | None, typer.Option(help="Folder for the table (.csv) and the picture (.svg).")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Read everything, say what would be done, and do nothing.")]
+
+
+class Combination(Enum):
+    """How the correlations with several patterns make one."""
+
+    CREST = "crest"
+    MAX = "max"
+    MIN = "min"
+    MEDIAN = "median"
+    MEAN = "mean"
+
+
+class Operation(Enum):
+    """Who drives."""
+
+    CARD = "card"
+    FULL_NOTCH = "full-notch"
+
+
+@app.command(
+    epilog="Example: sysid rail terrain datasets/rail-example/crest.yaml datasets/rail-example/heavy-haul-101.yaml"
+)
+def terrain(
+    track: Annotated[Path, typer.Argument(help="Line: a YAML file, or a track card (.csv) with --section.")],
+    train: Annotated[Path, typer.Argument(help="Train: a YAML file.")],
+    *,
+    step: Annotated[float, typer.Option(help="Metres between two places.")] = 25.0,
+    look_ahead: Annotated[float, typer.Option(help="How far ahead of the train in m.")] = 0.0,
+    pattern: Annotated[
+        Combination, typer.Option(help="The crest's pattern, or a combination of three.")
+    ] = Combination.CREST,
+    section: Annotated[str | None, typer.Option(help="Section of a track card.")] = None,
+    out: Out = None,
+    dry_run: DryRun = False,
+) -> None:
+    """Crests and sags along a line as a train feels them, how severe they are, and how they want to be handled."""
+    import numpy as np
+
+    from sysid.rail.dynamics.train import read_train
+    from sysid.rail.track.features import features
+    from sysid.rail.track.handling import SPEED_GAINS, peak_force, sag_acceleration
+    from sysid.rail.track.terrain import CREST, PATTERNS, Shape, combined, correlation, effective_grade
+
+    line, consist = _line(track, section), read_train(train)
+    if not 0.0 < step <= 1000.0:
+        raise ConfigError("step is out of range", where="--step", expected="metres, up to 1000", got=step)
+    shape = Shape.of(consist)
+    x = np.arange(line.starts[0] - shape.length, line.starts[-1] + 2.0 * shape.length + step, step)
+    if len(x) > 1_000_000:
+        raise ConfigError(
+            "the line has too many places", where="--step", expected="a million at most", got=f"{len(x)}",
+            remedy="take a longer step",
+        )  # fmt: skip
+    typer.echo(f"{line.name}: {len(x)} places from {x[0]:.0f} to {x[-1]:.0f} m; {consist.name}, {shape.length:.0f} m")
+    if dry_run:
+        typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/terrain.csv and .svg" if out else ""))
+        return
+    patterns = (CREST,) if pattern is Combination.CREST else PATTERNS
+    each = [correlation(line, shape, x, pattern=one, look_ahead=look_ahead) for one in patterns]
+    felt = each[0] if len(each) == 1 else combined(each, pattern.value)
+    found = features(x, felt)
+    for one in found:
+        force = peak_force(line, consist, one.apex)
+        if one.kind == "crest":
+            handling = f"no power until half the train is past; gain at most {3.6 * SPEED_GAINS[one.severity]:.0f} km/h"
+        else:
+            handling = f"hold {sag_acceleration(line, shape, one.apex):+.3f} m/s2"
+        typer.echo(
+            f"{one.kind:<6} {one.severity.value:<7} {one.start:8.0f} to {one.end:8.0f} m, strongest at {one.apex:8.0f} "
+            f"m ({1000.0 * one.correlation:+.1f} per mille): {handling}; coupler {force.coupler} "
+            f"{'draft' if force.force >= 0.0 else 'buff'} {abs(force.force) / 1000.0:.0f} kN"
+        )
+    if not found:
+        typer.echo("neither crest nor sag")
+    if out is not None:
+        grades = effective_grade(line, shape, x)
+        columns = {
+            "position_m": x, "elevation_m": line.elevation(x), "grade": line.grade(x),
+            "effective_grade": grades, "correlation": felt,
+        }  # fmt: skip
+        _write(out, "terrain", columns)
+        _picture(out / "terrain.svg", x / 1000.0, "position of the leading end [km]", [
+            ("elevation [m]", columns["elevation_m"]), ("correlation [per mille]", 1000.0 * felt),
+            ("effective grade [per mille]", 1000.0 * grades),
+        ], [(one.start / 1000.0, one.end / 1000.0, f"{one.kind}, {one.severity.value}") for one in found])  # fmt: skip
+
+
+@app.command(epilog="Example: sysid rail drive card.csv train.yaml --section A --stop 1000 --point 700")
+def drive(
+    card: Annotated[Path, typer.Argument(help="Track card: CSV with section, distance_km, code, value.")],
+    train: Annotated[Path, typer.Argument(help="Train with notches: a YAML file.")],
+    *,
+    section: Annotated[str, typer.Option(help="Section that the train departs into.")],
+    stop: Annotated[float, typer.Option(help="Where it shall stop, in m from the section's station.")],
+    point: Annotated[
+        float | None, typer.Option(help="Where the automatic stop begins, in m; 300 m before the stop.")
+    ] = None,
+    operation: Annotated[Operation, typer.Option(help="By the card, or full notch and brake.")] = Operation.CARD,
+    longest: Annotated[float, typer.Option(help="Seconds after which the run is broken off.")] = 600.0,
+    out: Out = None,
+    dry_run: DryRun = False,
+) -> None:
+    """Drive a train from a station to a stop by a track card: constant speed, limits, automatic stop."""
+    from sysid.rail.dynamics.brake import no_brake
+    from sysid.rail.dynamics.drive import Limits
+    from sysid.rail.dynamics.drive import drive as driven
+    from sysid.rail.dynamics.motion import MovingTrain
+    from sysid.rail.dynamics.train import read_train
+    from sysid.rail.track.card import read_card
+    from sysid.rail.transit.ato import CardDriver, FullNotchDriver
+
+    rows, consist = read_card(card), read_train(train)
+    line, begins = rows.profile(section), max(0.0, stop - 300.0) if point is None else point
+    if not 0.0 < stop <= 100_000.0 or not 0.0 <= begins < stop or not 0.0 < longest <= 7200.0:
+        raise ConfigError(
+            "the run cannot be made", where="--stop, --point, --longest",
+            expected="a stop up to 100 km ahead, a point before it, and up to 7200 s",
+            got=f"stop {stop:g} m, point {begins:g} m, {longest:g} s",
+        )  # fmt: skip
+    typer.echo(
+        f"section {section}: {consist.name}, stop at {stop:g} m, automatic from {begins:g} m, by {operation.value}"
+    )
+    if operation is Operation.CARD:
+        driver: Any = CardDriver(train=consist, card=rows, section=section, stop=stop, point=begins)
+    else:
+        driver = FullNotchDriver(train=consist, limits=line, stop=stop, point=begins)
+    if dry_run:
+        typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/drive.csv and .svg" if out else ""))
+        return
+    moving = MovingTrain(train=consist, track=line)
+    run = driven(moving, no_brake(len(consist.vehicles)), driver, Limits(duration=longest, block=1))
+    import numpy as np
+
+    limits = np.array([line.lowest_limit(at - consist.length, at) for at in run.position])
+    over = float((run.speed - limits).max())
+    typer.echo(
+        f"stands at {run.position[-1]:.2f} m after {run.motion.time[-1]:.1f} s; {run.notch_changes} changes of notch, "
+        f"{run.traction_work / 3.6e6:.2f} kWh of traction, "
+        + (f"{3.6 * over:.1f} km/h over a limit" if over > 0.0 else "no limit passed")
+    )
+    if run.speed[-1] > 0.01:
+        typer.echo(f"note: it has not stopped within {longest:g} s")
+    if out is not None:
+        columns = {
+            "time_s": run.motion.time, "position_m": run.position, "speed_m_s": run.speed, "limit_m_s": limits,
+            "notch": run.notch.astype(float),
+        }  # fmt: skip
+        _write(out, "drive", columns)
+        _picture(out / "drive.svg", run.position / 1000.0, "distance [km]", [
+            ("speed [km/h]", 3.6 * run.speed), ("limit [km/h]", np.where(np.isfinite(limits), 3.6 * limits, np.nan)),
+            ("notch", columns["notch"]), ("elevation [m]", line.elevation(run.position)),
+        ])  # fmt: skip
+
+
+def _line(path: Path, section: str | None) -> Any:
+    """A track from YAML, or a section of a card."""
+    from sysid.rail.dynamics.track import read_track
+    from sysid.rail.track.card import read_card
+
+    if path.suffix.lower() != ".csv":
+        return read_track(path)
+    card = read_card(path)
+    if section is None and len(card.sections) > 1:
+        raise ConfigError(
+            "the card has several sections", where=path, expected=f"one of {', '.join(card.sections)}", got="none",
+            remedy=f"say which: --section {card.sections[0]}",
+        )  # fmt: skip
+    return card.profile(section or card.sections[0])
+
+
+def _write(folder: Path, name: str, columns: dict[str, NDArray[np.float64]]) -> None:
+    import numpy as np
+
+    from sysid.atomic import replacing
+
+    folder.mkdir(parents=True, exist_ok=True)
+    with replacing(folder / f"{name}.csv") as draft:
+        np.savetxt(
+            draft,
+            np.column_stack(list(columns.values())),
+            fmt="%.9g",
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
+        )
+    typer.echo(f"written: {folder / f'{name}.csv'}")
+
+
+def _picture(
+    file: Path,
+    x: NDArray[np.float64],
+    label: str,
+    rows: Sequence[tuple[str, NDArray[np.float64]]],
+    spans: Sequence[tuple[float, float, str]] = (),
+) -> None:
+    """One panel a row, what is marked shaded in all of them."""
+    from matplotlib.figure import Figure
+
+    from sysid.atomic import replacing
+
+    figure = Figure(figsize=(8.0, 1.8 * len(rows)), layout="constrained")
+    panels = figure.subplots(len(rows), 1, sharex=True)
+    for panel, (title, values) in zip(panels, rows, strict=True):
+        panel.plot(x, values, linewidth=1.2, color="#1f5a96")
+        panel.set_ylabel(title, fontsize=8)
+        panel.grid(visible=True, alpha=0.3)
+        for first, last, _ in spans:
+            panel.axvspan(first, last, color="#d9822b", alpha=0.2)
+    for first, last, said in spans:
+        panels[0].annotate(said, (0.5 * (first + last), panels[0].get_ylim()[1]), ha="center", va="bottom", fontsize=7)
+    panels[-1].set_xlabel(label)
+    with replacing(file) as draft:
+        figure.savefig(draft, format="svg", metadata={"Date": None})
+    typer.echo(f"written: {file}")

@@ -1,0 +1,93 @@
+"""``sysid rail``: the examples of its page say what comes out, files are written, dry runs do nothing."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from sysid.errors import SysidError
+from sysid.rail.commands import app
+from sysid.workbench import cli
+
+ROOT = Path(__file__).parents[2]
+LINES = ROOT / "datasets" / "rail-example"
+CREST, TRAIN = str(LINES / "crest.yaml"), str(LINES / "heavy-haul-101.yaml")
+DRIVE = ["drive", str(LINES / "card-a-b.csv"), str(LINES / "commuter.yaml"), "--section", "A", "--stop", "1000"]
+
+
+def run(words: list[str]) -> str:
+    result = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def examples() -> list[tuple[str, str]]:
+    page = (ROOT / "docs" / "rail.md").read_text(encoding="utf-8")
+    blocks = "".join(re.findall(r"```console\n(.*?)```", page, flags=re.S))
+    return [
+        (command, told) for command, told in re.findall(r"^\$ sysid rail (.*)\n((?:[^$].*\n)+)", blocks, flags=re.M)
+    ]
+
+
+@pytest.mark.parametrize(("command", "told"), examples(), ids=lambda text: text[:7])
+def test_the_page_says_what_the_commands_say(command: str, told: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    assert run(shlex.split(command)) == told
+
+
+def test_the_page_has_an_example_of_each_command() -> None:
+    assert {command.split()[0] for command, _ in examples()} == {
+        one.callback.__name__ for one in app.registered_commands
+    }
+
+
+def test_a_table_and_a_picture_are_written(tmp_path: Path) -> None:
+    told = run(["terrain", CREST, TRAIN, "--pattern", "median", "--out", str(tmp_path / "out")])
+    rows = np.genfromtxt(tmp_path / "out" / "terrain.csv", delimiter=",", names=True)
+    at = rows["position_m"][np.argmax(rows["correlation"])]
+    assert abs(at) <= 25.0
+    assert f"strongest at {at:8.0f} m" in told
+    assert (tmp_path / "out" / "terrain.svg").read_text(encoding="utf-8").startswith("<?xml")
+
+
+@pytest.mark.parametrize("words", [["terrain", CREST, TRAIN], DRIVE], ids=["terrain", "drive"])
+def test_a_dry_run_does_nothing(words: list[str], tmp_path: Path) -> None:
+    assert "nothing is done" in run([*words, "--dry-run", "--out", str(tmp_path / "out")])
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["terrain", CREST, TRAIN, "--step", "0"], "step is out of range"),
+        (["terrain", str(LINES / "card-a-b.csv"), TRAIN], "several sections"),
+        ([*DRIVE, "--point", "1200"], "the run cannot be made"),
+        ([*DRIVE[:4], "Z", *DRIVE[5:]], "no section Z"),
+        (["drive", str(LINES / "crest.yaml"), *DRIVE[2:]], "no track card"),
+    ],
+    ids=["step", "section", "point", "unknown section", "no card"],
+)
+def test_what_cannot_be_is_refused_in_words(words: list[str], said: str) -> None:
+    with pytest.raises(SysidError, match=said):
+        CliRunner().invoke(app, words, catch_exceptions=False)
+
+
+def test_the_command_line_finds_what_a_field_brings(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["entry-points"]
+    entries = [
+        importlib.metadata.EntryPoint(name=name, value=value, group="sysid.commands")
+        for name, value in declared["sysid.commands"].items()
+    ]
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: entries)
+    monkeypatch.setattr(cli.app, "registered_groups", list(cli.app.registered_groups))
+    assert cli.run_cli(["rail", "terrain", CREST, TRAIN, "--dry-run"]) == 0
+    assert "nothing is done" in capsys.readouterr().out
