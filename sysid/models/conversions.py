@@ -1,4 +1,4 @@
-"""Linear systems in other forms: sampled, continuous, at another rate, smaller; on objects of python-control.
+"""Linear systems in other forms: sampled, continuous, slower, smaller, canonical; on objects of python-control.
 
 A model becomes such an object by its ``to_control()``, or with its states by
 :func:`sysid.models.to_control.state_space`. The package is imported when a function is called.
@@ -120,6 +120,86 @@ def transfer_function(system: Any) -> Any:
     import control
 
     return control.tf(system)
+
+
+WELL_CONDITIONED = 1e-12
+"""Least ratio of singular values of a change of coordinates whose result has digits left."""
+
+
+def canonical(system: Any, form: str) -> Any:
+    """The same system in coordinates of the state that have a name.
+
+    Args:
+        system: An object of python-control, in either time.
+        form: ``modal``: the poles stand on the diagonal, pairs as blocks ``[[re, im], [-im, re]]``, those of largest
+            magnitude first. ``companion``: the denominator stands in the last column and the input enters the first
+            state, as of MATLAB's ``canon``. ``observable``: the denominator stands in the first column and the output
+            is the first state. The latter two are of one input, and of one output.
+
+    Returns:
+        A ``control.StateSpace``.
+
+    Raises:
+        ConfigError: If there is no such form, or the system has none: poles that are equal, states that are not reached
+            or not seen, several inputs or outputs.
+
+    Example:
+        >>> import control
+        >>> canonical(control.tf([1.0], [1.0, 3.0, 2.0]), "companion").A.round(9).tolist()
+        [[0.0, -2.0], [1.0, -3.0]]
+    """
+    import control
+
+    given = state_space(system)
+    A, B, C = (np.asarray(part, dtype=np.float64) for part in (given.A, given.B, given.C))
+    if form == "modal":
+        T = _eigenvectors(A)
+    elif form == "companion" and B.shape[1] == 1:
+        T = _krylov(A, B[:, 0])
+    elif form == "observable" and C.shape[0] == 1:
+        seen = _krylov(A.T, C[0]).T
+        denominator = np.poly(A)
+        # From the observability matrix of the form itself, which is triangular.
+        own = np.array([[denominator[i - j] if i >= j else 0.0 for j in range(len(A))] for i in range(len(A))])
+        T = linalg.pinv(own @ seen)
+    else:
+        raise ConfigError(
+            "no such form of this system",
+            where="form",
+            expected="modal; of one input companion, of one output observable",
+            got=f"{form}, {B.shape[1]} inputs and {C.shape[0]} outputs",
+            remedy="write modal, or take one input and one output",
+        )
+    sizes = linalg.svdvals(T)
+    if len(T) and not sizes[-1] > WELL_CONDITIONED * sizes[0]:
+        raise ConfigError(
+            f"the system has no {form} form",
+            expected="poles that differ, and states that are reached and seen",
+            got=f"coordinates that are singular to {sizes[-1] / sizes[0]:.1e}",
+            remedy="reduce the system first (reduced), or leave its coordinates as they are",
+        )
+    inverse = linalg.inv(T)
+    return control.StateSpace(inverse @ A @ T, inverse @ B, C @ T, given.D, given.dt, **_names(given))
+
+
+def _krylov(A: Array, b: Array) -> Array:
+    """``b, A b, A^2 b, ...`` side by side."""
+    columns = [b]
+    for _ in range(len(A) - 1):
+        columns.append(A @ columns[-1])
+    return np.column_stack(columns)
+
+
+def _eigenvectors(A: Array) -> Array:
+    """Real eigenvectors, of a pair the real and the imaginary part; by falling magnitude of the pole."""
+    poles, vectors = linalg.eig(A)
+    columns: list[Array] = []
+    for i in np.lexsort((-poles.imag, -poles.real, -np.abs(poles).round(12))):
+        if poles[i].imag == 0.0:
+            columns.append(vectors[:, i].real)
+        elif poles[i].imag > 0.0:
+            columns += [vectors[:, i].real, vectors[:, i].imag]
+    return np.column_stack(columns) if columns else np.zeros((0, 0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.models.conversions import c2d, d2c, d2d, reduced, state_space, transfer_function
+from sysid.models.conversions import c2d, canonical, d2c, d2d, reduced, state_space, transfer_function
 
 
 def plant(dt: float = 0) -> control.StateSpace:
@@ -50,6 +50,26 @@ def test_transfer_functions_and_state_spaces_are_the_same_system() -> None:
     assert transfer_function(state_space(one))(z) == pytest.approx(one(z))
 
 
+@pytest.mark.parametrize("dt", [0, 0.1])
+def test_canonical_forms_are_the_same_system_in_named_coordinates(dt: float) -> None:
+    one = plant(dt)[0, 0]  # three states of one input and one output
+    x, denominator = np.exp(0.3j) if dt else 0.7j, np.poly(one.A)
+    found = {form: canonical(one, form) for form in ("modal", "companion", "observable")}
+    for system in found.values():
+        assert system(x) == pytest.approx(one(x), rel=1e-9)
+        assert (system.dt, system.input_labels) == (one.dt, one.input_labels)
+    eye = np.eye(3)
+    np.testing.assert_allclose(found["companion"].A, np.column_stack([eye[:, 1:], -denominator[:0:-1]]), atol=1e-9)
+    np.testing.assert_allclose(found["companion"].B[:, 0], eye[0], atol=1e-9)
+    np.testing.assert_allclose(found["observable"].A, np.column_stack([-denominator[1:], eye[:, :2]]), atol=1e-9)
+    np.testing.assert_allclose(found["observable"].C[0], eye[0], atol=1e-9)
+    blocks = canonical(plant(dt), "modal").A  # of several inputs and outputs too
+    pair = blocks[:2, :2] if abs(blocks[0, 1]) > 1e-9 else blocks[1:, 1:]
+    assert pair[0, 0] == pytest.approx(pair[1, 1])
+    assert pair[0, 1] == pytest.approx(-pair[1, 0])
+    assert np.count_nonzero(np.abs(blocks) > 1e-9) == 5
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -59,8 +79,21 @@ def test_transfer_functions_and_state_spaces_are_the_same_system() -> None:
         lambda: c2d(plant(), 0.0),
         lambda: reduced(control.tf([1.0], [1.0, -1.0]), 1),
         lambda: reduced(plant(), 4),
+        lambda: canonical(plant(), "companion"),
+        lambda: canonical(plant(), "diagonal"),
+        lambda: canonical(control.ss([[0.5, 1.0], [0.0, 0.5]], [[0.0], [1.0]], [[1.0, 0.0]], 0.0, 0.1), "modal"),
     ],
-    ids=["negative pole", "continuous", "discrete", "no time", "unstable", "more states"],
+    ids=[
+        "negative pole",
+        "continuous",
+        "discrete",
+        "no time",
+        "unstable",
+        "more states",
+        "two inputs",
+        "no form",
+        "equal poles",
+    ],
 )
 def test_what_cannot_be_is_refused_with_a_remedy(wrong) -> None:
     with pytest.raises(ConfigError) as caught:
