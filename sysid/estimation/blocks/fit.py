@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -14,7 +15,7 @@ from sysid.estimation.blocks.linear_start import LinearStart, linear_start, part
 from sysid.estimation.grey_box.fit import built_template, fit_equations
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.result import FitResult
-from sysid.models import HammersteinWiener, Mapping, Start, WienerHammerstein
+from sysid.models import BuiltModel, HammersteinWiener, Mapping, Start, WienerHammerstein
 from sysid.models.block_oriented import BlockStructure
 from sysid.traces import Trace
 
@@ -68,10 +69,11 @@ def fit_hammerstein_wiener(
     template, experiments = built_template(
         traces, mapping, grey, built_of=structure, start=start or Start(), rest_output=rest_output
     )
-    return fit_equations(
+    found = fit_equations(
         template, experiments, (training or Training()).with_starts(STARTS), (traces, selection, start or Start()),
         scattered=curved, began=began, vet=vet, on_progress=on_progress,
     )  # fmt: skip
+    return with_equations(found)
 
 
 def fit_wiener_hammerstein(
@@ -106,10 +108,18 @@ def fit_wiener_hammerstein(
         traces, mapping, greys[0], built_of=structure, start=start or Start(), rest_output=rest_output
     )
     others = [np.array([one.start for one in grey.free]) for grey in greys[1:]]
-    return fit_equations(
+    found = fit_equations(
         template, experiments, training, (traces, selection, start or Start()),
         others=others, scattered=frozenset(), began=began, vet=vet, on_progress=on_progress,
     )  # fmt: skip
+    return with_equations(found)
+
+
+def with_equations(found: FitResult) -> FitResult:
+    """A fit whose notes have its equations, with the numbers that were found."""
+    model = found.model
+    assert isinstance(model, BuiltModel)  # noqa: S101 - the template is one
+    return replace(found, notes=(*found.notes, *model.equations.splitlines()))
 
 
 def _begun(

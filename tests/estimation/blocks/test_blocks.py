@@ -92,6 +92,7 @@ def test_the_limits_of_a_saturation_have_intervals_that_hold_them() -> None:
     away = known.values[places] * half + middle - [-0.6, 0.4]
     assert (np.abs(away) < 3.0 * known.standard_deviations[places] * half).all()
     assert (known.standard_deviations[places] < 0.05).all()
+    assert any("clamp(f_in, (-0." in note for note in fit.notes)
 
 
 def sandwich(u: np.ndarray) -> np.ndarray:
