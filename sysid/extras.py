@@ -30,6 +30,7 @@ EXTRAS = {
     "ziglang": "fmu-cross",
     "casadi": "casadi",
     "fmpy": "fmu",
+    "jax": "jax",
 }
 """Our extra by the name that is imported."""
 

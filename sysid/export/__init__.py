@@ -8,6 +8,7 @@ from sysid.export.command_table import CommandTable, read_command
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run
 from sysid.export.exporters import EXPORTERS, exporter
 from sysid.export.flags import Flag, expected_flags
+from sysid.export.jax_exporter import jax_run, jax_step
 from sysid.export.layout import DelayLine, StateLayout
 from sysid.export.parity import Parity, ParityCase, check_parity, parity_cases, random_cases
 from sysid.export.reading import read_bundle
@@ -37,6 +38,8 @@ __all__ = [
     "expected_flags",
     "export_bundle",
     "exporter",
+    "jax_run",
+    "jax_step",
     "parity_cases",
     "random_cases",
     "read_bundle",

@@ -60,21 +60,7 @@ class CExporter(AbstractExporter):
         """Build the source with this machine's compiler, and call it."""
         prefix = file.details["prefix"]
         function = _library(file, folder)[f"{prefix}_run"]
-        function.restype = ctypes.c_uint
-        dtype, n_outputs = np.dtype(file.dtype), file.details["n_outputs"]
-
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
-            n_samples, n_cars, _ = inputs.shape
-            after = np.array(with_remainders(state, file.details["n_state"]), dtype=dtype, order="C")
-            u = np.ascontiguousarray(inputs.transpose(1, 0, 2), dtype=dtype)
-            y = np.empty((n_cars, n_samples, n_outputs), dtype=dtype)
-            flags = np.empty((n_cars, n_samples), dtype=np.uint32)
-            for car in range(n_cars):
-                places = [ctypes.c_void_p(array[car].ctypes.data) for array in (after, u, y, flags)]
-                function(places[0], ctypes.c_size_t(n_samples), *places[1:])
-            return Run(output=y.transpose(1, 0, 2), state=after, flags=flags.T.astype(np.int32))
-
-        return run
+        return caller(function, file)
 
 
 def _library(file: ExportedFile, folder: Path) -> ctypes.CDLL:
@@ -85,3 +71,30 @@ def _library(file: ExportedFile, folder: Path) -> ctypes.CDLL:
         build_library([file.name], Path(workplace), "surrogate.so", flags)
         # The loader keeps what it has mapped, so that the file may go.
         return ctypes.CDLL(str(Path(workplace) / "surrogate.so"))
+
+
+def caller(function: Any, file: ExportedFile) -> Runner:
+    """A compiled run, as the contract of exporters has it.
+
+    Args:
+        function: ``(state, n_samples, inputs, outputs, flags)``, of one car.
+        file: What it was built from; its details tell how many outputs and numbers of the state there are.
+
+    Returns:
+        The runner.
+    """
+    function.restype = ctypes.c_uint
+    dtype, n_outputs = np.dtype(file.dtype), file.details["n_outputs"]
+
+    def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+        n_samples, n_cars, _ = inputs.shape
+        after = np.array(with_remainders(state, file.details["n_state"]), dtype=dtype, order="C")
+        u = np.ascontiguousarray(inputs.transpose(1, 0, 2), dtype=dtype)
+        y = np.empty((n_cars, n_samples, n_outputs), dtype=dtype)
+        flags = np.empty((n_cars, n_samples), dtype=np.uint32)
+        for car in range(n_cars):
+            places = [ctypes.c_void_p(array[car].ctypes.data) for array in (after, u, y, flags)]
+            function(places[0], ctypes.c_size_t(n_samples), *places[1:])
+        return Run(output=y.transpose(1, 0, 2), state=after, flags=flags.T.astype(np.int32))
+
+    return run

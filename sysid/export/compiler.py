@@ -15,7 +15,9 @@ from sysid.extras import has
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic")
 """What the exported source is clean under."""
-FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
+FLAGS = ("-O2", "-fPIC", "-shared")
+LANGUAGES = {"c": ("CC", ("cc", "gcc", "clang"), "-std=c99"), "c++": ("CXX", ("c++", "g++", "clang++"), "-std=c++11")}
+"""Of each the variable that chooses a compiler, those that are looked for, and the standard."""
 ZIG = (sys.executable, "-m", "ziglang", "cc")
 """Clang with the headers and libraries of every machine, from PyPI."""
 
@@ -24,8 +26,14 @@ class CompilerError(SysidError):
     """C that we wrote and that the compiler refuses."""
 
 
-def compiler() -> list[str]:
-    """The command of the C compiler: ``CC`` if it is set, otherwise the first of cc, gcc and clang.
+NEEDS = {"c": "the formats c, arduino, fmi2 and fmi3 need a C compiler", "c++": "the format cpp needs a C++ compiler"}
+
+
+def compiler(language: str = "c") -> list[str]:
+    """The command of the compiler: ``CC`` (for C++ ``CXX``) if it is set, otherwise the first that is there.
+
+    Args:
+        language: ``"c"`` or ``"c++"``.
 
     Returns:
         The command, as words.
@@ -33,18 +41,19 @@ def compiler() -> list[str]:
     Raises:
         ConfigError: If there is none.
     """
-    chosen = shlex.split(os.environ.get("CC", ""))
-    found = [chosen] if chosen else [[name] for name in ("cc", "gcc", "clang")]
+    variable, names, _ = LANGUAGES[language]
+    chosen = shlex.split(os.environ.get(variable, ""))
+    found = [chosen] if chosen else [[name] for name in names]
     for command in found:
         if shutil.which(command[0]):
             return command
     if not chosen and has("ziglang"):
-        return [*ZIG, *CROSS]
+        return [*ZIG[:-1], "cc" if language == "c" else "c++", *CROSS]
     raise ConfigError(
-        "the formats c, fmi2 and fmi3 need a C compiler, which is not there",
+        f"{NEEDS[language]}, which is not there",
         expected=" or ".join(command[0] for command in found),
         got="no such program",
-        remedy="install gcc or clang, set CC, or leave these formats out",
+        remedy=f"install gcc or clang, set {variable}, or leave these formats out",
     )
 
 
@@ -53,7 +62,13 @@ CROSS = ("-s", "-fno-sanitize=undefined")
 
 
 def build_library(
-    sources: Sequence[str], folder: Path, output: str, flags: Sequence[str] = (), *, target: str | None = None
+    sources: Sequence[str],
+    folder: Path,
+    output: str,
+    flags: Sequence[str] = (),
+    *,
+    target: str | None = None,
+    language: str = "c",
 ) -> None:
     """Build a shared library; the same bytes wherever the folder lies.
 
@@ -63,13 +78,14 @@ def build_library(
         output: Its file name.
         flags: More flags of the compiler.
         target: A machine that it is built for, by the compiler of the extra ``fmu-cross``; this one by default.
+        language: ``"c"`` or ``"c++"``.
 
     Raises:
         ConfigError: If there is no compiler.
         CompilerError: If it reports an error.
     """
-    chosen = compiler() if target is None else [*ZIG, "-target", target, *CROSS]
-    command = [*chosen, *FLAGS, *flags, "-o", output, *sources, "-lm"]
+    chosen = compiler(language) if target is None else [*ZIG, "-target", target, *CROSS]
+    command = [*chosen, LANGUAGES[language][2], *FLAGS, *flags, "-o", output, *sources, "-lm"]
     done = subprocess.run(  # noqa: S603 - the compiler of this machine on files that we wrote
         command, cwd=folder, capture_output=True, text=True, check=False
     )

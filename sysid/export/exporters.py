@@ -7,10 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sysid.errors import ConfigError
+from sysid.export.arduino_exporter import ArduinoExporter
 from sysid.export.c_exporter import CExporter
 from sysid.export.casadi_exporter import CasadiExporter
+from sysid.export.cpp_exporter import CppExporter
 from sysid.export.exporter import AbstractExporter
 from sysid.export.fmu_exporter import FmuExporter
+from sysid.export.jax_exporter import JaxExporter
 from sysid.export.onnx_exporter import OnnxExporter
 from sysid.export.torch_export import TorchExportExporter
 from sysid.export.torchscript import TorchScriptExporter
@@ -27,6 +30,9 @@ EXPORTERS: dict[str, AbstractExporter] = {
         FmuExporter(name="fmi2", version=2),
         FmuExporter(name="fmi3", version=3),
         CasadiExporter(),
+        JaxExporter(),
+        CppExporter(),
+        ArduinoExporter(),
     )
 }
 """Every format by name."""

@@ -70,6 +70,9 @@ ROWS = {
     "FMI 2.0": Row(format="fmi2", name="{name}.fmi2.fmu"),
     "FMI 3.0": Row(format="fmi3", name="{name}.fmi3.fmu"),
     "CasADi, step": Row(format="casadi", name="step.casadi"),
+    "JAX, step": Row(format="jax", name="step.jax"),
+    "C++": Row(format="cpp", name="{name}.hpp"),
+    "Arduino": Row(format="arduino", name="{name}_arduino.zip", dtype="float32", tolerance=1e-3),
 }
 """Every file of every format: the table of the contract."""
 FORMATS = tuple(dict.fromkeys(row.format for row in ROWS.values()))
@@ -148,8 +151,8 @@ FEW_MODELS = (
     "NARX, gates",
     "NARX against its bounds",
 )
-WRAPPED = ("fmi2", "fmi3", "torch-export")
-"""Formats around one that meets every model: an FMU holds the C source, torch.export traces TorchScript's module."""
+WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino")
+"""Formats around one that meets every model: the C source, or (torch.export) TorchScript's module."""
 PAIRS = [(m, r) for m in MODELS for r, row in ROWS.items() if row.format not in WRAPPED or m in FEW_MODELS]
 
 

@@ -55,4 +55,5 @@ CUBIC = Neuron(
     c="x * x * x",
     onnx=_onnx,
     torch=_torch,
+    jax=lambda: lambda x: x * x * x,  # what a power's derivative is at 0 depends on the library
 )

@@ -39,6 +39,7 @@ class Neuron:
             all: the file may be compiled for float.
         onnx: Adds the function's nodes to a graph, from the name of the sums and the name of what comes out.
         torch: Makes a torch module of the function that can be scripted.
+        jax: Gives the function in ``jax.numpy``, elementwise.
     """
 
     name: str
@@ -48,3 +49,4 @@ class Neuron:
     c: str
     onnx: Callable[[Graph, str, str], str]
     torch: Callable[[], Any]
+    jax: Callable[[], Callable[[Any], Any]]

@@ -39,6 +39,12 @@ def _torch() -> Any:
     return nn.Tanh()
 
 
+def _jax() -> Any:
+    import jax.numpy as jnp
+
+    return jnp.tanh
+
+
 TANH = Neuron(
     name="tanh",
     description="saturates, as what is measured within a range mostly does",
@@ -48,4 +54,5 @@ TANH = Neuron(
     c="TANH(x > R(20.0) ? R(20.0) : x < R(-20.0) ? R(-20.0) : x)",
     onnx=_onnx,
     torch=_torch,
+    jax=_jax,
 )
