@@ -28,7 +28,7 @@ int main()
 }}
 """
 OTHER = """#include "{p}.hpp"
-double half(double R) {{ return R / {p}::Surrogate::n_inputs; }}
+double half(double R) {{ return R / static_cast<int>({p}::Surrogate::n_inputs); }}
 """
 BOARD = """#ifndef ARDUINO_H
 #define ARDUINO_H
