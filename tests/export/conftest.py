@@ -259,8 +259,8 @@ def command() -> TraceSet:
 
 @pytest.fixture(scope="session")
 def cascade_bundle(limited: Cascade, command: TraceSet, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    """A whole cascade in every format but those of torch and JAX, which take long, and what lacks here; read-only."""
-    formats = [name for name, one in EXPORTERS.items() if not name.startswith(("torch", "jax")) and not one.lacks()]
+    """A whole cascade in every format but those of torch, which take long, and what lacks here; read-only."""
+    formats = [name for name, one in EXPORTERS.items() if not name.startswith("torch") and not one.lacks()]
     folder = tmp_path_factory.mktemp("cascade") / "b"
     return export_bundle(
         limited, command, folder, formats=formats, metrics=evaluate_cascade(limited, command, repeats=1)
