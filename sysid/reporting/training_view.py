@@ -36,7 +36,7 @@ def trust_sections(results: Results) -> list[Section]:
     sections = []
     coverage = coverage_table(results)
     if coverage is not None:
-        sections.append(Section(anchor="intervals", title="How sure the networks are", parts=(coverage,)))
+        sections.append(Section(anchor="intervals", title="How sure the free runs are", parts=(coverage,)))
     stability = stability_table(results)
     if stability is not None:
         sections.append(Section(anchor="stability", title="Whether their free run stays stable", parts=(stability,)))

@@ -265,7 +265,7 @@ def choose(
     return Choice(
         name=min(by_estimation, key=by_estimation.__getitem__),
         chosen_by=f"Least {what} of the free run on the estimation traces, for want of selection traces; "
-        "it favours the largest network.",
+        "it favours the model with the most parameters.",
     )
 
 
