@@ -29,6 +29,7 @@ WORDS = (
 ABOVE = {
     "auto": "sysid.workbench.auto.python",
     "experiment": "sysid.workbench.experiments.python",
+    "surrogate": "sysid.workbench.surrogates.python",
 }
 """Words that stand on a pipeline, which is above the others, and where each is."""
 

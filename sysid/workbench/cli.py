@@ -301,6 +301,46 @@ def auto(  # noqa: PLR0917 - one parameter an option, by name on the command lin
     raise typer.Exit(auto_command(source, given=given, fresh=fresh, out=out, tracking=not no_tracking))
 
 
+@app.command(epilog="Example: sysid surrogate cylinder.fmu --minutes 60 --range valve=-10:10 --parameter mass=100:300")
+def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the command line
+    source: Annotated[
+        str, typer.Argument(help="An FMU, or a pipeline of kind experiment. It is code, and is run with your rights.")
+    ],
+    minutes: Annotated[float, typer.Option(min=0.1, help="Time for experiments, search and proof together.")] = 60.0,
+    span: Annotated[
+        list[str] | None, typer.Option("--range", metavar="NAME=LOW:HIGH", help="Of an input of the FMU; repeated.")
+    ] = None,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=LOW:HIGH", help="A parameter that varies, an input of the surrogate; repeated."),
+    ] = None,
+    output: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="An output; all by default; repeated.")
+    ] = None,
+    sample_time: Annotated[float | None, typer.Option(help="Seconds; as the FMU says by default.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Seconds an experiment; as the FMU says by default.")] = None,
+    proof: Annotated[
+        int | None, typer.Option(min=1, help="New experiments of the proof; 1000, or as many as there is time for.")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/surrogate-<name> by default.")] = None,
+    no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
+) -> None:
+    """From a slow model to a small one in its place: experiments, a model of them, an FMU with the same ports, a proof.
+
+    What was killed goes on where it was.
+    """
+    from sysid.workbench.commands.surrogate import surrogate_command, wish_of
+
+    wish = wish_of(span or [], parameter or [], output or [], sample_time=sample_time, duration=duration)
+    raise typer.Exit(
+        surrogate_command(
+            source, wish, minutes=minutes, proof=proof, workers=workers, seed=seed, out=out, tracking=not no_tracking
+        )
+    )
+
+
 @app.command(epilog="Example: sysid excite multisine --samples 4000 --sample-time 0.01 --range 0:10 --out u.csv")
 def excite(
     kind: Annotated[

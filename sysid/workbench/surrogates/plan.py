@@ -1,0 +1,111 @@
+"""What a surrogate is made from: a pipeline of kind ``experiment``, written where it can be read and changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sysid.references.config import ReferenceConfig
+from sysid.references.described import Wish, proposed
+from sysid.references.design import Counts, Design, drawn
+from sysid.references.runs import ReferenceRuns
+from sysid.workbench.experiments.config import ExperimentConfig
+from sysid.workbench.runner.store import write_bytes
+from sysid.yaml_files import check, yaml_text
+
+RUNNING = 0.2
+"""Share of the time in which the reference is run for data; as much again for the proof."""
+FEWEST, MOST = 8, 60
+"""Experiments that are fitted."""
+
+
+def written(fmu: Path, wish: Wish, folder: Path, *, minutes: float, workers: int, seed: int) -> tuple[Path, list[str]]:
+    """The pipeline of an FMU, written; one that is there already is left as it is.
+
+    Args:
+        fmu: The reference. **Its code is run once**, to see how long that takes.
+        wish: What is said beside its description.
+        folder: Where.
+        minutes: Time for all.
+        workers: Processes.
+        seed: Of everything random.
+
+    Returns:
+        The file, and what was taken from where.
+
+    Raises:
+        ConfigError: If the description does not say enough, or the reference cannot be run.
+    """
+    file = folder / "experiment.yaml"
+    if file.is_file():
+        return file, [f"{file} is there already and is taken as it is"]
+    fields, duration, notes = proposed(fmu, wish)
+    reference = check(ReferenceConfig, fields, where=fmu)
+    runs = affordable(reference, Design(duration=duration, seed=seed), minutes=minutes, workers=workers)
+    experiment = {"duration": duration, "runs": runs.model_dump(), "seed": seed}
+    content: dict[str, Any] = {
+        **{"kind": "experiment", "name": f"{fmu.stem}-runs", "reference": fields, "experiment": experiment},
+        "workers": workers,
+    }
+    check(ExperimentConfig, content, where=fmu)
+    told = "".join(f"# {one}\n" for one in notes)
+    write_bytes(file, f"# Proposed for {fmu.name}. An FMU is code, and is run.\n{told}{yaml_text(content)}".encode())
+    return file, notes
+
+
+def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, workers: int) -> Counts:
+    """How many experiments there is time for.
+
+    Args:
+        reference: Run once to see.
+        design: What each is.
+        minutes: Time for all.
+        workers: Processes.
+
+    Returns:
+        By role.
+    """
+    (case,) = drawn(reference, design, 1, seed=(design.seed, 9), prefix="TRY")
+    with ReferenceRuns(config=reference, workers=1) as runs:
+        (one,) = runs.run([case])
+    each = one.wall_s if np.isfinite(one.wall_s) else reference.time_limit
+    count = int(np.clip(RUNNING * 60.0 * minutes * workers / max(each, 1e-3) / 1.5, FEWEST, MOST))
+    return Counts(estimation=count, selection=max(3, count // 4), test=max(3, count // 4))
+
+
+def pairs(options: Sequence[str], flag: str) -> dict[str, tuple[float, float]]:
+    """Ranges as they are typed, ``NAME=LOW:HIGH``.
+
+    Args:
+        options: As typed.
+        flag: For errors.
+
+    Returns:
+        By name.
+
+    Raises:
+        ConfigError: If one is not of that form.
+
+    Example:
+        >>> pairs(["u=0:10"], "--range")
+        {'u': (0.0, 10.0)}
+    """
+    from sysid.errors import ConfigError
+
+    found = {}
+    for text in options:
+        name, _, span = text.rpartition("=")
+        try:
+            low, high = (float(part) for part in span.split(":"))
+        except ValueError:
+            name = ""
+        if not name or not low < high:
+            raise ConfigError(
+                f"{flag} is not a range", where="the command line", expected="NAME=LOW:HIGH, as valve=0:10", got=text,
+                remedy="write the name, and two rising numbers",
+            )  # fmt: skip
+        found[name] = (low, high)
+    return found

@@ -1,0 +1,91 @@
+"""From slow models to surrogates in their place: what one command makes of each in so many minutes.
+
+Run with ``python -m tests.benchmarks surrogates --minutes=5 --only=thermal,cylinder``. References are two slow models
+of the tests (a stiff thermal network of 200 states, a hydraulic cylinder with friction and end stops), and,
+where the folder of the environment variable ``REFERENCE_FMUS`` holds them, the Modelica Association's VanDerPol,
+Dahlquist and BouncingBall (https://github.com/modelica/Reference-FMUs). Time is that of the whole: experiments, search
+and proof. The target is a share of 99 % within 1 % of the range for what is smooth and 95 % for what has events (root
+mean square of the free run), and 100 times the reference's speed on the thermal network.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import sysid
+from sysid.references.described import Wish, proposed
+
+MODELS = Path(__file__).parents[1] / "references"
+MINUTES = 5.0
+RUNS = {"estimation": 12, "selection": 4, "test": 4}
+PYTHON: dict[str, dict[str, Any]] = {
+    "thermal": {
+        "reference": {
+            **{"python": "slow_models:thermal", "sample_time": 20.0},
+            "inputs": {
+                "heat": {"unit": "W", "range": [0, 100], "start": 0},
+                "air": {"unit": "kelvin", "range": [283.15, 303.15], "rate": 0.02, "start": 293.15},
+            },
+            "outputs": {"face": {"unit": "kelvin"}, "middle": {"unit": "kelvin"}},
+        },
+        "experiment": {"duration": 8000.0, "runs": RUNS},
+    },
+    "cylinder": {
+        "reference": {
+            **{"python": "slow_models:cylinder", "sample_time": 0.02},
+            "inputs": {"valve": {"unit": "V", "range": [-10, 10], "start": 0}},
+            "outputs": {"position": {"unit": "mm"}},
+        },
+        "experiment": {"duration": 10.0, "runs": RUNS},
+    },
+}
+FMUS = {
+    "VanDerPol": {"mu": (0.5, 2.0)},
+    "Dahlquist": {"k": (0.5, 2.0)},
+    "BouncingBall": {"e": (0.5, 0.9)},
+}
+"""Parameters that vary: none of these has an input."""
+
+
+def pipeline(name: str, folder: Path) -> Path:
+    """The YAML of a reference."""
+    if name in PYTHON:
+        content: dict[str, Any] = {**PYTHON[name]}
+        content["reference"] = {"folder": str(MODELS), **content["reference"]}
+    else:
+        file = Path(os.environ["REFERENCE_FMUS"]) / f"{name}.fmu"
+        fields, duration, _ = proposed(file, Wish(ranges={}, parameters=FMUS[name]))
+        content = {"reference": fields, "experiment": {"duration": duration, "runs": RUNS}}
+    path = folder / f"{name}.yaml"
+    path.write_text(yaml.safe_dump({"kind": "experiment", "name": name, "workers": 2, **content}), encoding="utf-8")
+    return path
+
+
+def main() -> None:
+    """Make each, and print a row."""
+    given = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
+    minutes, only = float(given.get("minutes", MINUTES)), given.get("only", "")
+    names = only.split(",") if only else [*PYTHON, *(FMUS if "REFERENCE_FMUS" in os.environ else ())]
+    print(f"{'reference':<14}{'new':>6}{'rms':>9}{'everywhere':>12}{'diverged':>10}{'faster':>10}{'FMU off':>10}")
+    for name in names:
+        with tempfile.TemporaryDirectory() as place:
+            made = sysid.surrogate(pipeline(name, Path(place)), Path(place) / "out", minutes=minutes)
+        proof = made.proof
+        off = "-" if proof.dropped is None else f"{proof.dropped:.1e}"
+        print(
+            f"{name:<14}{len(proof.errors):>6}{proof.share:>9.1%}{proof.share_everywhere:>12.1%}{proof.diverged:>10}"
+            f"{proof.reference_s / proof.surrogate_s:>10.3g}{off:>10}",
+            flush=True,
+        )
+        for line in proof.sentences():
+            print(f"  {line}")
+
+
+if __name__ == "__main__":
+    main()

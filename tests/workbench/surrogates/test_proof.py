@@ -1,0 +1,78 @@
+"""A surrogate against its reference: a proof on what taught nothing, the same ports, and what has to be asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import sysid
+from sysid.errors import ConfigError
+from sysid.export import Bundle
+from sysid.models import Start
+from sysid.references.config import ReferenceConfig
+from sysid.references.described import Wish, proposed
+from sysid.references.design import Design, designed
+from sysid.reporting.judging.results import JudgementRecord
+from sysid.workbench.surrogates.plan import pairs
+from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
+
+pytest.importorskip("fmpy")
+MODELS = Path(__file__).parents[2] / "references"
+REFERENCE = {
+    **{"python": "slow_models:first_order", "folder": str(MODELS), "sample_time": 0.5},
+    **{"inputs": {"u": {"unit": "V", "range": [0, 2], "start": 0}}, "outputs": {"y": {"unit": "V"}}},
+}
+DESIGN = {"duration": 40.0, "runs": {"estimation": 4, "selection": 0, "test": 0}}
+
+
+@pytest.fixture(scope="module")
+def proven(tmp_path_factory: pytest.TempPathFactory) -> tuple[Bundle, Proof, JudgementRecord]:
+    """A lag of the first order, which a linear model is, on twelve new experiments."""
+    folder = tmp_path_factory.mktemp("surrogate")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SYSID_CACHE", str(folder / "cache"))
+        traces = sysid.experiment(REFERENCE, DESIGN, workers=1)
+        fit = sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=1, nk=0), rest_output=0.0)
+        bundle = sysid.save(fit, traces, folder / "bundle", formats=("fmi2",), start=Start())
+        config, design = ReferenceConfig.model_validate(REFERENCE), Design.model_validate(DESIGN)
+        return (bundle, *prove(bundle, config, design, traces, count=12, workers=1))
+
+
+def test_every_new_experiment_is_within_the_tolerance_of_a_model_that_is_exact(
+    proven: tuple[Bundle, Proof, JudgementRecord],
+) -> None:
+    _, proof, section = proven
+    assert proof.errors.shape == (12, 1)
+    assert proof.errors.max() < 1e-9
+    assert (proof.share, proof.share_everywhere, proof.diverged, proof.failed) == (1.0, 1.0, 0, 0)
+    assert len(section.scenes) == 10
+    assert "Of 12 new random experiments" in section.method
+
+
+def test_no_experiment_of_the_proof_has_taught(proven: tuple[Bundle, Proof, JudgementRecord]) -> None:
+    config, design = ReferenceConfig.model_validate(REFERENCE), Design.model_validate(DESIGN)
+    taught = {case.inputs.tobytes() for some in designed(config, design).values() for case in some}
+    assert not taught & {one.case.inputs.tobytes() for one in proven[1].outcomes}
+
+
+def test_the_fmu_runs_in_the_place_of_the_reference(proven: tuple[Bundle, Proof, JudgementRecord]) -> None:
+    assert proven[1].dropped is not None
+    assert proven[1].dropped < 1e-12
+
+
+def test_what_an_fmu_does_not_say_is_asked_for_by_its_option(proven: tuple[Bundle, Proof, JudgementRecord]) -> None:
+    file = fmu_of(proven[0])
+    assert file is not None
+    wish = Wish(ranges={"u": (0.0, 2.0)}, parameters={}, outputs=("y",), sample_time=0.5, duration=40.0)
+    fields, duration, _ = proposed(file, wish)
+    assert (list(fields["inputs"]), fields["inputs"]["u"]["unit"], duration) == (["u"], "V", 40.0)
+    with pytest.raises(ConfigError, match="does not say all") as caught:
+        proposed(file, Wish(ranges={}, parameters={}, outputs=("y",)))
+    assert "--range u=LOW:HIGH" in str(caught.value.remedy)
+
+
+@pytest.mark.parametrize("text", ["u", "u=3:1", "=1:2", "u=a:b"])
+def test_a_range_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(ConfigError, match="is not a range"):
+        pairs([text], "--range")
