@@ -3,7 +3,7 @@
 import copy
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from html import escape
 from typing import Any
 
@@ -32,15 +32,21 @@ def no_store_of_an_earlier_test(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
 
 
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pages with empty pictures: to draw them takes longer than all else, and most tests of a page are not of these."""
+@pytest.fixture(scope="session")
+def blank_picture() -> Callable[..., str]:
+    """In the place of a drawing: to draw takes longest, and most tests of a page are not of its pictures."""
 
-    def empty(_: object, *, title: str, description: str, name: str) -> str:
+    def blank(_: object, *, title: str, description: str, name: str) -> str:
         words = f'<title id="{name}-title">{escape(title)}</title><desc id="{name}-desc">{escape(description)}</desc>'
         return f'<svg role="img" aria-labelledby="{name}-title {name}-desc" viewBox="0 0 1 1">{words}</svg>'
 
-    monkeypatch.setattr("sysid.reporting.parts.svg", empty)
+    return blank
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch, blank_picture: Callable[..., str]) -> None:
+    """Pages with empty pictures."""
+    monkeypatch.setattr("sysid.reporting.parts.svg", blank_picture)
 
 
 @pytest.fixture(scope="session", autouse=True)

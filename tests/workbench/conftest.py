@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from sysid.reporting.figures.svg import svg
 
 DATASET = """\
 name: rig
@@ -67,6 +69,20 @@ def fill(folder: Path) -> None:
         (data / f"run-{seed}.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
     (folder / "pipelines").mkdir()
     (folder / "pipelines" / "first.yaml").write_text(PIPELINE, encoding="utf-8")
+
+
+@pytest.fixture(scope="package", autouse=True)
+def undrawn_pages(blank_picture: Callable[..., str]) -> Iterator[None]:
+    """Pages of runs have empty pictures, but for the tests that ask for ``drawn`` and for processes of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sysid.reporting.parts.svg", blank_picture)
+        yield
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of the pictures."""
+    monkeypatch.setattr("sysid.reporting.parts.svg", svg)
 
 
 @pytest.fixture(scope="session")

@@ -21,8 +21,6 @@ from sysid.workbench.fits.config import read_pipeline
 from sysid.workbench.fits.record import read_scores
 from sysid.workbench.fits.run import run_pipeline
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 U = Channel(name="u", unit="V")
 BRAKE = """\
 name: brake

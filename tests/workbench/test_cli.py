@@ -7,7 +7,6 @@ import signal
 import statistics
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,8 @@ from sysid.export import read_bundle
 from sysid.ingest import read_trace
 from sysid.workbench import cli
 from sysid.workbench.cli import run_cli
+from sysid.workbench.runner.events import Event, StepProgress
+from sysid.workbench.runner.run import Run
 
 SYSID = [str(Path(sys.executable).with_name("sysid"))]
 COMMANDS = ("run", "ingest", "simulate", "export", "promote", "report", "ui", "init", "schema")
@@ -204,7 +205,6 @@ def test_a_data_set_is_summed_up(workspace: Path, capsys: pytest.CaptureFixture[
         assert word in told
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_untracked_results_are_done_but_not_code_0(
     workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -216,23 +216,21 @@ def test_untracked_results_are_done_but_not_code_0(
     assert (workspace / "runs" / "first" / "report" / "index.html").is_file()
 
 
-def test_ctrl_c_ends_a_fit_and_keeps_its_model(workspace: Path) -> None:
-    file = workspace / "pipelines" / "first.yaml"
-    # Some 1,600 parameters: an iteration takes a tenth of a second, and hundreds of them are needed.
-    text = file.read_text(encoding="utf-8").replace("    initial: open loop\n", "")
-    for old, new in (("delays: 1", "delays: 8"), ("neurons: 2", "neurons: 60"), ("8}", "100000}")):
-        text = text.replace(old, new, 2 if old == "delays: 1" else 1)
-    file.write_text(text, encoding="utf-8")
-    process = subprocess.Popen([*SYSID, "run", "first", "--no-tracking"], stdout=subprocess.PIPE, text=True)
-    log = workspace / "runs" / "first" / "log.txt"
-    deadline = time.monotonic() + 240.0
-    while time.monotonic() < deadline and not (
-        log.exists() and "Fitting open loop, NARX 8/8/60 ..." in log.read_text()
-    ):
-        time.sleep(0.05)
-    time.sleep(1.0)
-    process.send_signal(signal.SIGINT)
-    told, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
-    assert "closed loop" in told
+def test_ctrl_c_ends_a_fit_and_keeps_its_model(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told_before, iterations = Run.tell, list[str]()
+
+    def pressed_at_the_third_iteration(run: Run, event: Event) -> None:
+        told_before(run, event)
+        if isinstance(event, StepProgress) and event.step.startswith("Fitting open loop"):
+            iterations.append(event.detail)
+            if len(iterations) == 3:
+                signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Run, "tell", pressed_at_the_third_iteration)
+    assert run_cli(["run", "first", "--no-tracking"]) == 0
+    told = capsys.readouterr().out
+    assert "Interrupted; this is the best model up to then" in told
+    assert "Fitting closed loop" in told
     assert '"status": "INTERRUPTED"' in (workspace / "runs" / "first" / "results.json").read_text()

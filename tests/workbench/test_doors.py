@@ -29,8 +29,6 @@ from sysid.workbench.sweep.run import Sweep, run_sweep
 from sysid.workbench.sweep.workers import InThisProcess
 from sysid.yaml_files import check, yaml_text
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 MAPPING = "inlet+valve -> outlet"
 STABILITY = {"count": 15}
 TERMS = {"data": "rig", "mapping": MAPPING, "start": "rest", "rest": {"outlet": 100.0}}

@@ -42,7 +42,6 @@ def test_what_is_proposed_runs(kind: str, tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     # What a picture shows is tested where it is drawn.
     monkeypatch.setattr("sysid.workbench.commands.ingest._picture", lambda _: "none")
-    monkeypatch.setattr("sysid.reporting.parts.svg", lambda *_, **__: "<svg></svg>")
     path, u, y = written(kind, tmp_path)
     assert run_cli(["ingest", str(path), "--propose", "datasets/rig/dataset.yaml"]) == 0
     (tmp_path / "pipelines").mkdir()

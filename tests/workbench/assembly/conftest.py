@@ -73,17 +73,6 @@ def write_tanks(folder: Path, seed: int = 0) -> None:
 
 
 @pytest.fixture
-def drawn() -> None:
-    """For tests of the pictures: pages of the others have empty ones."""
-
-
-@pytest.fixture(autouse=True)
-def _undrawn(request: pytest.FixtureRequest) -> None:
-    if "drawn" not in request.fixturenames:
-        request.getfixturevalue("undrawn")
-
-
-@pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A workspace with both, the current folder."""
     write_tanks(tmp_path / "datasets" / "tanks")

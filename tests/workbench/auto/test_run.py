@@ -25,7 +25,7 @@ from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
 from tests.workbench.auto.conftest import data, record, traces
 
-pytestmark = pytest.mark.usefixtures("undrawn", "small")
+pytestmark = pytest.mark.usefixtures("small")
 
 FEW = 560
 """Iterations of two linear structures and two networks, four times each, and of one network again."""

@@ -340,7 +340,6 @@ def test_progress_of_several_starts_never_falls(workspace: Path) -> None:
     assert 0.0 <= shares[0] < shares[-1] <= 1.0
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_results_are_strict_json(workspace: Path) -> None:
     run(workspace)
     for file in (workspace / "run").rglob("*.json"):

@@ -8,8 +8,6 @@ import pytest
 
 from sysid.workbench.cli import run_cli
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 GREY = """\
 name: grey
 data: rig

@@ -21,8 +21,6 @@ from sysid.workbench.kinds import RunRequest
 from sysid.workbench.listeners import perform
 from sysid.workbench.tracking.mlflow_store import connect
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 PIPELINE = """\
 kind: overshoot
 name: jump

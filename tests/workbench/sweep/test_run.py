@@ -19,8 +19,6 @@ from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
 from sysid.workbench.tracking.listener import Tracker
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 SWEEP = """\
 kind: sweep
 name: tries

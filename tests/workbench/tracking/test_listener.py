@@ -221,7 +221,6 @@ def test_a_deleted_experiment_comes_back(tracked_once) -> None:
 
 
 @pytest.mark.parametrize("step", ["connect", "pictures"])
-@pytest.mark.usefixtures("undrawn")
 def test_a_failing_store_costs_no_fit(
     workspace: Path, empty_store: Path, monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
