@@ -29,6 +29,7 @@ EXTRAS = {
     "psycopg": "postgres",
     "ziglang": "fmu-cross",
     "casadi": "casadi",
+    "wasmtime": "wasm",
     "fmpy": "fmu",
     "jax": "jax",
 }

@@ -86,13 +86,35 @@ def build_library(
     """
     chosen = compiler(language) if target is None else [*ZIG, "-target", target, *CROSS]
     command = [*chosen, LANGUAGES[language][2], *FLAGS, *flags, "-o", output, *sources, "-lm"]
-    done = subprocess.run(  # noqa: S603 - the compiler of this machine on files that we wrote
+    _compile(command, folder, ", ".join(sources))
+
+
+def build_module(source: str, folder: Path) -> bytes:
+    """Build a module of WebAssembly that imports nothing.
+
+    Args:
+        source: File name in the folder; what it marks as exported is.
+        folder: Where it lies.
+
+    Returns:
+        The module.
+
+    Raises:
+        CompilerError: If the compiler, that of the extra ``wasm``, reports an error.
+    """
+    flags = ("-target", "wasm32-wasi", "-mexec-model=reactor", *CROSS, "-std=c99", "-O2")
+    _compile([*ZIG, *flags, "-o", "module.wasm", source, "-lm"], folder, source)
+    return (folder / "module.wasm").read_bytes()
+
+
+def _compile(command: Sequence[str], folder: Path, what: str) -> None:
+    done = subprocess.run(  # noqa: S603 - a compiler on files that we wrote
         command, cwd=folder, capture_output=True, text=True, check=False
     )
     if done.returncode:
         raise CompilerError(
             "the compiler refuses the exported C source",
-            where=", ".join(sources),
+            where=what,
             got=done.stderr.strip()[-2000:],
             remedy="please report this with the compiler's name and version",
         )

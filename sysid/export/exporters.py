@@ -17,6 +17,7 @@ from sysid.export.jax_exporter import JaxExporter
 from sysid.export.onnx_exporter import OnnxExporter
 from sysid.export.torch_export import TorchExportExporter
 from sysid.export.torchscript import TorchScriptExporter
+from sysid.export.wasm_exporter import WasmExporter
 
 EXPORTERS: dict[str, AbstractExporter] = {
     exporter.name: exporter
@@ -33,6 +34,7 @@ EXPORTERS: dict[str, AbstractExporter] = {
         JaxExporter(),
         CppExporter(),
         ArduinoExporter(),
+        WasmExporter(),
     )
 }
 """Every format by name."""

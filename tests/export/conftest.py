@@ -72,9 +72,12 @@ ROWS = {
     "CasADi, step": Row(format="casadi", name="step.casadi"),
     "JAX, step": Row(format="jax", name="step.jax"),
     "C++": Row(format="cpp", name="{name}.hpp"),
+    "WebAssembly": Row(format="wasm", name="{name}.wasm"),
     "Arduino": Row(format="arduino", name="{name}_arduino.zip", dtype="float32", tolerance=1e-3),
 }
 """Every file of every format: the table of the contract."""
+OPTIONAL = ("wasm",)
+"""Formats whose compiler is large, and is not among what the tests must have."""
 FORMATS = tuple(dict.fromkeys(row.format for row in ROWS.values()))
 
 
@@ -125,9 +128,18 @@ def declared() -> Callable[[AbstractModel], Surrogate]:
     return surrogate_of
 
 
+def usable(name: str) -> AbstractExporter:
+    """The exporter of a format; skips where a package that no test has to have is not there."""
+    found = EXPORTERS[name]
+    problem = found.lacks() if name in OPTIONAL else None
+    if problem:
+        pytest.skip(str(problem))
+    return found
+
+
 def open_file(row: Row, surrogate: Surrogate, folder: Path) -> Exported:
     """Write a surrogate and load one of its files."""
-    exporter: AbstractExporter = EXPORTERS[row.format]
+    exporter = usable(row.format)
     written = exporter.write(surrogate, folder)
     (file,) = [file for file in written if (matches(row, file, surrogate))]
     run = exporter.load(file, folder)
@@ -151,7 +163,7 @@ FEW_MODELS = (
     "NARX, gates",
     "NARX against its bounds",
 )
-WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino")
+WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino", "wasm")
 """Formats around one that meets every model: the C source, or (torch.export) TorchScript's module."""
 PAIRS = [(m, r) for m in MODELS for r, row in ROWS.items() if row.format not in WRAPPED or m in FEW_MODELS]
 

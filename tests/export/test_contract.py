@@ -10,13 +10,20 @@ from hypothesis import strategies as st
 from sysid.export import EXPORTERS, Flag, expected_flags
 from sysid.export.parity import largest_difference
 from sysid.models import NARX, History
+from tests.export.conftest import usable
 
 
 def test_every_file_of_every_exporter_is_in_this_contract(rows, narx, declared, tmp_path):
     surrogate = declared(narx(NARX(input_delays=1, output_delays=1, neurons=1)))
-    written = [file for exporter in EXPORTERS.values() for file in exporter.write(surrogate, tmp_path)]
+    here = [name for name, one in EXPORTERS.items() if not one.lacks()]
+    assert {row.format for row in rows.values()} == {*EXPORTERS}
+    written = [file for name in here for file in EXPORTERS[name].write(surrogate, tmp_path)]
     found = sorted((file.format, file.name, file.dtype) for file in written)
-    assert found == sorted((row.format, row.name.format(name=surrogate.identifier), row.dtype) for row in rows.values())
+    assert found == sorted(
+        (row.format, row.name.format(name=surrogate.identifier), row.dtype)
+        for row in rows.values()
+        if row.format in here
+    )
     named = {name for file in written for name in (file.name, *file.companions)}
     assert sorted(named) == sorted(path.name for path in tmp_path.iterdir())
 
@@ -146,7 +153,7 @@ def test_models_wired_run_as_one(any_cascade, row, opened, inputs, tmp_path):
 
 
 def test_the_same_model_gives_the_same_bytes_whatever_was_written_before(format_name, models, declared, tmp_path):
-    exporter, contents = EXPORTERS[format_name], []
+    exporter, contents = usable(format_name), []
     for other in ("NARX without bounds", "NARX, direct input"):
         folder = tmp_path / other.replace(" ", "_")
         folder.mkdir()
