@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 import sysid
+from sysid.export.c_equations import equation_values
 from sysid.export.flags import MEANING
 from sysid.export.incremental_form import IncrementalForm
-from sysid.export.layout import HiddenState
+from sysid.export.layout import EquationState, HiddenState
+from sysid.export.program_form import ProgramForm
 from sysid.export.stage import Level, Side, Stage
 from sysid.export.state_space_form import StateSpaceForm
 from sysid.export.surrogate import Surrogate
@@ -49,6 +51,12 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "any_sums": any(stage["adds"] for stage in stages),
         "rest_lines": _rest_lines(surrogate),
         "rest_spaces": _rest_spaces(surrogate),
+        "rest_equations": [
+            {"stage": at, "first": stage.first, "sources": stage.sources, "targets": stage.targets}
+            for at, stage in enumerate(surrogate.stages)
+            if isinstance(stage.state, EquationState) and stages[at]["n"]
+        ],
+        "equations": [stage for stage in stages if stage["kind"] == "equations"],
         "late": [{**asdict(late), "name": surrogate.channels[late.column].name} for late in surrogate.late],
         "levels": [level_text(surrogate, port.level) for port in surrogate.channels],
         "levels_in_words": [_words(port.level) for port in surrogate.outputs],
@@ -116,7 +124,16 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
     }
     for output in outputs:  # the others are at no bound, and at a limit that nobody is told of
         output["raises"] = bool(output["sides"] and output["told"]) or stage.bounded
+    if isinstance(form, ProgramForm):
+        own = equation_values(stage, surrogate.stages.index(stage))
+        return common | own | {"scaled": _scaled(stage, [i in _read_now(form) for i in range(form.n_inputs)])}
     return common | (_state_space(stage) if isinstance(form, StateSpaceForm) else _lagged(stage))
+
+
+def _read_now(form: ProgramForm) -> set[int]:
+    """Inputs whose sample of now is read, or kept."""
+    now = {channel for parts in form.given for channel, lag, _ in parts if lag == 0}
+    return now | {channel for channel, depth in enumerate(form.depths) if depth}
 
 
 def _side(surrogate: Surrogate, side: Side) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
 from sysid.export.flags import Flag
+from sysid.export.program_form import INPUT, STATE, Listing, ProgramForm
 from sysid.export.stage import Side, Stage
 from sysid.export.state_space_form import Neurons, StateSpaceForm
 from sysid.export.surrogate import Surrogate
@@ -89,7 +90,8 @@ class _Step:
         form, n = stage.form, stage.form.n_inputs
         scaled = [(self.known[source] - form.offset[i]) / form.scale[i] for i, source in enumerate(stage.known_sources)]
         past = self.state[stage.first : stage.first + stage.state.size]
-        outputs, following = (_space if isinstance(form, StateSpaceForm) else _lagged)(stage, scaled, past)
+        lower = _equations if isinstance(form, ProgramForm) else _space if isinstance(form, StateSpaceForm) else _lagged
+        outputs, following = lower(stage, scaled, past)
         for j, output in enumerate(outputs):
             bounded = _within(output, form.low, form.high)
             value = bounded * form.scale[n + j] + form.offset[n + j]
@@ -196,3 +198,45 @@ def _space(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tuple[li
         change = casadi.vertsplit(summed(form.change, form.drift, form.state_neurons))
         following = [_within(one + moved, -form.bound, form.bound) for one, moved in zip(past, change, strict=True)]
     return outputs, lambda _: following
+
+
+def _equations(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tuple[list[Any], Any]:
+    """Outputs of equations, and their next state, which hangs on no output."""
+    form, layout = stage.equations
+    known, n, n_c = [*scaled, *past], form.n_state, form.n_continuous
+
+    def sample(channel: int, lag: int) -> Any:
+        return known[form.n_inputs + layout.lines[channel].column(lag)] if lag else scaled[channel]
+
+    u = [sum(sample(channel, lag) * weight for channel, lag, weight in parts) for parts in form.given]
+    x = list(past[:n])
+    total = sum(x) if x else 0
+    lost = _choice(total < np.inf, _choice(total > -np.inf, 0, np.nan), np.nan)  # by a state that is no number
+    outputs = [one + lost for one in _listed(form.outputs, x, u)]
+    updates = _listed(form.updates, x, u)
+    now = x[:n_c]
+    for _ in range(form.substeps if n_c else 0):
+        at, moved = now, [0.0] * n_c
+        for weight, ahead in ((1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)):
+            slope = _listed(form.rates, [*at, *x[n_c:]], u)
+            moved = [one + weight * own for one, own in zip(moved, slope, strict=True)]
+            at = [one + ahead * form.step * own for one, own in zip(now, slope, strict=True)]
+        now = [one + form.step / 6.0 * own for one, own in zip(now, moved, strict=True)]
+    after = [one + lost for one in (*now, *updates)] + [known[column] for column in layout.next_columns()]
+    return outputs, lambda _: after
+
+
+def _listed(listing: Listing, x: Sequence[Any], u: Sequence[Any]) -> list[Any]:
+    """The results of a listing."""
+    import casadi
+
+    values: list[Any] = []
+    given = {STATE: x, INPUT: u}
+
+    def read(one: Any) -> Any:
+        return casadi.SX(one) if isinstance(one, float) else given.get(one.kind, values)[one.at]
+
+    for one in listing.instructions:
+        points = (one.points,) if one.points else ()
+        values.append(one.operation.casadi(casadi, *map(read, one.reads), *points))
+    return [read(one) for one in listing.results]

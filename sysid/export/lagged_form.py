@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.export.program_form import ProgramForm
 from sysid.export.state_space_form import StateSpaceForm
 from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import NeuralForm, StateSpace
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
+from sysid.models.equation_form import EquationForm
 from sysid.models.wiring import Member
 
 
@@ -71,7 +73,7 @@ class LaggedForm:
         if columns is None:
             raise ConfigError(
                 "this kind of model cannot be exported",
-                expected="a model over lagged inputs and outputs (ARX, NARX), or a state space, linear or neural",
+                expected="a model over lagged inputs and outputs (ARX, NARX), a state space, or equations",
                 got=model.structure.label,
                 remedy="write export: null in the pipeline, or fit one of these to what it puts out, and export that",
             )
@@ -121,7 +123,7 @@ class LaggedForm:
         return all(1 in own for own in self.lags[self.n_inputs :])
 
 
-def lowered_form(model: Member) -> LaggedForm | StateSpaceForm:
+def lowered_form(model: Member) -> LaggedForm | StateSpaceForm | ProgramForm:
     """A model, lowered to whichever kind it is.
 
     Args:
@@ -131,15 +133,16 @@ def lowered_form(model: Member) -> LaggedForm | StateSpaceForm:
         The lowered form.
 
     Raises:
-        ConfigError: If it lowers to neither kind.
+        ConfigError: If it lowers to no kind.
     """
     form = model.recursion
     lowered = HIDDEN.get(type(form))
     return LaggedForm.of(model) if lowered is None else lowered(form, model.ends)
 
 
-HIDDEN: dict[type, Callable[..., StateSpaceForm]] = {
+HIDDEN: dict[type, Callable[..., StateSpaceForm | ProgramForm]] = {
     StateSpace: StateSpaceForm.linear,
     NeuralForm: StateSpaceForm.neural,
+    EquationForm: lambda form, ends: ProgramForm(ends=ends, lowered=form),
 }
 """Forms with hidden states, and what they become; every other form is lagged."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.export.lagged_form import LaggedForm, lowered_form
+from sysid.export.program_form import ProgramForm
 from sysid.export.state_space_form import StateSpaceForm
 from sysid.models import History
 from sysid.models.wiring import Member
@@ -73,19 +74,96 @@ class HiddenState:
         }
 
 
-def layout_of(model: Member) -> StateLayout | HiddenState:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EquationState:
+    """The state of equations: their states in units, then past samples of inputs that are read later.
+
+    Args:
+        form: The equations.
+    """
+
+    form: ProgramForm
+
+    @property
+    def size(self) -> int:
+        """Length of the state."""
+        return self.form.n_state + sum(self.form.depths)
+
+    @property
+    def lines(self) -> tuple[DelayLine, ...]:
+        """One line an input, behind the states."""
+        ends, depths = self.form.ends, self.form.depths
+        first = [self.form.n_state + at for at in [0, *accumulate(depths)]]
+        return tuple(
+            DelayLine(channel=name, unit=unit, first=at, length=depth, offset=0.0, scale=1.0)
+            for name, unit, at, depth in zip(ends.inputs, ends.input_units, first, depths, strict=False)
+        )
+
+    def from_history(self, history: History) -> NDArray[np.float64]:
+        """The state after some samples, as the model finds it.
+
+        Args:
+            history: The samples, oldest first, in units; a single one is a system at rest.
+
+        Returns:
+            Shape ``(size,)``.
+        """
+        inputs, _ = history.padded(max(self.form.depths, default=0))
+        past = [column[::-1][:depth] for column, depth in zip(inputs.T, self.form.depths, strict=False)]
+        return np.concatenate([self.form.state_after(history), *past])
+
+    def at_rest(self, levels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The state of a system that has stood at some values for ever.
+
+        Args:
+            levels: Inputs, then outputs, in their units.
+
+        Returns:
+            Shape ``(size,)``.
+        """
+        n = self.form.n_inputs
+        return self.from_history(self.form.history_at(levels[:n], levels[n:]))
+
+    def next_columns(self) -> NDArray[np.int64]:
+        """Where each past sample of the next state comes from in ``[inputs | state]``; behind the states.
+
+        Returns:
+            Shape ``(size - n_states,)``.
+        """
+        n = self.form.n_inputs
+        columns = [
+            i if lag == 1 else n + line.column(lag - 1)
+            for i, line in enumerate(self.lines)
+            for lag in range(1, line.length + 1)
+        ]
+        return np.array(columns, dtype=np.int64)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The states, and how to begin at rest, as JSON values."""
+        return {
+            "size": self.form.n_state,
+            "names": list(self.form.states),
+            "rule": "states in their own units; at rest a state that is declared has its value, the others are where "
+            "nothing changes: see initialisation.state and verify/states.json for computed examples",
+            "declared": list(self.form.declared),
+        }
+
+
+def layout_of(model: Member) -> StateLayout | HiddenState | EquationState:
     """The layout of a model's state, whatever it lowers to.
 
     Args:
         model: The model.
 
     Returns:
-        Delay lines, or the state of a state space.
+        Delay lines, the state of a state space, or that of equations.
 
     Raises:
-        ConfigError: If it lowers to neither.
+        ConfigError: If it lowers to none of them.
     """
     form = lowered_form(model)
+    if isinstance(form, ProgramForm):
+        return EquationState(form=form)
     return HiddenState(form=form) if isinstance(form, StateSpaceForm) else StateLayout.of_form(form)
 
 

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
-from sysid.export.layout import HiddenState
+from sysid.export.layout import EquationState, HiddenState
 from sysid.export.parity import Parity, ParityCase
 from sysid.export.stage import Port, Range, Stage
 from sysid.export.surrogate import Surrogate
@@ -29,7 +29,8 @@ SCHEMA_VERSION = 5
 read: 2 added what lies beside the exported files (``attachments``), and parity over random sequences; 3 has several
 outputs and models in place of one (``outputs``, ``stages``), and float32 files whose state is longer by the remainders;
 4 has networks with gates, models that read each other in a circle, and neural state spaces, whose state at rest has a
-constant and a bound."""
+constant and a bound; 5 has assemblies that put out some of what they compute, and equations, whose states are in
+units."""
 SCHEMA = "model.schema.json"
 """The JSON schema of ``model.json``, which travels in every bundle."""
 MANIFEST = "model.json"
@@ -315,9 +316,11 @@ def _initialisation(surrogate: Surrogate, example: Trace) -> dict[str, Any]:
     first = surrogate.inputs_of(example)[0]
     lines = "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale"
     spaces = [stage for stage in surrogate.stages if isinstance(stage.state, HiddenState)]
+    equations = any(isinstance(stage.state, EquationState) for stage in surrogate.stages)
     levels = surrogate.levels(first).tolist()
     return {
         "rule": lines
+        + ("; equations are where they are declared to be, or where nothing changes" if equations else "")
         + ("; a state space is where its inputs, and in a neural one its output, hold it" if spaces else ""),
         "levels": {port.name: port.level for port in surrogate.channels},
         "values": {port.name: value for port, value in zip(surrogate.channels, levels, strict=True)},

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.export.onnx_equations import stepped, terms_of
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.wide_blocks import Block, OwnLimit
 from sysid.export.wide_form import Group, WideForm, columns_of, readings_of
@@ -66,7 +67,8 @@ def step_core(nodes: Nodes, form: WideForm, x: str, memory: str) -> Step:
             pieces.append(
                 held if own is None else part.add("Gather", [held, part.integers(own)], f"now{other}", axis=0)
             )
-        made.append(_group(part, form, group, pieces, memory))
+        make = _equations if group.computes else _group
+        made.append(make(part, form, group, pieces, memory))
     raw = join(nodes, [one.raw for one in made], "raw")
     following = _memory(nodes, form, memory, made)
     if raw == following:  # a loop mixes up what is two of its outputs
@@ -133,6 +135,24 @@ def _group(nodes: Nodes, form: WideForm, group: Group, pieces: Sequence[str], me
         total = nodes.add("Add", [parts["last"], change], "total")
     held, raw = _held(nodes, form, group, total, parts)
     return _Made(held=held, raw=raw, total=total, change=change, last=parts.get("last", ""))
+
+
+def _equations(nodes: Nodes, form: WideForm, group: Group, pieces: Sequence[str], memory: str) -> _Made:
+    """The nodes of equations: what they read, row by row, and what they make of it."""
+    (block,) = group.blocks
+    columns, width = columns_of(form, group)
+    terms: list[str] = []
+    if pieces:
+        places = [columns[one] for one in block.readings]
+        terms = terms_of(nodes, block, join(nodes, pieces, "readings"), places, width)
+    step = stepped(nodes, block, terms, memory, keeps=form.keeps)
+    parts = {}
+    for name in ("upper", "lower"):
+        table = group.stacked(name)
+        if np.isfinite(table[:, -1]).any() or table[:, :-1].any():
+            parts[name] = _product(nodes, table, join(nodes, terms, f"{name}_terms"), name)
+    held, raw = _held(nodes, form, group, step.total, parts)
+    return _Made(held=held, raw=raw, total=step.total, change=step.change, last=step.last)
 
 
 def _tables(form: WideForm, group: Group) -> dict[str, NDArray[np.float64]]:

@@ -58,6 +58,10 @@ class Nodes:
         """Add a constant of every channel, to be laid against values with channels along the first axis."""
         return self.numbers(name, np.asarray(values).reshape(-1, *([1] * self.trailing)))
 
+    def kind(self) -> int:
+        """The graph's number type, as ONNX counts them."""
+        return int(helper.np_dtype_to_tensor_dtype(self.dtype))
+
     def truths(self, name: str, values: Sequence[bool]) -> str:
         """Add a constant of truth values, of every channel."""
         array = np.asarray(values, dtype=bool).reshape(-1, *([1] * self.trailing))

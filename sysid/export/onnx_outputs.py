@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from onnx import helper
 
 from sysid.export.flags import MEANING, Flag
 from sysid.export.onnx_core import bounded, join, within
@@ -178,13 +177,17 @@ def in_units(nodes: Nodes, form: WideForm, raw: str, u: str) -> Units:
     bounded = [i for i, row in enumerate(rows.values()) if row.bounded]
     at_bound = ""
     if bounded:
-        own = nodes.rows(numbers, bounded, len(rows), "bounded")
-        at_bound = _at_bound(nodes, own, low[bounded], high[bounded])
+        numbers_held = nodes.rows(numbers, bounded, len(rows), "bounded")
+        at_bound = _at_bound(nodes, numbers_held, low[bounded], high[bounded])
         at_limits = limits.reached(bounded, "bounded")
         if at_limits:
             at_bound = nodes.add("And", [at_bound, nodes.add("Not", [at_limits], "free")], "at_bound")
     flags = tuple(row.limit_flag for row in rows.values() if row.told)
-    counts = (int(starts[-1]), len(bounded))
+    count = int(starts[-1])
+    if any(group.computes for group in form.groups):  # a state may be lost a sample before it is read
+        own = [int(starts[g]) + at for g, group in enumerate(form.groups) for at in range(group.n_outputs)]
+        raw, count = nodes.rows(raw, own, count, "raw_outputs"), len(own)
+    counts = (count, len(bounded))
     return Units(outputs=outputs, raw=raw, at_limit=at_limit, at_bound=at_bound, limit_flags=flags, counts=counts)
 
 
@@ -357,7 +360,7 @@ def flags_of(nodes: Nodes, surrogate: Surrogate, u: str, units: Units) -> str:
     causes = [cause for cause in causes if cause[0]]
     which = [flag for _, flags in causes for flag in flags]
     present = sorted(set(which))
-    numbers = nodes.add("Cast", [join(nodes, [name for name, _ in causes], "causes")], "marks", to=_kind(nodes))
+    numbers = nodes.add("Cast", [join(nodes, [name for name, _ in causes], "causes")], "marks", to=nodes.kind())
     if nodes.trailing > 1:
         numbers = nodes.add("Reshape", [numbers, nodes.integers([len(which), -1])], "marks_in_rows")
     table = nodes.numbers("flag_of_cause", [[float(flag is one) for one in which] for flag in present])
@@ -370,10 +373,6 @@ def flags_of(nodes: Nodes, surrogate: Surrogate, u: str, units: Units) -> str:
         "Concat", [nodes.integers([1]), nodes.add("Shape", [u], "u_shape", start=1)], "flag_shape", axis=0
     )
     return nodes.add("Reshape", [total, shape], "flag_rows")
-
-
-def _kind(nodes: Nodes) -> int:
-    return int(helper.np_dtype_to_tensor_dtype(nodes.dtype))
 
 
 def state_after(nodes: Nodes, form: WideForm, memory: str, tails: Sequence[tuple[str, dict[int, int], int]]) -> str:

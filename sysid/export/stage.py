@@ -11,7 +11,8 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.export.lagged_form import LaggedForm, lowered_form
-from sysid.export.layout import HiddenState, StateLayout, layout_of
+from sysid.export.layout import EquationState, HiddenState, StateLayout, layout_of
+from sysid.export.program_form import ProgramForm
 from sysid.export.state_space_form import StateSpaceForm
 from sysid.models import Limit
 from sysid.models.wiring import Member, Wiring
@@ -112,12 +113,12 @@ class Stage:
     first_remainder: int
 
     @cached_property
-    def form(self) -> LaggedForm | StateSpaceForm:
+    def form(self) -> LaggedForm | StateSpaceForm | ProgramForm:
         """What is written."""
         return lowered_form(self.model)
 
     @cached_property
-    def state(self) -> StateLayout | HiddenState:
+    def state(self) -> StateLayout | HiddenState | EquationState:
         """The layout of its own state, counted from ``first``."""
         return layout_of(self.model)
 
@@ -133,6 +134,13 @@ class Stage:
         if isinstance(self.form, StateSpaceForm):
             return self.form
         raise ConfigError("not a state space", got=self.form.ends.outputs)
+
+    @property
+    def equations(self) -> tuple[ProgramForm, EquationState]:
+        """Form and layout of a model that is equations."""
+        if isinstance(self.form, ProgramForm) and isinstance(self.state, EquationState):
+            return self.form, self.state
+        raise ConfigError("not equations", got=self.form.ends.outputs)
 
     @property
     def known_sources(self) -> tuple[int, ...]:
@@ -154,8 +162,8 @@ class Stage:
     @property
     def remainders(self) -> int:
         """Numbers more in its state in float32: what rounding took from its newest numbers, for the next step."""
-        if isinstance(self.form, StateSpaceForm):
-            return self.state.size
+        if isinstance(self.form, StateSpaceForm | ProgramForm):
+            return self.form.n_state
         return self.form.n_outputs if self.form.adds else 0
 
     @property

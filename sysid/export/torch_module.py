@@ -10,9 +10,11 @@ from torch import Tensor, nn
 
 from sysid.export.flags import Flag
 from sysid.export.lagged_form import LaggedForm
+from sysid.export.program_form import ProgramForm
 from sysid.export.stage import Stage
 from sysid.export.state_space_form import StateSpaceForm
 from sysid.export.surrogate import Surrogate
+from sysid.export.torch_equations import EquationStep
 
 
 class Limits(nn.Module):
@@ -218,6 +220,13 @@ class StateSpaceStep(nn.Module):
         return outputs, torch.clamp(state + change, -self.bound, self.bound), held, reached
 
 
+def _step_of(stage: Stage, dtype: torch.dtype) -> nn.Module:
+    """The module of a stage."""
+    if isinstance(stage.form, ProgramForm):
+        return EquationStep(stage, Limits(stage))
+    return StateSpaceStep(stage, dtype) if isinstance(stage.form, StateSpaceForm) else LaggedStep(stage, dtype)
+
+
 def _scaling(form: LaggedForm | StateSpaceForm) -> dict[str, tuple[float, ...]]:
     n = form.n_inputs
     return {
@@ -246,12 +255,7 @@ class SurrogateStep(nn.Module):
 
     def __init__(self, surrogate: Surrogate, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
-        self.stages = nn.ModuleList(
-            [
-                StateSpaceStep(stage, dtype) if isinstance(stage.form, StateSpaceForm) else LaggedStep(stage, dtype)
-                for stage in surrogate.stages
-            ]
-        )
+        self.stages = nn.ModuleList([_step_of(stage, dtype) for stage in surrogate.stages])
         self.register_buffer("declared_low", torch.tensor([port.low for port in surrogate.inputs], dtype=dtype))
         self.register_buffer("declared_high", torch.tensor([port.high for port in surrogate.inputs], dtype=dtype))
         self.selects = surrogate.selects

@@ -52,6 +52,7 @@ class TorchScriptExporter(AbstractExporter):
         """Script both modules and save them."""
         import torch
 
+        from sysid.export.torch_equations import EquationStep
         from sysid.export.torch_module import SurrogateSequence, SurrogateStep
 
         _forget_scripted_classes()
@@ -60,6 +61,8 @@ class TorchScriptExporter(AbstractExporter):
             name = f"{kind.value}.torchscript.pt"
             buffer = io.BytesIO()
             with _deprecation_known():
+                for stage in (part for part in module.modules() if isinstance(part, EquationStep)):
+                    stage.traced()
                 torch.jit.save(torch.jit.script(module.eval()), buffer)
             (folder / name).write_bytes(reproducible_archive(buffer.getvalue()))
             details = {"torch": torch.__version__.partition("+")[0]}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from sysid.export.exporter import ExportedFile, Kind
 from sysid.export.flags import expected_flags
+from sysid.export.layout import EquationState
 from sysid.export.parity import ParityCase
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import render
@@ -31,7 +33,7 @@ def write_verification(
     folder: Path,
     tolerances: dict[str, float],
 ) -> dict[str, str]:
-    """Write records, and a program for each kind of file that has one.
+    """Write records, the states before them where these are searched for, and a program for each kind of file.
 
     Args:
         surrogate: What was exported.
@@ -58,6 +60,9 @@ def write_verification(
         "tolerance": repr(tolerances["float64"]),
         "tolerance_float32": repr(tolerances["float32"]),
     }
+    if any(isinstance(stage.state, EquationState) for stage in surrogate.stages):
+        begins = {name: surrogate.at_rest(inputs[0]).tolist() for name, (inputs, _) in records.items()}
+        texts["states.json"] = (json.dumps(begins, indent=1) + "\n", "the state before each record, at rest")
     networks = [file for file in files if file.name.endswith(".onnx") and file.kind is Kind.SEQUENCE]
     for network in networks[:1]:
         python = values | {"onnx": network.name, "dtype": network.dtype, "tolerance": repr(tolerances[network.dtype])}

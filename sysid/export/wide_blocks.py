@@ -2,6 +2,7 @@
 
 A stage, lagged or with hidden states, becomes one block: terms, which are differences of readings as in
 :class:`sysid.export.incremental_form.IncrementalForm`, and rows over these terms: neurons, gates, outputs and states.
+Equations are a block too, whose terms are what their programs read, and which has no tables.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.export.incremental_form import IncrementalForm, Term
+from sysid.export.program_form import ProgramForm
 from sysid.export.stage import Stage
 from sysid.export.state_space_form import StateSpaceForm
 from sysid.export.surrogate import Surrogate
-from sysid.kernels.neurons import Neuron
+from sysid.kernels.neurons import NEURONS, Neuron
+from sysid.models.activations import PLAIN
 
 
 @dataclass(frozen=True, order=True)
@@ -125,6 +128,11 @@ class Block:
     own: tuple[OwnLimit, ...]
     neuron: Neuron
     rectified: bool
+
+    @property
+    def computes(self) -> bool:
+        """Whether it is equations: programs over its terms, in place of tables."""
+        return isinstance(self.stage.form, ProgramForm)
 
     @property
     def n_outputs(self) -> int:
@@ -242,8 +250,8 @@ def block_of(surrogate: Surrogate, stage: Stage, *, keeps: bool) -> Block:
         The block.
     """
     terms = _Terms(surrogate, stage, rates=keeps)
-    lower = _space if isinstance(stage.form, StateSpaceForm) else _lagged
-    tables = lower(terms, stage)
+    kinds = {StateSpaceForm: _space, ProgramForm: _equations}
+    tables = kinds.get(type(stage.form), _lagged)(terms, stage)
     rows, m = len(tables.linear), stage.form.n_outputs
     if keeps and stage.remainders:
         first = surrogate.state_size + stage.first_remainder
@@ -269,7 +277,7 @@ def block_of(surrogate: Surrogate, stage: Stage, *, keeps: bool) -> Block:
         low=low,
         high=high,
         own=tuple(one for one in held if isinstance(one, OwnLimit)),
-        neuron=stage.form.neuron,
+        neuron=tables.neuron or stage.form.neuron,
         rectified=tables.rectified,
     )
 
@@ -285,6 +293,7 @@ class _Tables:
     last: dict[int, int]
     bound: float = np.inf
     rectified: bool = False
+    neuron: Neuron | None = None
 
     def add(self, terms: dict[int, int]) -> None:
         """Add terms to rows as they are: of each row one, behind those there are."""
@@ -343,6 +352,33 @@ def _space(terms: _Terms, stage: Stage) -> _Tables:
         last={m + i: i for i in range(form.n_state)},
         bound=form.bound,
         rectified=form.rectified,
+    )
+
+
+def _equations(terms: _Terms, stage: Stage) -> _Tables:
+    """Terms alone: the states, then what the programs read of inputs."""
+    form, layout = stage.equations
+    for i in range(form.n_state):
+        terms.add([(Past(stage.first + i), 1.0)])
+    for parts in form.given:
+        read: list[tuple[Reading, float]] = []
+        shift = 0.0
+        for channel, lag, weight in parts:
+            line, source = layout.lines[channel], stage.sources[channel]
+            if source < terms.n_inputs:
+                first = stage.first + line.first if line.length else -1
+                read.append((InputTerm(-1, lag, source, 0.0, 1.0, first, line.length), weight))
+            elif lag:
+                read.append((Past(stage.first + line.column(lag)), weight))
+            else:
+                slope, own = affine(terms.surrogate, source, 0.0, 1.0)
+                read.append((Now(source - terms.n_inputs), slope * weight))
+                shift += own * weight
+        terms.add(read, shift)
+    rows = form.n_outputs + form.n_state
+    nothing = np.zeros((rows, form.n_state + len(form.given) + 1))
+    return _Tables(
+        hidden=nothing[:0], gates=None, readout=nothing[:, :0], linear=nothing, last={}, neuron=NEURONS[PLAIN]
     )
 
 

@@ -78,6 +78,11 @@ class Group:
         return next((block.neuron for block in self.blocks if block.neurons), self.blocks[0].neuron)
 
     @property
+    def computes(self) -> bool:
+        """Whether it is equations, which are a group of their own."""
+        return self.blocks[0].computes
+
+    @property
     def rectified(self) -> bool:
         """Whether outputs are absolute values."""
         return any(block.rectified for block in self.blocks)
@@ -107,6 +112,8 @@ class Group:
 
     def fits(self, block: Block) -> bool:
         """Whether a block can be computed in the same nodes, and is better computed so."""
+        if self.computes or block.computes:
+            return False
         own, kinds = Group(blocks=(block,)), {one.neuron.name for one in self.blocks if one.neurons}
         if block.neurons and kinds | {block.neuron.name} != {block.neuron.name}:
             return False

@@ -128,7 +128,7 @@ def evaluate(code, v, first, widths, places, table):
         elif op == POW:
             r = a ** v[code[i, 2]]
         elif op == EXP:
-            r = math.exp(a) if a < 709.0 else math.inf
+            r = math.inf if a >= 709.0 else math.exp(a)
         elif op == LOG:
             r = math.log(a) if a > 0.0 else (-math.inf if a == 0.0 else math.nan)
         elif op == SIN:

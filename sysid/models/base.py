@@ -40,9 +40,6 @@ class AbstractStructure(ABC):
     several_outputs: bool = False
     """Whether one model has all outputs of a mapping; where it is false, each output gets a model of its own."""
 
-    exports: bool = True
-    """Whether its models can be written as files that run elsewhere."""
-
     per_input: tuple[str, ...] = ()
     """Fields that hold one number per input."""
 

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractStructure
 from sysid.models.curves import NONE, Curve
-from sysid.models.grey_box import GreyBox
 from sysid.models.lags import per_input, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
@@ -48,7 +47,6 @@ class BlockStructure(AbstractStructure):
     """What both have in common: dead times, and equations that a grey box runs."""
 
     delays: int | tuple[int, ...]
-    exports = GreyBox.exports
 
     def lags(self, n_inputs: int) -> tuple[int, ...]:
         """The dead time of each input, in samples."""

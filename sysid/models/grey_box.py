@@ -154,7 +154,6 @@ class GreyBox(AbstractStructure):
     substeps: int | None = None
 
     kind = "GreyBox"
-    exports = False
 
     def __post_init__(self) -> None:
         text: Any = self.equations

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractStructure
 from sysid.models.curves import quoted
-from sysid.models.grey_box import GreyBox
 from sysid.models.lags import Lags, LagSpec, parse_lags, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
@@ -49,7 +48,6 @@ class PolynomialNARX(AbstractStructure):
     terms: Annotated[int, IntRange(low=2, high=30)] = 20
 
     kind = "PolynomialNARX"
-    exports = GreyBox.exports
 
     def __post_init__(self) -> None:
         given = self.input_delays

@@ -26,6 +26,9 @@ STEPS = 50
 MANY = 6
 """States up to which searches begin on both sides of each."""
 
+STOOD = 1e-10
+"""What changes where nothing does, in shares of what would: searches from elsewhere are not needed then."""
+
 LARGEST = 1e100
 """Numbers from here on are those of a run that explodes."""
 
@@ -69,10 +72,13 @@ def at_rest(
         moved = level.copy()
         moved[free] += step * scale
         begins.append(terms.held(moved))
-    ends = [_stood(standing, begin, (free, scale), (output, output_scale), terms) for begin in begins]
-    left, place = min((left, at) for at, (left, _) in enumerate(ends))
-    del left
-    x = ends[place][1]
+    least, x = _stood(standing, level, (free, scale), (output, output_scale), terms)
+    for begin in begins[1:]:
+        if least <= STOOD:
+            break
+        left, end = _stood(standing, begin, (free, scale), (output, output_scale), terms)
+        if left < least:
+            least, x = left, end
     (change, by_state, by_parameter), (_, out_state, out_parameter) = standing(x)
     J, open_ = _split(by_state[:, free] * scale, change)
     move = -np.linalg.pinv(J, rcond=RANK) @ by_parameter

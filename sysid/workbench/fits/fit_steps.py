@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import seedless
 from sysid.export.exporters import wanted_formats
@@ -116,7 +115,6 @@ class FitSteps:
         """
         if self.config.export is not None:
             wanted_formats(self.config.export.formats)  # what cannot be written is said now, not when all is fitted
-            self._check_export(self.config.export)
         return self._run(run, loaded or run.do(self.loading()))
 
     def _run(self, run: Run, loaded: Done[Data]) -> Results:
@@ -130,7 +128,7 @@ class FitSteps:
         sizes = steps.output_sizes(loaded.value, self.config.mapping.outputs)
         choice = self.chosen or steps.choose({name: one.pairs for name, one in fitted.items()}, asked, sizes)
         best = fitted[choice.name]
-        bundle = run.do(self._export(run, best, loaded)) if self._exports(run, best) else None
+        bundle = run.do(self._export(run, best, loaded)) if self.config.export else None
         exports = () if bundle is None else bundle.value
         if bundle is not None:
             place, stored = run.store.path / "bundle", bundle.stored
@@ -308,29 +306,6 @@ class FitSteps:
             outcome=outcome,
             typical=EXPORT_TIME,
         )
-
-    def _check_export(self, asked: ExportConfig) -> None:
-        """Refuse the export that a pipeline asks for by name, where that kind of model has no files."""
-        for fit in self.config.fits:
-            if fit.name == asked.fit and not fit.structure.exports:
-                raise ConfigError(
-                    f"models of kind {fit.structure.kind} cannot be exported yet",
-                    where="export.fit",
-                    expected="a fit of another kind, or best",
-                    got=asked.fit,
-                    remedy="write export: null, or name another fit",
-                )
-
-    def _exports(self, run: Run, best: Fitted) -> bool:
-        """Whether the chosen fit is exported; where its kind has no files, that is told and the run goes on."""
-        if self.config.export is None or best.config.structure.exports:
-            return self.config.export is not None
-        text = (
-            f"nothing is exported: {best.config.name} is best, and models of kind {best.config.structure.kind} have no "
-            f"files yet. sysid export {self.config.name} --fit NAME exports another fit"
-        )
-        run.then(partial(run.tell, events.Warned(text=text)))
-        return False
 
     def _exporting(self, name: str) -> str:
         asked = self.config.export or ExportConfig()

@@ -1,0 +1,41 @@
+"""A pipeline of equations: the best of them is exported like any model, and the bundle runs from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sysid.workbench.cli import run_cli
+
+pytestmark = pytest.mark.usefixtures("undrawn")
+
+GREY = """\
+name: grey
+data: rig
+mapping: inlet+valve -> outlet
+seed: 3
+fits:
+  - name: equations
+    structure:
+      kind: GreyBox
+      equations: doutlet/dt = a*valve*(inlet - outlet) - b*(outlet - 100)
+      parameters: {a: {start: 0.01, low: 0}, b: {start: 0.1, low: 0}}
+    training: {max_iterations: 3, starts: 1}
+stability: {count: 10}
+export: {fit: equations, formats: [c]}
+"""
+
+
+def test_the_best_equations_are_exported_and_run(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (workspace / "pipelines" / "grey.yaml").write_text(GREY, encoding="utf-8")
+    assert run_cli(["run", "grey", "--no-tracking"]) == 0
+    assert "Exporting equations as c" in " ".join(capsys.readouterr().out.split())
+    bundle = workspace / "runs" / "grey" / "bundle"
+    manifest = json.loads((bundle / "model.json").read_text(encoding="utf-8"))
+    assert [file["format"] for file in manifest["files"]] == ["c"]
+    assert manifest["state"]["equations"][0]["names"] == ["outlet"]
+    record = bundle / "verify" / "record1.csv"
+    assert run_cli(["simulate", str(bundle), str(record), "--out", str(workspace / "out.csv")]) == 0
+    assert (workspace / "out.csv").is_file()
