@@ -13,7 +13,6 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final
-from xml.sax.saxutils import quoteattr
 
 UNKNOWN: Final = "\N{REPLACEMENT CHARACTER}"
 """What stands for a character that cannot be shown."""
@@ -248,6 +247,8 @@ def xml_attribute(text: object) -> str:
         >>> xml_attribute('a<b & "c"')
         '\'a&lt;b &amp; "c"\''
     """
+    from xml.sax.saxutils import quoteattr  # brings the whole of urllib, a twelfth of what --help takes
+
     return quoteattr(visible(text))
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from sysid.names import visible
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data
@@ -37,7 +38,8 @@ def blank_picture() -> Callable[..., str]:
     """In the place of a drawing: to draw takes longest, and most tests of a page are not of its pictures."""
 
     def blank(_: object, *, title: str, description: str, name: str) -> str:
-        words = f'<title id="{name}-title">{escape(title)}</title><desc id="{name}-desc">{escape(description)}</desc>'
+        told = escape(visible(description, lines=True))
+        words = f'<title id="{name}-title">{escape(visible(title))}</title><desc id="{name}-desc">{told}</desc>'
         return f'<svg role="img" aria-labelledby="{name}-title {name}-desc" viewBox="0 0 1 1">{words}</svg>'
 
     return blank

@@ -79,10 +79,12 @@ def test_base_code_needs_no_extra(tmp_path):
     assert done.stdout.splitlines() == [
         "sysid.export.onnx_blocks onnx",
         "sysid.export.onnx_core onnx",
+        "sysid.export.onnx_equations onnx",
         "sysid.export.onnx_nodes onnx",
         "sysid.export.onnx_outputs onnx",
         "sysid.export.onnx_sequence onnx",
         "sysid.export.onnx_step onnx",
+        "sysid.export.torch_equations torch",
         "sysid.export.torch_module torch",
         "sysid.sklearn",
         "sysid.workbench.commands.sweep",

@@ -152,7 +152,7 @@ def _within(value: Any, low: float, high: float) -> Any:
 def _active(stage: Stage, sums: Any) -> Any:
     with warnings.catch_warnings():  # CasADi says that numpy's functions of its values may be others one day
         warnings.simplefilter("ignore", FutureWarning)
-        return stage.form.neuron.value(sums)
+        return stage.neuron.value(sums)
 
 
 def _lagged(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tuple[list[Any], Any]:

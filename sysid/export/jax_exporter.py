@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
 from sysid.export.flags import Flag
+from sysid.export.program_form import INPUT, STATE, Listing, ProgramForm
 from sysid.export.stage import Side, Stage
 from sysid.export.state_space_form import Neurons, StateSpaceForm
 from sysid.export.surrogate import Surrogate
@@ -180,7 +181,8 @@ class _Step:
         past = self.state[stage.first : stage.first + stage.state.size]
         sources = [self.known[source] for source in stage.known_sources]
         scaled = (jnp.stack(sources) - offset[:n]) / scale[:n] if n else jnp.zeros(0)
-        computed, following = (_space if isinstance(form, StateSpaceForm) else _lagged)(stage, scaled, past)
+        lower = _equations if isinstance(form, ProgramForm) else _space if isinstance(form, StateSpaceForm) else _lagged
+        computed, following = lower(stage, scaled, past)
         bounded = _within(computed, form.low, form.high)
         values = bounded * scale[n:] + offset[n:]
         outputs = []
@@ -273,3 +275,53 @@ def _space(stage: Stage, scaled: Any, past: Any) -> tuple[Any, Callable[[Any], A
     change = summed(form.change, form.drift, form.state_neurons)
     after = _within(past + change, -form.bound, form.bound)
     return outputs, lambda _: after
+
+
+def _equations(stage: Stage, scaled: Any, past: Any) -> tuple[Any, Callable[[Any], Any]]:
+    """Outputs of equations, and their next state, which hangs on no output."""
+    import jax
+    import jax.numpy as jnp
+
+    form, layout = stage.equations
+    n, n_c = form.n_state, form.n_continuous
+    known = jnp.concatenate([scaled, past])
+
+    def sample(channel: int, lag: int) -> Any:
+        return known[form.n_inputs + layout.lines[channel].column(lag)] if lag else scaled[channel]
+
+    u = [sum(sample(channel, lag) * weight for channel, lag, weight in parts) for parts in form.given]
+    x = past[:n]
+    lost = jnp.where(jnp.isfinite(jnp.sum(x)), 0.0, np.nan)  # by a state that is no number
+    outputs = _listed(form.outputs, x, u) + lost
+
+    def slopes(at: Any) -> Any:
+        return _listed(form.rates, jnp.concatenate([at, x[n_c:]]), u)
+
+    def substep(now: Any, _: None) -> tuple[Any, None]:
+        first = slopes(now)
+        second = slopes(now + 0.5 * form.step * first)
+        third = slopes(now + 0.5 * form.step * second)
+        last = slopes(now + form.step * third)
+        return now + form.step / 6.0 * (first + 2.0 * second + 2.0 * third + last), None
+
+    now = jax.lax.scan(substep, x[:n_c], None, length=form.substeps)[0] if n_c else x[:0]
+    after = jnp.concatenate([now, _listed(form.updates, x, u)]) + lost
+    following = jnp.concatenate([after, known[np.array(layout.next_columns(), dtype=np.int32)]])
+    return outputs, lambda _: following
+
+
+def _listed(listing: Listing, x: Any, u: Sequence[Any]) -> Any:
+    """The results of a listing, as an array."""
+    import jax.numpy as jnp
+
+    values: list[Any] = []
+    given = {STATE: x, INPUT: u}
+
+    def read(one: Any) -> Any:
+        return one if isinstance(one, float) else given.get(one.kind, values)[one.at]
+
+    for one in listing.instructions:
+        points = (one.points,) if one.points else ()
+        values.append(one.operation.jax(jnp, *map(read, one.reads), *points))
+    found = [jnp.asarray(read(one), dtype=np.float64) for one in listing.results]
+    return jnp.stack(found) if found else jnp.zeros(0)

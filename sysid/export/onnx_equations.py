@@ -52,7 +52,7 @@ def terms_of(nodes: Nodes, block: Block, readings: str, columns: Sequence[int], 
     found = []
     for i, (weights, shift) in enumerate(zip(block.selection, block.shift, strict=True)):
         total = ""
-        for at in np.flatnonzero(weights):
+        for at in np.flatnonzero(weights).tolist():
             part = rows[columns[at]]
             if weights[at] != 1.0:
                 part = nodes.add("Mul", [part, nodes.numbers(f"weight{i}_{at}", weights[at])], f"part{i}_{at}")
@@ -76,7 +76,8 @@ def stepped(nodes: Nodes, block: Block, terms: Sequence[str], memory: str, *, ke
     Returns:
         The names.
     """
-    form, n = block.stage.equations[0], block.stage.form.n_state
+    form = block.stage.equations[0]
+    n = form.n_state
     x, u = list(terms[:n]), list(terms[n : n + len(form.given)])
     kept = list(terms[n + len(form.given) : n + len(form.given) + n]) if keeps else []
     cars = _Rows(nodes, memory)

@@ -45,6 +45,7 @@ class Operation:
         onnx: Adds its nodes to a graph, from a name for what comes out and the names of what it reads.
         torch: The same on tensors and numbers, given the module torch; what comes out is a tensor.
         casadi: The same on CasADi's expressions, given its module.
+        jax: The same on JAX's numbers, given the module ``jax.numpy``.
     """
 
     c: str
@@ -52,6 +53,7 @@ class Operation:
     onnx: Callable[..., str]
     torch: Callable[..., Any]
     casadi: Callable[..., Any]
+    jax: Callable[..., Any]
 
 
 def _node(operator: str) -> Callable[..., str]:
@@ -207,6 +209,22 @@ def _select_casadi(casadi: Any, a: Any, b: Any, c: Any) -> Any:
     return casadi.if_else(a >= 1, b, casadi.if_else(a <= 0, c, c + a * (b - c)))
 
 
+def _root_jax(jnp: Any, a: Any) -> Any:
+    """A root of 1 where it is not asked for: that of 0 has no derivative."""
+    return jnp.where(a <= 0.0, 0.0, jnp.sqrt(jnp.where(a <= 0.0, 1.0, a)))
+
+
+def _select_jax(jnp: Any, a: Any, b: Any, c: Any) -> Any:
+    return jnp.where(a >= 1.0, b, jnp.where(a <= 0.0, c, c + a * (b - c)))
+
+
+def _table_jax(jnp: Any, a: Any, points: Points) -> Any:
+    x, y, slopes = (jnp.asarray(one) for one in pieces(points))
+    held = jnp.clip(a, points[0][0], points[-1][0])
+    piece = jnp.sum(held >= x[1:])
+    return y[piece] + slopes[piece] * (held - x[piece])
+
+
 def _same(name: str) -> Callable[..., Any]:
     """A function that a library has by this name."""
     return lambda library, *reads: getattr(library, name)(*reads)
@@ -217,11 +235,16 @@ def _plain(operator: Callable[..., Any]) -> Callable[..., Any]:
     return lambda _, *reads: operator(*reads)
 
 
+def _everywhere(operator: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
+    """The same by the operators of Python in every library that has them."""
+    return dict.fromkeys(("torch", "casadi", "jax"), _plain(operator))
+
+
 _MIN_C = "({a} <= {b} || {a} != {a} ? {a} : {b})"
 _FIRST = ("({a} %s {b} ? R(1.0) : R(0.0))", "({a} %s {b} ? R(0.0) : R(1.0))")
 
 
-def _elementary(name: str, slope: str, *, c: str = "", onnx: str = "", torch: str = "") -> Operation:
+def _elementary(name: str, slope: str, *, c: str = "", onnx: str = "", torch: str = "", jax: str = "") -> Operation:
     """A function of one number that every target has."""
     return Operation(
         c=c or f"M({name})({{a}})",
@@ -229,28 +252,29 @@ def _elementary(name: str, slope: str, *, c: str = "", onnx: str = "", torch: st
         onnx=_node(onnx or name.title()),
         torch=_same(torch or name),
         casadi=_same(name),
+        jax=_same(jax or torch or name),
     )
 
 
 OPERATIONS: dict[int, Operation] = {
     machine.ADD: Operation(
         c="{a} + {b}", slopes=("R(1.0)", "R(1.0)"), onnx=_node("Add"),
-        torch=_plain(lambda a, b: a + b), casadi=_plain(lambda a, b: a + b),
+        **_everywhere(lambda a, b: a + b),
     ),
     machine.SUB: Operation(
         c="{a} - {b}", slopes=("R(1.0)", "R(-1.0)"), onnx=_node("Sub"),
-        torch=_plain(lambda a, b: a - b), casadi=_plain(lambda a, b: a - b),
+        **_everywhere(lambda a, b: a - b),
     ),
     machine.MUL: Operation(
         c="{a} * {b}", slopes=("{b}", "{a}"), onnx=_node("Mul"),
-        torch=_plain(lambda a, b: a * b), casadi=_plain(lambda a, b: a * b),
+        **_everywhere(lambda a, b: a * b),
     ),
     machine.DIV: Operation(
         c="{a} / {b}", slopes=("R(1.0) / {b}", "-{r} / {b}"), onnx=_node("Div"),
-        torch=_plain(lambda a, b: a / b), casadi=_plain(lambda a, b: a / b),
+        **_everywhere(lambda a, b: a / b),
     ),
     machine.NEG: Operation(
-        c="-{a}", slopes=("R(-1.0)",), onnx=_node("Neg"), torch=_plain(lambda a: -a), casadi=_plain(lambda a: -a)
+        c="-{a}", slopes=("R(-1.0)",), onnx=_node("Neg"), **_everywhere(lambda a: -a)
     ),
     machine.POW: Operation(
         c="M(pow)({a}, {b})",
@@ -259,10 +283,11 @@ OPERATIONS: dict[int, Operation] = {
             "({a} > R(0.0) ? {r} * M(log)({a}) : R(0.0))",
         ),
         onnx=_node("Pow"), torch=_power_torch, casadi=_plain(lambda a, b: a**b),
+        jax=_plain(lambda a, b: a**b),
     ),
     machine.FMA: Operation(
         c="{a} * {b} + {c}", slopes=("{b}", "{a}", "R(1.0)"), onnx=_fma_nodes,
-        torch=_plain(lambda a, b, c: a * b + c), casadi=_plain(lambda a, b, c: a * b + c),
+        **_everywhere(lambda a, b, c: a * b + c),
     ),
     machine.ABS: _elementary(
         "fabs", "({a} > R(0.0) ? R(1.0) : {a} < R(0.0) ? R(-1.0) : R(0.0))", onnx="Abs", torch="abs"
@@ -270,12 +295,12 @@ OPERATIONS: dict[int, Operation] = {
     machine.MIN: Operation(
         c=_MIN_C, slopes=tuple(one % "<=" for one in _FIRST), onnx=_least_nodes("LessOrEqual"),
         torch=lambda torch, a, b: torch.minimum(*_whole(torch, a, b)),
-        casadi=lambda casadi, a, b: _least_casadi(casadi, a, b, a <= b),
+        casadi=lambda casadi, a, b: _least_casadi(casadi, a, b, a <= b), jax=_same("minimum"),
     ),
     machine.MAX: Operation(
         c=_MIN_C.replace("<=", ">="), slopes=tuple(one % ">=" for one in _FIRST), onnx=_least_nodes("GreaterOrEqual"),
         torch=lambda torch, a, b: torch.maximum(*_whole(torch, a, b)),
-        casadi=lambda casadi, a, b: _least_casadi(casadi, a, b, a >= b),
+        casadi=lambda casadi, a, b: _least_casadi(casadi, a, b, a >= b), jax=_same("maximum"),
     ),
     machine.SQRT: Operation(
         c="({a} <= R(0.0) ? R(0.0) : M(sqrt)({a}))", slopes=("({r} > R(0.0) ? R(0.5) / {r} : R(0.0))",),
@@ -285,25 +310,29 @@ OPERATIONS: dict[int, Operation] = {
             a <= 0.0, torch.zeros_like(a), torch.sqrt(torch.where(a <= 0.0, torch.ones_like(a), a))
         ),
         casadi=lambda casadi, a: casadi.if_else(a <= 0, 0, casadi.sqrt(casadi.if_else(a <= 0, 1, a))),
+        jax=_root_jax,
     ),
     machine.EXP: _elementary("exp", "{r}"),
     machine.LOG: _elementary("log", "R(1.0) / {a}"),
     machine.TANH: _elementary("tanh", "R(1.0) - {r} * {r}", c="tanh_neuron({a})"),
     machine.SIN: _elementary("sin", "M(cos)({a})"),
     machine.COS: _elementary("cos", "-M(sin)({a})"),
-    machine.ATAN: replace(_elementary("atan", "R(1.0) / (R(1.0) + {a} * {a})"), onnx=_atan_nodes),
+    machine.ATAN: replace(_elementary("atan", "R(1.0) / (R(1.0) + {a} * {a})", jax="arctan"), onnx=_atan_nodes),
     machine.SIGN: Operation(
         c="({a} > R(0.0) ? R(1.0) : {a} < R(0.0) ? R(-1.0) : R(0.0))", slopes=("",), onnx=_sign_nodes,
         torch=lambda torch, a: _truth(torch, a > 0.0, a) - _truth(torch, a < 0.0, a),
         casadi=lambda casadi, a: casadi.if_else(a > 0, 1, casadi.if_else(a < 0, -1, 0)),
+        jax=lambda jnp, a: jnp.where(a > 0.0, 1.0, jnp.where(a < 0.0, -1.0, 0.0)),
     ),
     machine.GREATER: Operation(
         c="({a} > R(0.0) ? R(1.0) : R(0.0))", slopes=("",), onnx=_switch_nodes("Greater"),
         torch=lambda torch, a: _truth(torch, a > 0.0, a), casadi=lambda casadi, a: casadi.if_else(a > 0, 1, 0),
+        jax=lambda jnp, a: jnp.where(a > 0.0, 1.0, 0.0),
     ),
     machine.NOT_LESS: Operation(
         c="({a} >= R(0.0) ? R(1.0) : R(0.0))", slopes=("",), onnx=_switch_nodes("GreaterOrEqual"),
         torch=lambda torch, a: _truth(torch, a >= 0.0, a), casadi=lambda casadi, a: casadi.if_else(a >= 0, 1, 0),
+        jax=lambda jnp, a: jnp.where(a >= 0.0, 1.0, 0.0),
     ),
     machine.SELECT: Operation(
         c="({a} >= R(1.0) ? {b} : {a} <= R(0.0) ? {c} : {c} + {a} * ({b} - {c}))",
@@ -312,11 +341,11 @@ OPERATIONS: dict[int, Operation] = {
             "({a} >= R(1.0) ? R(1.0) : {a} <= R(0.0) ? R(0.0) : {a})",
             "({a} >= R(1.0) ? R(0.0) : {a} <= R(0.0) ? R(1.0) : R(1.0) - {a})",
         ),
-        onnx=_select_nodes, torch=_select_torch, casadi=_select_casadi,
+        onnx=_select_nodes, torch=_select_torch, casadi=_select_casadi, jax=_select_jax,
     ),
     machine.TABLE: Operation(
         c="table({a}, {points})", slopes=("table_slope({a}, {points})",), onnx=_table_nodes, torch=_table_torch,
-        casadi=_table_casadi,
+        casadi=_table_casadi, jax=_table_jax,
     ),
 }  # fmt: skip
 """By the machine's number."""

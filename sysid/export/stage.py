@@ -14,6 +14,7 @@ from sysid.export.lagged_form import LaggedForm, lowered_form
 from sysid.export.layout import EquationState, HiddenState, StateLayout, layout_of
 from sysid.export.program_form import ProgramForm
 from sysid.export.state_space_form import StateSpaceForm
+from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import Limit
 from sysid.models.wiring import Member, Wiring
 
@@ -141,6 +142,11 @@ class Stage:
         if isinstance(self.form, ProgramForm) and isinstance(self.state, EquationState):
             return self.form, self.state
         raise ConfigError("not equations", got=self.form.ends.outputs)
+
+    @property
+    def neuron(self) -> Neuron:
+        """Kind of its neurons; those of networks in equations are of the first kind that there was."""
+        return NEURONS["tanh"] if isinstance(self.form, ProgramForm) else self.form.neuron
 
     @property
     def known_sources(self) -> tuple[int, ...]:

@@ -135,7 +135,7 @@ class EquationStep(nn.Module):
                 example = (torch.ones(2, self.n, dtype=torch.float64), u, like)
                 with warnings.catch_warnings():  # the points of tables are constants, as the warning wants them to be
                     warnings.filterwarnings("ignore", message="torch.tensor results are registered as constants")
-                    setattr(self, name, torch.jit.trace(program, example, check_trace=False))
+                    setattr(self, name, torch.jit.trace(program, example, check_trace=False))  # type: ignore[no-untyped-call]
             else:
                 setattr(self, name, Nothing())
 

@@ -277,7 +277,7 @@ def block_of(surrogate: Surrogate, stage: Stage, *, keeps: bool) -> Block:
         low=low,
         high=high,
         own=tuple(one for one in held if isinstance(one, OwnLimit)),
-        neuron=tables.neuron or stage.form.neuron,
+        neuron=tables.neuron or stage.neuron,
         rectified=tables.rectified,
     )
 

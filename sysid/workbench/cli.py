@@ -9,13 +9,18 @@ from __future__ import annotations
 import signal
 import sys
 import warnings
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sysid.errors import SysidError
 from sysid.workbench.commands.reader_options import META, ReaderCommand, RecordCommand
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 app = typer.Typer(
     name="sysid",
@@ -66,10 +71,17 @@ def _with_commands_of_fields(words: list[str]) -> None:
     first = next((word for word in words if not word.startswith("-")), None)
     if first in known:
         return
-    from importlib.metadata import entry_points
+    from importlib.metadata import PackageNotFoundError, distribution, entry_points
 
     there = {group.name for group in app.registered_groups}
-    for entry in entry_points(group="sysid.commands"):
+    found: Iterable[EntryPoint] = ()
+    if first:
+        found = entry_points(group="sysid.commands")
+    else:
+        # A list of all is wanted at once: to look through every installed package takes a tenth of its time.
+        with suppress(PackageNotFoundError):
+            found = distribution("sysid-workbench").entry_points.select(group="sysid.commands")
+    for entry in found:
         if entry.name not in there and first in {None, entry.name}:
             app.add_typer(entry.load(), name=entry.name)
 

@@ -163,8 +163,8 @@ FEW_MODELS = (
     "NARX, gates",
     "NARX against its bounds",
 )
-WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino", "wasm")
-"""Formats around one that meets every model: the C source, or (torch.export) TorchScript's module."""
+WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino", "wasm", "jax")
+"""Formats that meet one model of a kind: those around the C source or TorchScript's module, and what compiles long."""
 PAIRS = [(m, r) for m in MODELS for r, row in ROWS.items() if row.format not in WRAPPED or m in FEW_MODELS]
 
 

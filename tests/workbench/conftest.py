@@ -71,7 +71,7 @@ def fill(folder: Path) -> None:
     (folder / "pipelines" / "first.yaml").write_text(PIPELINE, encoding="utf-8")
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def undrawn_pages(blank_picture: Callable[..., str]) -> Iterator[None]:
     """Pages of runs have empty pictures, but for the tests that ask for ``drawn`` and for processes of their own."""
     with pytest.MonkeyPatch.context() as patch:

@@ -60,7 +60,7 @@ def test_signals_are_written(words: list[str], record: str, capsys: pytest.Captu
     [
         ["prbs", "--range", "5"],
         ["prbs", "--hold", "3"],
-        ["sine"],
+        ["sawtooth"],
         ["noise", "--band", "1:x"],
         ["chirp", "--band", "1:99"],
     ],

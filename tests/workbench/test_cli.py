@@ -120,7 +120,7 @@ def test_a_fault_of_ours_has_code_1_and_its_trace(
     def fault(*_: object, **__: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(cli, "app", fault)
+    monkeypatch.setattr(cli, "_with_commands_of_fields", fault)
     assert run_cli(["run", "first"]) == 1
     told = capsys.readouterr().err
     assert "ZeroDivisionError" in told
@@ -133,7 +133,7 @@ def test_stopping_has_the_code_of_the_signal(
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "app", stop)
+    monkeypatch.setattr(cli, "_with_commands_of_fields", stop)
     assert run_cli(["run", "first"]) == 130
     assert "goes on where this one was" in capsys.readouterr().err
 

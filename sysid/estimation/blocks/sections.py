@@ -72,14 +72,14 @@ def sections_of(poles: Poles) -> tuple[tuple[float, ...], ...]:
         The sections.
 
     Example:
-        >>> sections_of(np.array([0.5, 0.8, 0.9 + 0.1j, 0.9 - 0.1j]))
-        ((-1.8, 0.8200000000000001), (-1.3, 0.4))
+        >>> sections_of(np.array([0.5, 0.8, 0.5 + 0.5j, 0.5 - 0.5j]))
+        ((-1.0, 0.5), (-1.3, 0.4))
     """
     size = np.abs(poles)
     inside = np.where(size > LARGEST_POLE, poles * LARGEST_POLE / np.maximum(size, 1e-12), poles)
     pairs = [p for p in inside if p.imag > 0.0]
     real = sorted(float(p.real) for p in inside if p.imag == 0.0)
-    found: list[tuple[float, ...]] = [(float(-2.0 * p.real), float(abs(p) ** 2)) for p in pairs]
+    found: list[tuple[float, ...]] = [(float(-2.0 * p.real), float(p.real**2 + p.imag**2)) for p in pairs]
     while len(real) > 1:
         p, q = real.pop(), real.pop()
         found.append((-(p + q), p * q))

@@ -37,5 +37,20 @@ def test_the_best_equations_are_exported_and_run(workspace: Path, capsys: pytest
     assert [file["format"] for file in manifest["files"]] == ["c"]
     assert manifest["state"]["equations"][0]["names"] == ["outlet"]
     record = bundle / "verify" / "record1.csv"
-    assert run_cli(["simulate", str(bundle), str(record), "--out", str(workspace / "out.csv")]) == 0
+    assert (
+        run_cli(
+            [
+                "simulate",
+                str(bundle),
+                str(record),
+                "--references",
+                "inlet=gauge",
+                "--references",
+                "outlet=gauge",
+                "--out",
+                str(workspace / "out.csv"),
+            ]
+        )
+        == 0
+    )
     assert (workspace / "out.csv").is_file()
