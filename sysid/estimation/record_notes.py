@@ -25,8 +25,9 @@ MOST_SAMPLES = 20_000
 LEAST_ERROR = 1e-2
 """Part of the output's standard deviation that the error must have to be worth an explanation."""
 MOST_TRACES = 20
-WORSE = 1.1
-"""Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt."""
+WORSE, HARDLY = 1.1, 0.9
+"""Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt; and
+above which it does as well, all but a twentieth of the output's movement."""
 SHARE, SURE = 0.2, 1e-6
 """Part of the error that an input of the same sample must explain, and how improbable that is by chance."""
 
@@ -129,15 +130,15 @@ def contradicted(model: AbstractModel, traces: Sequence[Trace], start: Start) ->
         start: What stands before each.
 
     Returns:
-        One sentence for each output whose free run a constant beats, and for each input that acts at once where the
-        model lets it act only later.
+        One sentence for each output whose free run a constant beats or equals, and for each input that acts at once
+        where the model lets it act only later.
     """
     runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
     longest = max(runs, key=lambda run: len(run.output))
-    return (*_worse_than_constant(model, runs), *_acts_at_once(model, longest))
+    return (*_beside_a_constant(model, runs), *_acts_at_once(model, longest))
 
 
-def _worse_than_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[str]:
+def _beside_a_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[str]:
     y = np.concatenate([run.output[run.usable] for run in runs])
     simulated = np.concatenate([run.simulated[run.usable] for run in runs])
     told = []
@@ -146,11 +147,13 @@ def _worse_than_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[
             continue
         with np.errstate(over="ignore", invalid="ignore"):
             ratio = float(np.mean((simulated[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
-        if not ratio <= WORSE:
+        if not ratio <= HARDLY:
             fit = f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %" if np.isfinite(ratio) else "it diverges"
+            how = "hardly better" if ratio <= WORSE else "worse"
             told.append(
-                f"Over the records that were fitted the free run of {name} is worse than a constant ({fit}). Try other "
-                f"orders, a fit of the free run (loop: closed, noise: false, OE) or more iterations."
+                f"Over the records that were fitted the free run of {name} is {how} "
+                f"than a constant ({fit}). Try other orders, more starts, a fit of the free run (loop: closed, noise: "
+                f"false, OE) or more iterations; or the inputs say little of {name}."
             )
     return told
 

@@ -90,8 +90,8 @@ class _Step:
         form, n = stage.form, stage.form.n_inputs
         scaled = [(self.known[source] - form.offset[i]) / form.scale[i] for i, source in enumerate(stage.known_sources)]
         past = self.state[stage.first : stage.first + stage.state.size]
-        lower = _equations if isinstance(form, ProgramForm) else _space if isinstance(form, StateSpaceForm) else _lagged
-        outputs, following = lower(stage, scaled, past)
+        kinds = {StateSpaceForm: _space, ProgramForm: _equations}
+        outputs, following = kinds.get(type(form), _lagged)(stage, scaled, past)
         for j, output in enumerate(outputs):
             bounded = _within(output, form.low, form.high)
             value = bounded * form.scale[n + j] + form.offset[n + j]

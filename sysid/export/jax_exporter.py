@@ -181,8 +181,8 @@ class _Step:
         past = self.state[stage.first : stage.first + stage.state.size]
         sources = [self.known[source] for source in stage.known_sources]
         scaled = (jnp.stack(sources) - offset[:n]) / scale[:n] if n else jnp.zeros(0)
-        lower = _equations if isinstance(form, ProgramForm) else _space if isinstance(form, StateSpaceForm) else _lagged
-        computed, following = lower(stage, scaled, past)
+        kinds = {StateSpaceForm: _space, ProgramForm: _equations}
+        computed, following = kinds.get(type(form), _lagged)(stage, scaled, past)
         bounded = _within(computed, form.low, form.high)
         values = bounded * scale[n:] + offset[n:]
         outputs = []

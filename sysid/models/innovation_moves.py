@@ -2,19 +2,54 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.models.base import AbstractModel
+from sysid.models.history import History
+from sysid.models.innovations import Innovations
 from sysid.models.moves import moves_of
-
-if TYPE_CHECKING:
-    from sysid.models.base import AbstractModel
-    from sysid.models.history import History
 
 LARGEST = 1e-4
 """Step of an entry of a scaled system: poles near the unit circle do not follow a line much farther."""
+
+
+class InnovationModel(AbstractModel):
+    """A linear model whose state space has, or may have, a gain for innovations."""
+
+    if TYPE_CHECKING:  # fields of the dataclasses
+
+        @property
+        def orders(self) -> Any:
+            """Its structure, which says whether it has a model of the noise."""
+
+        @property
+        def system(self) -> Innovations:
+            """The matrices, in scaled numbers."""
+
+        @property
+        def scaling(self) -> Any:
+            """Between units and scaled numbers."""
+
+    def output_moves(
+        self,
+        factor: NDArray[np.float64],
+        inputs: NDArray[np.float64],
+        history: History,
+        measured: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """How free run and prediction move with its numbers; see the base class."""
+        return prediction_moves(self, factor, inputs, history, measured)
+
+    def innovation_responses(self, steps: int) -> NDArray[np.float64] | None:
+        """Of the outputs to innovations over some steps; see the base class."""
+        if not self.orders.noise:
+            return None
+        scale = np.atleast_1d(self.scaling.output_scale)
+        found = responses_to_innovations(self.system.A, self.system.C, self.system.K, steps)
+        return np.asarray(scale[:, np.newaxis] * found / scale)
 
 
 def prediction_moves(

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
-from sysid.models.history import History
-from sysid.models.innovation_moves import prediction_moves, responses_to_innovations
+from sysid.models.base import AbstractStructure, SeveralOutputs
+from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
@@ -101,7 +100,7 @@ class LinearStateSpace(AbstractStructure):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LinearStateSpaceModel(AbstractModel):
+class LinearStateSpaceModel(InnovationModel):
     """A fitted state space of one output.
 
     Args:
@@ -147,22 +146,6 @@ class LinearStateSpaceModel(AbstractModel):
     def with_theta(self, theta: NDArray[np.float64]) -> LinearStateSpaceModel:
         """The same model with other numbers, in the order of :attr:`vector`."""
         return replace(self, system=self.system.at(theta))
-
-    def output_moves(
-        self,
-        factor: NDArray[np.float64],
-        inputs: NDArray[np.float64],
-        history: History,
-        measured: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
-        """How free run and prediction move with its numbers; see the base class."""
-        return prediction_moves(self, factor, inputs, history, measured)
-
-    def innovation_responses(self, steps: int) -> NDArray[np.float64] | None:
-        """Of the outputs to innovations over some steps; see the base class."""
-        if not self.orders.noise:
-            return None
-        return responses_to_innovations(self.system.A, self.system.C, self.system.K, steps)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -249,7 +232,7 @@ class VectorStateSpace(LinearStateSpace):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VectorStateSpaceModel(SeveralOutputs):
+class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
     """A fitted state space of several outputs.
 
     Args:
@@ -295,24 +278,6 @@ class VectorStateSpaceModel(SeveralOutputs):
     def with_theta(self, theta: NDArray[np.float64]) -> VectorStateSpaceModel:
         """The same model with other numbers, in the order of :attr:`vector`."""
         return replace(self, system=self.system.at(theta))
-
-    def output_moves(
-        self,
-        factor: NDArray[np.float64],
-        inputs: NDArray[np.float64],
-        history: History,
-        measured: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
-        """How free run and prediction move with its numbers; see the base class."""
-        return prediction_moves(self, factor, inputs, history, measured)
-
-    def innovation_responses(self, steps: int) -> NDArray[np.float64] | None:
-        """Of the outputs to innovations over some steps; see the base class."""
-        if not self.orders.noise:
-            return None
-        scale = np.array(self.scaling.output_scale)
-        found = responses_to_innovations(self.system.A, self.system.C, self.system.K, steps)
-        return np.asarray(scale[:, np.newaxis] * found / scale)
 
     @property
     def poles(self) -> NDArray[np.complex128]:

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractModel, AbstractStructure
-from sysid.models.history import History
-from sysid.models.innovation_moves import prediction_moves, responses_to_innovations
+from sysid.models.base import AbstractStructure
+from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
 from sysid.models.lags import per_input, whole
 from sysid.models.mapping import Mapping
@@ -337,7 +336,7 @@ def _padded(values: NDArray[Any], length: int) -> NDArray[Any]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PolynomialModel(AbstractModel):
+class PolynomialModel(InnovationModel):
     """A fitted polynomial model.
 
     Args:
@@ -398,22 +397,6 @@ class PolynomialModel(AbstractModel):
     def with_theta(self, theta: NDArray[np.float64]) -> PolynomialModel:
         """The same model with other numbers, in the order of :attr:`vector`."""
         return replace(self, theta=theta)
-
-    def output_moves(
-        self,
-        factor: NDArray[np.float64],
-        inputs: NDArray[np.float64],
-        history: History,
-        measured: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
-        """How free run and prediction move with its numbers; see the base class."""
-        return prediction_moves(self, factor, inputs, history, measured)
-
-    def innovation_responses(self, steps: int) -> NDArray[np.float64] | None:
-        """Of the outputs to innovations over some steps; see the base class."""
-        if not self.orders.noise:
-            return None
-        return responses_to_innovations(self.system.A, self.system.C, self.system.K, steps)
 
     @property
     def gains(self) -> Array:

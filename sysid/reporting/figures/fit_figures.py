@@ -21,6 +21,8 @@ from sysid.reporting.worst_instants import Instant
 from sysid.units import squared
 
 _COLUMNS = 450
+LETTERS = 80
+"""Of all names below an axis together, beyond which they stand upright: side by side they would cover each other."""
 _FREE_RUN: dict[str, Any] = {"color": PALETTE[0], "linestyle": DASHES[1], "linewidth": 1.5}
 _OTHER_RUN: dict[str, Any] = {"color": PALETTE[1], "linestyle": DASHES[2], "linewidth": 1.5}
 _ONE_STEP: dict[str, Any] = {"color": PALETTE[1], "linestyle": DASHES[2], "linewidth": 1.5}
@@ -254,7 +256,7 @@ def cases_figure(series: Sequence[Series], cases: Sequence[str], *, quantity: st
                 style = {"color": PUBLISHED, "marker": "_", "markersize": 13, "markeredgewidth": 2.4}
             axes.plot(x, values, **{"markersize": 6, **style, "linestyle": "none"}, label=row.name)
         axes.set_yscale("log")
-        axes.set_xticks(place, list(cases))
+        axes.set_xticks(place, list(cases), rotation=90 if sum(map(len, cases)) > LETTERS else 0)
         axes.set_xlim(-0.5, len(cases) - 0.5)
         axes.grid(visible=False, axis="x")
         axes.set_ylabel(quantity)

@@ -10,6 +10,7 @@ from typing import Any
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.networks.multistart import planned_iterations
+from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.sweep.search_space import Point
 
@@ -17,6 +18,8 @@ REFIT = 0.2
 """Share of the time that is kept for the last fit."""
 TRIAL = 0.15
 """Share of the time that one trial may take."""
+LINEAR = 0.4
+"""Share of the time by whose end linear structures beyond the first of each kind have to be done."""
 FINAL = 0.15
 """Share of either that is kept for trying the best once more."""
 
@@ -51,6 +54,7 @@ class Budget:
         folds: Times that a point is trained.
         spent: Iterations so far.
         kept: Share that is not spent yet.
+        most: Share of the time that may be spent by the end of this round.
     """
 
     wall_s: float | None
@@ -61,6 +65,7 @@ class Budget:
     folds: int = 1
     spent: int = 0
     kept: float = FINAL
+    most: float = 1.0
     _rates: dict[str, float] = field(default_factory=dict)
     _open: list[Point] = field(default_factory=list)
 
@@ -93,7 +98,7 @@ class Budget:
         """
         for point, trial in zip(self._open, trials, strict=True):
             kind = point.structure.kind
-            rate = trial.seconds / (price(point, self.folds) * _size(point))
+            rate = trial.seconds / (price(point, self.folds) * size_of(point.structure))
             if math.isfinite(rate):
                 self._rates[kind] = max(rate, 0.5 * self._rates.get(kind, 0.0))
 
@@ -124,7 +129,11 @@ class Budget:
     def _fits(self, iterations: int, seconds: float, *, paid: bool) -> bool:
         if self.iterations is not None:
             return self.spent + iterations <= (1.0 - self.kept) * self.iterations
-        return paid or self.wall_s is None or self.clock() + seconds <= (1.0 - REFIT - self.kept) * self.wall_s
+        return paid or self.wall_s is None or self.clock() + seconds <= self._until()
+
+    def _until(self) -> float:
+        """Seconds by which a round of trials has to be over."""
+        return min(self.most, 1.0 - REFIT - self.kept) * (self.wall_s or 0.0)
 
     def _seconds(self, point: Point) -> float:
         """How long a trial will take; of a kind that was not tried yet, at least something."""
@@ -132,13 +141,22 @@ class Budget:
             return 0.0
         rate = self._rates.get(point.structure.kind, 0.0)
         limit = TRIAL * self.wall_s if point.training else self.wall_s
-        return min(limit, max(1e-3, rate * price(point, self.folds) * _size(point)))
+        return min(limit, max(1e-3, rate * price(point, self.folds) * size_of(point.structure)))
 
 
-def _size(point: Point) -> float:
-    """About how many parameters, from the fields that count something: enough to compare two of a kind."""
-    numbers = [v for v in point.structure.to_dict().values() if isinstance(v, int) and not isinstance(v, bool)]
-    product = 1.0
-    for number in numbers:
-        product *= max(1, number)
-    return product
+def size_of(structure: AbstractStructure) -> float:
+    """About how many parameters, from the fields that count something: enough to compare two of a kind.
+
+    Args:
+        structure: What is tried.
+
+    Returns:
+        The product of its counts; a list, such as poles for each input, counts as its sum.
+    """
+    counted = [sum(v) if _counts(v) else v for v in structure.to_dict().values()]
+    numbers = [v for v in counted if isinstance(v, int) and not isinstance(v, bool)]
+    return float(math.prod(max(1, number) for number in numbers))
+
+
+def _counts(value: Any) -> bool:
+    return isinstance(value, list | tuple) and all(isinstance(one, int) for one in value)

@@ -12,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.budget import Budget
+from sysid.workbench.auto.budget import LINEAR, Budget, size_of
 from sysid.workbench.auto.families import FAMILIES, Family, Try, suggested
 from sysid.workbench.auto.look import Looked
 from sysid.workbench.runner.store import digest
@@ -48,6 +48,7 @@ class Plan:
         seed: Of the search.
         again: How often the best are trained again; 0 where what was chosen is not.
         ended: Why it ended, once it has.
+        left_out: Linear structures for which there was no time beside the networks.
     """
 
     looked: Looked
@@ -58,6 +59,7 @@ class Plan:
     seed: int = 0
     again: int = AGAIN
     ended: str = ""
+    left_out: list[str] = field(default_factory=list)
     trials: list[Trial] = field(default_factory=list)
     _tries: list[Try] = field(default_factory=list)
     _seen: set[str] = field(default_factory=set)
@@ -73,7 +75,9 @@ class Plan:
         for tries in self._rounds:
             points = [self._point(one) for one in tries]
             taken = self.budget.take(points)
-            if len(taken) < len(points):
+            if self.budget.most < 1.0 and self.budget.wall_s is not None:
+                self.left_out += [point.structure.label for point in points if point not in taken]
+            elif len(taken) < len(points):
                 self.ended = "the budget is spent"
             by_number = {point.number: one for point, one in zip(points, tries, strict=True)}
             self._tries += [by_number[point.number] for point in taken]
@@ -138,10 +142,8 @@ class Plan:
             yield finals
 
     def _search(self) -> Iterator[list[Try]]:
-        for linear in (True, False):
-            wanted = suggested(self.looked, linear=linear)
-            wanted += [one for family in self.families if family.linear is linear for one in family.first(self.looked)]
-            yield from self._rounds_of(wanted)
+        yield from self._linear()
+        yield from self._rounds_of(self._first(linear=False))
         stale = 0
         while stale < PATIENCE:
             before = self.least()
@@ -152,6 +154,24 @@ class Plan:
             yield wanted
             stale = 0 if math.sqrt(self.least()) < (1.0 - GAIN) * math.sqrt(before) else stale + 1
         self.ended = self.ended or f"the last {PATIENCE * ROUND} trials gained less than {GAIN:.0%}"
+
+    def _linear(self) -> Iterator[list[Try]]:
+        """The first of each kind, which tells what others cost; then those for which there is time beside networks."""
+        wanted = self._first(linear=True)
+        least: dict[str, Try] = {}
+        for one in sorted(wanted, key=lambda one: size_of(one.structure)):
+            least.setdefault(one.structure.kind, one)
+        yield from self._rounds_of(list(least.values()))
+        self.budget.most = LINEAR
+        yield from self._rounds_of(wanted)
+        self.budget.most = 1.0
+
+    def _first(self, *, linear: bool) -> list[Try]:
+        """What is tried unasked."""
+        wanted = suggested(self.looked, linear=linear)
+        return wanted + [
+            one for family in self.families if family.linear is linear for one in family.first(self.looked)
+        ]
 
     def _rounds_of(self, wanted: Sequence[Try]) -> Iterator[list[Try]]:
         new = self._new(wanted, len(wanted))

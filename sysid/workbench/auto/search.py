@@ -185,7 +185,7 @@ class Search:
             fits={name: checks.given(trial) for name, trial in shown.items()},
             training={name: first.last[trial.number].training for name, trial in shown.items()},
             parts=self.parts,
-            told=(*self.parts.told, *(f"Look at the data: {one}" for one in self.looked.cautions)),
+            told=(*self.parts.told, *_left_out(plan), *(f"Look at the data: {one}" for one in self.looked.cautions)),
             done_now=trials.done_now,
         )
 
@@ -210,6 +210,12 @@ class Search:
             winner=choice.chosen.number,
             trials=list(plan.trials),
         )
+
+
+def _left_out(plan: Plan) -> list[str]:
+    """What was not tried for want of time."""
+    some = ", ".join(plan.left_out)
+    return [f"Linear models that would have taken the time of the networks were left out: {some}."] if some else []
 
 
 def error(trial: Trial) -> float:

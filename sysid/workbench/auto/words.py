@@ -23,12 +23,14 @@ class Choice:
         least: The one of the least error.
         linear: The best linear one; ``None`` where none can be used.
         refused: Trials of less error that were passed over, as their free run is not stable.
+        networks: Trials that are no linear model.
     """
 
     chosen: Trial
     least: Trial
     linear: Trial | None
     refused: int
+    networks: int
 
 
 def choose(
@@ -50,7 +52,10 @@ def choose(
     alike = [t for t in usable if error(t) <= limit and t not in usable[:refused]]
     smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
     linear = [t for t in usable if ESTIMATORS[t.structure["kind"]].linear]
-    return Choice(chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused)
+    networks = sum(not ESTIMATORS[t.structure["kind"]].linear for t in trials)
+    return Choice(
+        chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, networks=networks
+    )
 
 
 def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: str, error: Error) -> str:
@@ -86,7 +91,7 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: st
         share = 1.0 - root / math.sqrt(error(choice.linear))
         parts.append(f"{share:.0%} less than the best linear model, {choice.linear.label}")
     elif choice.linear is not None:
-        parts.append("and no network does better")
+        parts.append("and no network does better" if choice.networks else "no network was tried")
     said = f"{'; '.join(parts)}; {ended}."
     if choice.refused:
         said += f" {choice.refused} of less error were passed over: their free run is not stable."

@@ -78,7 +78,7 @@ def make_surrogate(
         proof: New experiments; 1,000 by default, or as many as there is time for.
         iterations: In place of the search's time: the same result on every machine.
         seed: Of the search.
-        say: Told how the proof goes.
+        say: Told what makes a surrogate wrong, and how the proof goes.
 
     Returns:
         The surrogate.
@@ -91,6 +91,9 @@ def make_surrogate(
     place, reference = folder / "experiment", config.reference.at(pipeline.resolve().parent)
     found: Experimented = perform(experiment_program(config, text=text, folder=pipeline.resolve().parent), place)
     mapping = Mapping(inputs=(*reference.inputs, *reference.parameters), outputs=tuple(reference.outputs))
+    notes = [*_uneven(found), *in_motion(found, mapping)]
+    for note in notes:  # before an hour is spent
+        say(f"note: {note}")
     fields: dict[str, Any] = {
         **{"kind": "auto", "name": "model", "data": str((place / DATASET).resolve()), "mapping": mapping},
         **{"start": Start(), "rest": dict(found.before), "seed": seed, "workers": config.workers},
@@ -100,7 +103,6 @@ def make_surrogate(
     search = check(AutoConfig, fields, where=pipeline)
     perform(search_program(auto_of(search, load=lambda: data_of(found.traces, mapping))), folder / "model")
     bundle = read_bundle(folder / "model" / "bundle")
-    notes = _uneven(found)
     count = proof or _affordable(config, reference_runs=ReferenceRuns(config=reference), minutes=minutes)
     shown, section = prove(
         bundle, reference, config.experiment, found.traces, count=count, workers=config.workers,
@@ -126,11 +128,41 @@ def _affordable(config: ExperimentConfig, *, reference_runs: ReferenceRuns, minu
 
 def _uneven(found: Experimented) -> list[str]:
     """Outputs that do not begin at one value, which a surrogate at rest does."""
-    traces = found.traces.with_role(Role.ESTIMATION)
-    spans = {name: float(np.ptp(np.concatenate([trace[name] for trace in traces]))) for name in found.before}
+    spans = _spans(found)
     return [
         f"{name} begins at values up to {spread:.3g} apart, the surrogate always at {found.before[name]:.6g}: its "
         "first samples are wrong where the reference begins elsewhere; give settling, or a start at which it is at rest"
         for name, spread in found.spread.items()
         if spread > UNEQUAL * spans[name]
     ]
+
+
+def in_motion(found: Experimented, mapping: Mapping) -> list[str]:
+    """Outputs that move before any input does, which those of a surrogate at rest do not.
+
+    Args:
+        found: The experiments.
+        mapping: What moves, and what answers.
+
+    Returns:
+        A sentence for each.
+    """
+    moved = dict.fromkeys(found.before, 0.0)
+    for trace in found.traces.with_role(Role.ESTIMATION):
+        inputs = trace.columns(mapping.inputs)
+        changed = np.flatnonzero((inputs != inputs[:1]).any(axis=1))
+        still = slice(0, int(changed[0]) if len(changed) else len(inputs))
+        moved = {name: max(most, float(np.ptp(trace[name][still]))) for name, most in moved.items()}
+    spans = _spans(found)
+    return [
+        f"{name} moves by up to {by:.3g} while the inputs stand still: the reference does not begin at rest, and the "
+        "surrogate does; give settling, or a start at which it is at rest"
+        for name, by in moved.items()
+        if by > UNEQUAL * spans[name]
+    ]
+
+
+def _spans(found: Experimented) -> dict[str, float]:
+    """How far each output moves over all that was fitted."""
+    traces = found.traces.with_role(Role.ESTIMATION)
+    return {name: float(np.ptp(np.concatenate([trace[name] for trace in traces]))) for name in found.before}

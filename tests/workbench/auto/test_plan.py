@@ -60,14 +60,34 @@ def by_size(point: Point) -> float:
 
 def test_linear_structures_come_first_and_alone() -> None:
     _, rounds = searched(lambda _: 1.0)
-    assert all(map(linear, rounds[0]))
-    assert {point.structure.kind for point in rounds[0]} >= {"ARX", "SS", "TransferFunction"}
-    assert not any(map(linear, (point for later in rounds[1:] for point in later)))
+    # The least of each kind tells what the others of it cost.
+    assert [point.structure.label for point in rounds[0]] == [
+        "TF [1; 0; 1]",
+        "SS 1 without noise model",
+        "ARX [2; 2; 1]",
+    ]
+    assert all(map(linear, rounds[1]))
+    assert {point.structure.kind for point in rounds[1]} >= {"SS", "TransferFunction"}
+    assert not any(map(linear, (point for later in rounds[2:] for point in later)))
+
+
+def test_linear_structures_leave_time_for_networks() -> None:
+    clock = [0.0]
+    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
+    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    tried: list[Point] = []
+    while (points := plan.ask()) and len(tried) < 20:
+        tried += points
+        seconds = [15.0 if point.structure.kind == "TransferFunction" else 0.1 for point in points]
+        clock[0] += sum(seconds)
+        plan.tell([trial(p, 1.0).model_copy(update={"seconds": s}) for p, s in zip(points, seconds, strict=True)])
+    assert plan.left_out == ["TF [2; 1; 1]"]
+    assert any(not linear(point) for point in tried)
 
 
 def test_a_search_that_gains_nothing_ends_soon() -> None:
     plan, rounds = searched(lambda _: 1.0)
-    assert len(rounds) == 2 + PATIENCE
+    assert len(rounds) == 3 + PATIENCE
     assert "gained less" in plan.ended
 
 
@@ -85,7 +105,7 @@ def test_nothing_is_tried_twice_and_nothing_that_cannot_be() -> None:
 
 def test_what_cannot_be_used_leads_nowhere() -> None:
     plan, rounds = searched(lambda point: 1.0 if linear(point) else math.inf)
-    assert len(rounds) == 2
+    assert len(rounds) == 3
     assert plan.least() == 1.0
 
 

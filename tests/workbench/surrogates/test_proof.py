@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import sysid
 from sysid.errors import ConfigError
 from sysid.export import Bundle
-from sysid.models import Start
+from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish, proposed
 from sysid.references.design import Design, designed
 from sysid.reporting.judging.results import JudgementRecord
+from sysid.workbench.experiments.run import Experimented
+from sysid.workbench.surrogates.make import in_motion
 from sysid.workbench.surrogates.plan import pairs
 from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
 
@@ -76,3 +79,12 @@ def test_what_an_fmu_does_not_say_is_asked_for_by_its_option(proven: tuple[Bundl
 def test_a_range_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(ConfigError, match="is not a range"):
         pairs([text], "--range")
+
+
+def test_a_reference_that_does_not_begin_at_rest_is_told() -> None:
+    u = np.repeat([0.0, 1.0], [10, 30])
+    for name, y in (("decays", 5.0 * 0.8 ** np.arange(40)), ("rests", np.minimum(u, 0.5))):
+        traces = sysid.data({"u": u, "y": y}, inputs="u", outputs="y", sample_time=0.5)
+        found = Experimented(traces=traces, outcomes={}, before={"y": 0.0}, spread={"y": 0.0})
+        told = in_motion(found, Mapping(inputs=("u",), outputs=("y",)))
+        assert [one.split(" while ")[0] for one in told] == (["y moves by up to 4.33"] if name == "decays" else [])
