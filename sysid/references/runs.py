@@ -276,7 +276,7 @@ class ReferenceRuns:
         kept = None if self.fresh else self._kept(case, key)
         if kept is not None:
             return kept
-        process = self._idle.pop() if self._idle else self._start()
+        process = self._worker()
         began, wall = time.perf_counter(), float("nan")
         with _exchange() as (given, made):
             np.save(given, case.inputs, allow_pickle=False)
@@ -302,6 +302,13 @@ class ReferenceRuns:
         )  # fmt: skip
         self._keep(key, outcome)
         return outcome
+
+    def _worker(self) -> _Process:
+        """One that is idle, or a new one; between looking and taking another thread may have taken the last."""
+        try:
+            return self._idle.pop()
+        except IndexError:
+            return self._start()
 
     def _trace(self, case: Case, outputs: NDArray[np.float64]) -> Trace:
         config, constant = self.config, np.ones((len(outputs), 1))

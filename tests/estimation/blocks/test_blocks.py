@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations_with_replacement
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from sysid.estimation.blocks.polynomial_narx import fit_polynomial_narx
 from sysid.estimation.blocks.sections import block_of, responses, sections_of
 from sysid.estimation.blocks.selection import choose_terms, products
 from sysid.estimation.networks.training import Training
+from sysid.export import EXPORTERS, Surrogate
 from sysid.models import BuiltModel, HammersteinWiener, Mapping, PolynomialNARX, WienerHammerstein, model_from_dict
 from sysid.models.curves import Curve
 from sysid.traces import Channel, Trace
@@ -155,6 +157,22 @@ def test_terms_are_those_that_leave_least(monkeypatch: pytest.MonkeyPatch) -> No
     best = np.linalg.lstsq(P, y, rcond=None)[0]
     assert found.coefficients[-1] == pytest.approx(best, rel=1e-6)
     assert sum(found.reductions) == pytest.approx(1.0 - np.sum((y - P @ best) ** 2) / (y @ y), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["c", "onnx"])
+def test_files_of_one_compute_what_it_computes(name: str, tmp_path: Path) -> None:
+    u = steps(1)
+    brief = Training(starts=1, max_iterations=2)
+    blocks = HammersteinWiener(states=2, input="network 2", output="saturation")
+    for fit in (
+        fit_hammerstein_wiener([a_trace(u, saturated(u))], MAPPING, blocks, brief),
+        fit_polynomial_narx([a_trace(u, polynomial(u))], MAPPING, PolynomialNARX(degree=2, terms=4), brief),
+    ):
+        whole = Surrogate.of(fit.model)
+        for file in EXPORTERS[name].write(whole, tmp_path):
+            run = EXPORTERS[name].load(file, tmp_path)
+            found = run(u[:300, None, None], whole.at_rest(u[:1])[None])
+            np.testing.assert_allclose(found.output[:, 0, 0], fit.model.simulate(u[:300, None]), atol=1e-9)
 
 
 def polynomial(u: np.ndarray) -> np.ndarray:
