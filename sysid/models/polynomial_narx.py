@@ -51,7 +51,10 @@ class PolynomialNARX(AbstractStructure):
 
     def __post_init__(self) -> None:
         given = self.input_delays
-        several = isinstance(given, list | tuple) and any(isinstance(one, list | tuple | str) for one in given)
+        # No lags at all are those of no input: a time series.
+        several = isinstance(given, list | tuple) and (
+            not given or any(isinstance(one, list | tuple | str) for one in given)
+        )
         object.__setattr__(self, "input_delays", tuple(map(_lags, given)) if several else (_lags(given),))
         object.__setattr__(self, "output_delays", parse_lags(self.output_delays, first=1, where="output_delays"))
         for name, most in (("degree", 9), ("terms", MOST_TERMS)):

@@ -55,6 +55,7 @@ class Budget:
         spent: Iterations so far.
         kept: Share that is not spent yet.
         most: Share of the time that may be spent by the end of this round.
+        unlimited: Points of the next round that are tried even so, as long as the time of the last fit is not reached.
     """
 
     wall_s: float | None
@@ -66,6 +67,7 @@ class Budget:
     spent: int = 0
     kept: float = FINAL
     most: float = 1.0
+    unlimited: int = 0
     _rates: dict[str, float] = field(default_factory=dict)
     _open: list[Point] = field(default_factory=list)
 
@@ -82,12 +84,14 @@ class Budget:
         seconds = 0.0
         for point in points:
             cost = 0.0 if self.wall_s is None or self.is_stored(point) else self._seconds(point) / self.side_by_side
-            if not self._fits(price(point, self.folds), seconds + cost, paid=cost == 0.0):
+            fits = self._fits(price(point, self.folds), seconds + cost, paid=cost == 0.0)
+            if not fits and not (len(taken) < self.unlimited and self._before_the_last_fit()):
                 continue
             seconds += cost
             self.spent += price(point, self.folds)
             taken.append(point)
         self._open = taken
+        self.unlimited = 0
         return taken
 
     def tell(self, trials: Sequence[Trial]) -> None:
@@ -130,6 +134,9 @@ class Budget:
         if self.iterations is not None:
             return self.spent + iterations <= (1.0 - self.kept) * self.iterations
         return paid or self.wall_s is None or self.clock() + seconds <= self._until()
+
+    def _before_the_last_fit(self) -> bool:
+        return self.wall_s is not None and self.clock() < (1.0 - REFIT) * self.wall_s
 
     def _until(self) -> float:
         """Seconds by which a round of trials has to be over."""

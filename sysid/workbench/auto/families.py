@@ -7,9 +7,21 @@ from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 from sysid.estimation.estimators import estimator_of
-from sysid.models import ARX, NARX, AbstractStructure, LinearStateSpace, NeuralStateSpace, TransferFunction
+from sysid.models import (
+    ARX,
+    NARX,
+    AbstractStructure,
+    HammersteinWiener,
+    LinearStateSpace,
+    NeuralStateSpace,
+    PolynomialNARX,
+    TransferFunction,
+)
+from sysid.models.curves import NONE
 from sysid.workbench.auto.look import Looked
 
+CURVE = "piecewise 6"
+"""A learnt curve that can be any."""
 LINEAR_ORDERS = range(1, 7)
 REGULARISATIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
 """Fixed weights of the size of the parameters; the evidence finds its own where none is given."""
@@ -96,7 +108,7 @@ def _around_narx(one: Try, _: Looked) -> list[Try]:
     moves: list[dict[str, Any]] = [
         {"neurons": round(1.6 * network.neurons) + 1},
         {"gated": not network.gated},
-        *([_lags(network, n) for n in (lags + 1, lags - 1) if n >= 1]),
+        *([_lags(network, n) for n in (lags + 1, lags - 1) if 1 <= n <= LINEAR_ORDERS[-1]]),
         {"neurons": max(1, round(0.6 * network.neurons))},
     ]
     return _moved(one, moves)
@@ -107,16 +119,39 @@ def _lags(network: NARX, n: int) -> dict[str, Any]:
     return {"input_delays": [list(range(k, k + n)) for k in first], "output_delays": list(range(1, n + 1))}
 
 
+def _blocks(looked: Looked) -> list[Try]:
+    curves = [{"input": CURVE}, {"output": CURVE}] if looked.n_inputs else []
+    return [Try(structure=HammersteinWiener(states=2, delays=looked.delay, **curve)) for curve in curves]
+
+
+def _around_blocks(one: Try, _: Looked) -> list[Try]:
+    blocks = cast("HammersteinWiener", one.structure)
+    before = any(curve.kind != NONE for curve in blocks.input)
+    other = {"output": CURVE if blocks.output.kind == NONE else NONE} if before else {"input": CURVE}
+    sizes = [{"states": n} for n in (blocks.states + 1, blocks.states - 1) if 1 <= n <= LINEAR_ORDERS[-1]]
+    return _changed(one, [*sizes[:1], other, *sizes[1:]])
+
+
+def _polynomials(looked: Looked) -> list[Try]:
+    lags = min(looked.lags, 4)
+    delays = f"{looked.delay}:{looked.delay + lags - 1}" if looked.n_inputs else []
+    return [Try(structure=PolynomialNARX(input_delays=delays, output_delays=lags, degree=d)) for d in (2, 3)]
+
+
 def _moved(one: Try, moves: Sequence[Mapping[str, Any]]) -> list[Try]:
     """The structure with some of its fields changed; then other regularisations of the structure itself."""
+    moved = _changed(one, moves)
+    weights = [replace(one, training={**one.training, "regularisation": r}) for r in _regularisations(one)]
+    return [moved[0], *weights[:1], *moved[1:3], *weights[1:], *moved[3:]]
+
+
+def _changed(one: Try, moves: Sequence[Mapping[str, Any]]) -> list[Try]:
     fields = one.structure.to_dict()
     kind = type(one.structure)
-    moved = [
+    return [
         Try(structure=kind(**{k: v for k, v in {**fields, **move}.items() if k != "kind"}), training=one.training)
         for move in moves
     ]
-    weights = [replace(one, training={**one.training, "regularisation": r}) for r in _regularisations(one)]
-    return [moved[0], *weights[:1], *moved[1:3], *weights[1:], *moved[3:]]
 
 
 def _regularisations(one: Try) -> list[float]:
@@ -147,5 +182,7 @@ FAMILIES = (
     Family(kind=LinearStateSpace.kind, linear=True, first=_state_spaces),
     Family(kind=NeuralStateSpace.kind, linear=False, first=_neural, around=_around_neural),
     Family(kind=NARX.kind, linear=False, first=_narx, around=_around_narx),
+    Family(kind=HammersteinWiener.kind, linear=False, first=_blocks, around=_around_blocks),
+    Family(kind=PolynomialNARX.kind, linear=False, first=_polynomials),
 )
 """All of them, in the order in which they are tried."""

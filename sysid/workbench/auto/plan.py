@@ -27,7 +27,7 @@ GAIN = 0.02
 PATIENCE = 2
 """Rounds without a gain after which the search ends."""
 FINALISTS, AGAIN = 3, 2
-"""The best networks, and how often each is trained again from other starts before the choice: the least of many errors
+"""The best nonlinear models, and how often each is trained again before the choice: the least of many errors
 owes something to luck, and the chosen one is trained from other starts too."""
 ALIKE = 0.03
 """Part of the least error within which another one counts as no worse; of those the smallest is chosen."""
@@ -35,7 +35,7 @@ ALIKE = 0.03
 
 @dataclass(kw_only=True, eq=False)
 class Plan:
-    """Asks for trials round by round: linear structures, the first networks, then what stands next to the best.
+    """Asks for trials round by round: linear structures, the first nonlinear ones, then what stands next to the best.
 
     Nothing depends on when a result comes in, and with a budget of iterations nothing on time.
 
@@ -43,12 +43,12 @@ class Plan:
         looked: What is in the record.
         budget: What may be spent.
         error: What chooses, as a mean square; infinite for what cannot be used.
-        training: Options that every network is trained with.
+        training: Options that every nonlinear model is trained with.
         families: What there is to try.
         seed: Of the search.
         again: How often the best are trained again; 0 where what was chosen is not.
         ended: Why it ended, once it has.
-        left_out: Linear structures for which there was no time beside the networks.
+        left_out: Linear structures for which there was no time beside the others.
     """
 
     looked: Looked
@@ -100,7 +100,7 @@ class Plan:
         """The least error so far, as a mean square.
 
         Args:
-            linear: Among linear models alone, or networks alone; among all by default.
+            linear: Among linear models alone, or the others alone; among all by default.
 
         Returns:
             The error; infinite where there is none.
@@ -111,12 +111,12 @@ class Plan:
 
     @property
     def n_again(self) -> int:
-        """Networks that were trained again."""
+        """Nonlinear models that were trained again."""
         return len(self._told_again)
 
     @property
     def candidates(self) -> list[Trial]:
-        """What may be chosen: networks that were trained again, where some were, and linear models."""
+        """What may be chosen: nonlinear models that were trained again, where some were, and linear ones."""
         kinds = {family.kind for family in self.families if family.linear}
         again = set(self._told_again)
         return [t for n, t in enumerate(self.trials) if n in again or not again or t.structure["kind"] in kinds]
@@ -127,7 +127,7 @@ class Plan:
         yield from self._finals()
 
     def _finals(self) -> Iterator[list[Try]]:
-        """The best networks once more, from other starts."""
+        """The best nonlinear models once more, from other starts."""
         kinds = {family.kind for family in self.families if not family.linear}
         places = [n for n, one in enumerate(self._tries[: len(self.trials)]) if one.structure.kind in kinds]
         best = sorted(places, key=lambda n: self.error(self.trials[n]))[:FINALISTS]
@@ -143,6 +143,7 @@ class Plan:
 
     def _search(self) -> Iterator[list[Try]]:
         yield from self._linear()
+        self.budget.unlimited = 1  # on a slow machine linear models alone would have taken all
         yield from self._rounds_of(self._first(linear=False))
         stale = 0
         while stale < PATIENCE:
@@ -156,7 +157,7 @@ class Plan:
         self.ended = self.ended or f"the last {PATIENCE * ROUND} trials gained less than {GAIN:.0%}"
 
     def _linear(self) -> Iterator[list[Try]]:
-        """The first of each kind, which tells what others cost; then those for which there is time beside networks."""
+        """The first of each kind, which tells what others cost; then those that leave time for nonlinear ones."""
         wanted = self._first(linear=True)
         least: dict[str, Try] = {}
         for one in sorted(wanted, key=lambda one: size_of(one.structure)):
@@ -179,7 +180,7 @@ class Plan:
             yield new
 
     def _next(self) -> list[Try]:
-        """What stands next to the best networks: half of it to the best of all, half to the best of another kind."""
+        """What stands next to good nonlinear models: half to the best of all, half to the best of another kind."""
         around = {family.kind: family.around for family in self.families if not family.linear}
         pairs = [pair for pair in zip(self.trials, self._tries, strict=True) if pair[1].structure.kind in around]
         ranked = sorted(pairs, key=lambda pair: (self.error(pair[0]), pair[0].number))

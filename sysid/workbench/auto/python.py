@@ -98,7 +98,7 @@ def auto(
     workers: int = 1,
     folder: str | Path | None = None,
 ) -> AutoSearch:
-    """Find a model: linear ones first, then networks of growing size, as long as they gain and there is time.
+    """Find a model: linear ones first, then nonlinear ones of growing size, as long as they gain and there is time.
 
     Selection traces choose; without any, parts of the estimation traces are held out in turn, and what is chosen is
     fitted once more to all of them. Validation and test traces are never looked at.

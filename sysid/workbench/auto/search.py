@@ -215,7 +215,7 @@ class Search:
 def _left_out(plan: Plan) -> list[str]:
     """What was not tried for want of time."""
     some = ", ".join(plan.left_out)
-    return [f"Linear models that would have taken the time of the networks were left out: {some}."] if some else []
+    return [f"Linear models that would have taken the time of nonlinear ones were left out: {some}."] if some else []
 
 
 def error(trial: Trial) -> float:

@@ -23,14 +23,14 @@ class Choice:
         least: The one of the least error.
         linear: The best linear one; ``None`` where none can be used.
         refused: Trials of less error that were passed over, as their free run is not stable.
-        networks: Trials that are no linear model.
+        nonlinear: Trials that are no linear model.
     """
 
     chosen: Trial
     least: Trial
     linear: Trial | None
     refused: int
-    networks: int
+    nonlinear: int
 
 
 def choose(
@@ -52,9 +52,9 @@ def choose(
     alike = [t for t in usable if error(t) <= limit and t not in usable[:refused]]
     smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
     linear = [t for t in usable if ESTIMATORS[t.structure["kind"]].linear]
-    networks = sum(not ESTIMATORS[t.structure["kind"]].linear for t in trials)
+    nonlinear = sum(not ESTIMATORS[t.structure["kind"]].linear for t in trials)
     return Choice(
-        chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, networks=networks
+        chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=nonlinear
     )
 
 
@@ -64,7 +64,7 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: st
     Args:
         choice: What was chosen.
         tried: How many were tried.
-        again: The best networks among them that were trained again from other starts; 0 for none.
+        again: The best nonlinear models among them that were trained again from other starts; 0 for none.
         unit: Of the output.
         ended: Why the search ended.
         error: What chooses.
@@ -84,14 +84,14 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: st
             f"{shown(root)} (root mean square) beside {shown(math.sqrt(error(choice.least)))} of "
             f"{choice.least.label}"
         )
-    best = "the best network" if again == 1 else f"the {again} best networks"
+    best = "the best nonlinear model" if again == 1 else f"the {again} best nonlinear models"
     finals = f", {best} again from other starts" if again else ""
     parts = [f"{why}, of {tried} tried{finals}"]
     if choice.linear is not None and choice.linear.number != choice.chosen.number:
         share = 1.0 - root / math.sqrt(error(choice.linear))
         parts.append(f"{share:.0%} less than the best linear model, {choice.linear.label}")
     elif choice.linear is not None:
-        parts.append("and no network does better" if choice.networks else "no network was tried")
+        parts.append("and no nonlinear model does better" if choice.nonlinear else "no nonlinear model was tried")
     said = f"{'; '.join(parts)}; {ended}."
     if choice.refused:
         said += f" {choice.refused} of less error were passed over: their free run is not stable."

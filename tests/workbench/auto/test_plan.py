@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from sysid.estimation.estimators import ESTIMATORS
-from sysid.models import ARX, NeuralStateSpace
+from sysid.models import ARX, HammersteinWiener, NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import Budget, price
 from sysid.workbench.auto.look import Looked
@@ -83,6 +83,37 @@ def test_linear_structures_leave_time_for_networks() -> None:
         plan.tell([trial(p, 1.0).model_copy(update={"seconds": s}) for p, s in zip(points, seconds, strict=True)])
     assert plan.left_out == ["TF [2; 1; 1]"]
     assert any(not linear(point) for point in tried)
+
+
+@pytest.mark.parametrize(("after", "some"), [(70.0, True), (90.0, False)])
+def test_a_slow_machine_tries_one_nonlinear_model_where_that_leaves_time_for_the_last_fit(
+    after: float, some: bool
+) -> None:
+    clock = [0.0]
+    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
+    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    plan.tell([trial(point, 1.0) for point in plan.ask()])
+    clock[0] = after
+    assert [linear(point) for point in plan.ask()] == ([False] if some else [])
+
+
+def test_curves_and_polynomials_are_tried_beside_networks() -> None:
+    _, rounds = searched(lambda _: 1.0)
+    labels = [point.structure.label for point in rounds[2]]
+    assert {"HW 2, piecewise 6 before", "HW 2, piecewise 6 behind"} <= set(labels)
+    assert "polynomial NARX 2/2, degree 3, up to 20 terms" in labels
+    assert any(label.startswith("NSS") for label in labels)
+
+
+def test_a_block_with_a_good_curve_is_followed() -> None:
+    def worth(point: Point) -> float:
+        one = point.structure
+        return 1.0 / (one.states + (one.output.kind != "none")) if isinstance(one, HammersteinWiener) else 1.0
+
+    _, rounds = searched(worth)
+    labels = {point.structure.label for one in rounds for point in one}
+    assert {"HW 3, piecewise 6 behind", "HW 6, piecewise 6 behind"} <= labels
+    assert "HW 3, piecewise 6 before, piecewise 6 behind" in labels
 
 
 def test_a_search_that_gains_nothing_ends_soon() -> None:

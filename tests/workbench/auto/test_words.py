@@ -39,14 +39,14 @@ def test_the_smallest_of_those_that_are_as_good_is_chosen() -> None:
 def test_a_linear_model_that_is_as_good_is_chosen() -> None:
     found = choose([arx(1, 1.01), network(2, 1.0, 60)], error, stable)
     assert found.chosen.number == 1
-    assert "and no network does better" in sentence(found, 2, unit="V", ended="", error=error)
+    assert "and no nonlinear model does better" in sentence(found, 2, unit="V", ended="", error=error)
 
 
 def test_that_no_network_was_tried_is_said() -> None:
     found = choose([arx(1, 1.01)], error, stable)
     said = sentence(found, 1, unit="V", ended="the budget is spent", error=error)
-    assert "no network was tried; the budget is spent" in said
-    assert "no network does better" not in said
+    assert "no nonlinear model was tried; the budget is spent" in said
+    assert "no nonlinear model does better" not in said
 
 
 def test_unstable_ones_are_passed_over_and_counted() -> None:
@@ -67,7 +67,7 @@ def test_dropped_and_failed_trials_are_not_chosen() -> None:
 def test_the_sentence_says_what_against_what_and_why_it_ended() -> None:
     found = choose(TRIALS, error, stable)
     said = sentence(found, len(TRIALS), again=3, unit="V", ended="the budget is spent", error=error)
-    tried = "4 tried, the 3 best networks again"
+    tried = "4 tried, the 3 best nonlinear models again"
     for words in ("NSS 2/2", "NSS 2/3", "1.02\u00a0V", tried, "49% less", "ARX [1; 1; 1]", "the budget is spent"):
         assert words in said
 
