@@ -26,7 +26,8 @@ def equilibrium_notes(model: AbstractModel, traces: Sequence[Trace], start: Star
 
     The free run from the declared start is compared with the record over the window that a start would be estimated on,
     and that with the errors of the free run from the estimated one, after it. A model that was fitted to what the start
-    said may have bent to it: a small ARX model that takes nothing for granted is asked as well.
+    said may have bent to it: a small ARX model that takes nothing for granted is asked as well, unless the model has
+    learnt where its records begin.
 
     Args:
         model: A model fitted to the records.
@@ -38,7 +39,7 @@ def equilibrium_notes(model: AbstractModel, traces: Sequence[Trace], start: Star
     """
     if start.kind not in {StartKind.REST, StartKind.FIRST_SAMPLE}:
         return ()
-    asked = [model, *_plain_models(traces, model)]
+    asked = [model] if model.structure.learns_start else [model, *_plain_models(traces, model)]
     told = []
     for trace in traces:
         found = [sentence for one in asked for sentence in _of(one, trace, start)]

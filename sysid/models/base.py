@@ -40,6 +40,9 @@ class AbstractStructure(ABC):
     several_outputs: bool = False
     """Whether one model has all outputs of a mapping; where it is false, each output gets a model of its own."""
 
+    learns_start: bool = False
+    """Whether where a record begins is fitted with the parameters, so that a run from its start need not be at rest."""
+
     per_input: tuple[str, ...] = ()
     """Fields that hold one number per input."""
 

@@ -53,6 +53,7 @@ class NeuralStateSpace(AbstractStructure):
     output: str = "plain"
 
     kind = "NSS"
+    learns_start = True
 
     def __post_init__(self) -> None:
         for name, least in (("states", 1), ("neurons", 0), ("output_neurons", 0)):

@@ -86,10 +86,13 @@ class ParameterPort(_Strict):
     Args:
         unit: Its unit.
         range: Its values.
+        variable: Of an FMU, the variable that is set where it has another name: ``variable: x`` of a parameter
+            ``x_start`` gives the start value of an output ``x``.
     """
 
     unit: Unit = "1"
     range: Span
+    variable: str | None = None
 
 
 class OutputPort(_Strict):
@@ -157,6 +160,12 @@ class ReferenceConfig(_Strict):
                 f"{twice[0]} is named twice", expected="a name for each port", got=", ".join(names),
                 remedy="an input, a parameter, a constant or an output: say which it is",
             )  # fmt: skip
+        renamed = [name for name, port in self.parameters.items() if port.variable is not None]
+        if renamed and self.fmu is None:
+            raise FieldError(
+                f"{renamed[0]} names a variable", expected="variable of parameters of an FMU alone", got=self.kind,
+                remedy="leave variable out: functions and programs get their parameters by name",
+            )  # fmt: skip
         if not self.inputs and not self.parameters:
             raise FieldError(
                 "nothing of the reference can be varied", expected="an input or a parameter", got="neither",
@@ -168,6 +177,11 @@ class ReferenceConfig(_Strict):
     def kind(self) -> str:
         """By what it is run: ``fmu``, ``python`` or ``program``."""
         return next(name for name in ("fmu", "python", "program") if getattr(self, name) is not None)
+
+    @property
+    def variables(self) -> dict[str, str]:
+        """The variables of an FMU that parameters set, by the names of these."""
+        return {name: port.variable or name for name, port in self.parameters.items()}
 
     @property
     def begin(self) -> NDArray[np.float64]:

@@ -79,10 +79,18 @@ def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
         "fmu": str(path.resolve()),
         "sample_time": sample_time,
         "inputs": inputs,
-        "parameters": {n: {"unit": _unit(variables[n]), "range": list(r)} for n, r in wish.parameters.items()},
+        "parameters": dict(_parameter(variables[n], r, {*inputs, *outputs}) for n, r in wish.parameters.items()),
         "outputs": {name: {"unit": _unit(variables[name])} for name in outputs},
     }
     return {key: value for key, value in fields.items() if value}, float(duration or 0.0), notes
+
+
+def _parameter(variable: Any, span: tuple[float, float], ports: set[str]) -> tuple[str, dict[str, Any]]:
+    """The name of a parameter, and its fields; of a variable that is an output, it is the start value."""
+    fields: dict[str, Any] = {"unit": _unit(variable), "range": list(span)}
+    if variable.name not in ports:
+        return variable.name, fields
+    return f"{variable.name}_start", {**fields, "variable": variable.name}
 
 
 def _input(variable: Any, wish: Wish, notes: list[str]) -> dict[str, Any]:

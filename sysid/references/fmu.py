@@ -79,7 +79,7 @@ class FmuReference:
         self.config, self.path = config, Path(str(config.fmu))
         self.description = read_fmu(self.path)
         self.variables = {one.name: one for one in self.description.modelVariables}
-        wanted = [*config.inputs, *config.parameters, *config.constants, *config.outputs]
+        wanted = [*config.inputs, *config.variables.values(), *config.constants, *config.outputs]
         missing = [name for name in wanted if name not in self.variables]
         if missing:
             raise ChannelError(missing, list(self.variables), where=self.path)
@@ -120,8 +120,7 @@ class FmuReference:
             found = fmpy.simulate_fmu(
                 self.place.name, model_description=self.description, validate=False, fmi_type=self.interface,
                 start_time=0.0, stop_time=float(ends[-1]), output_interval=h, input=self._signals(inputs, ends),
-                start_values={name: self._start(name, value) for name, value in parameters.items()}, output=names,
-                remote_platform=None,
+                start_values=self._starts(parameters), output=names, remote_platform=None,
             )  # fmt: skip
         except Exception as error:
             raise RunError(f"the FMU failed: {str(error).strip() or type(error).__name__}") from error
@@ -149,6 +148,11 @@ class FmuReference:
     def _type(self, name: str) -> Any:
         kind = str(self.variables[name].type)
         return np.int32 if kind in INTEGERS else TYPES.get(kind, np.float64)
+
+    def _starts(self, parameters: Mapping[str, float]) -> dict[str, float | int | bool]:
+        """Parameters as the variables that they set."""
+        variables = self.config.variables
+        return {variables.get(name, name): self._start(variables.get(name, name), x) for name, x in parameters.items()}
 
     def _start(self, name: str, value: float) -> float | int | bool:
         kind = self._type(name)

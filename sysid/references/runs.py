@@ -204,6 +204,7 @@ class ReferenceRuns:
             64 hexadecimal digits.
         """
         config = self.config
+        renamed = {name: variable for name, variable in config.variables.items() if name != variable}
         return content_key(
             {
                 "reference": [FORMAT, config.kind, self.digest],
@@ -215,6 +216,8 @@ class ReferenceRuns:
                 "sample_time": config.sample_time,
                 "settling": config.settling,
                 "format": config.format if config.kind == "program" else "",
+                # Said only where it matters, so that what was kept before it could be said is found.
+                **({"variables": sorted(renamed.items())} if renamed else {}),
             }
         )
 

@@ -10,6 +10,7 @@ from sysid.estimation import FitResult
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
+from sysid.reporting.linear_view import linear_views
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.residuals import GroupRecord, read_residuals
 from sysid.reporting.results import FitRecord, LinearityRecord, Results
@@ -128,6 +129,8 @@ def _responses(folder: Path, fit: FitRecord) -> list[Part]:
     if stored is None or stored.model.pole_radius is None:
         return []
     model, uncertainty, name = stored.model, stored.uncertainty, identifier(fit.slug)
+    if not linear_views(model, None):  # no input moves it: there is no response to draw
+        return []
     band = "Grey: 95 % of what the covariance of the parameters allows." if uncertainty else "Uncertainty not known."
     return [
         picture(

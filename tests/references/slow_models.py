@@ -24,6 +24,16 @@ def first_order(time: Array, inputs: Array, parameters: Mapping[str, float]) -> 
     return y
 
 
+def released(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """The same, let go from a value that it has not stood at."""
+    a = float(np.exp(-(time[1] - time[0]) / parameters["tau"]))
+    y, at = np.empty(len(time)), parameters["from"]
+    for k, u in enumerate(inputs[:, 0]):
+        at = a * at + (1.0 - a) * u
+        y[k] = at
+    return y
+
+
 def thermal(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A wall of 200 layers, heated on one side and cooled by radiation and convection on the other: stiff.
 

@@ -11,6 +11,7 @@ import pytest
 import sysid
 from sysid.errors import ChannelError, ConfigError
 from sysid.references.config import ReferenceConfig
+from sysid.references.described import Wish, proposed
 from sysid.references.fmu import FmuReference, read_fmu
 from sysid.references.runs import Case, ReferenceRuns
 
@@ -54,6 +55,22 @@ def test_an_fmu_gives_the_outputs_at_the_end_of_each_sample(bundle: Path, versio
     np.testing.assert_allclose(one.trace["y"], y, atol=1e-9)
     assert one.before["y"] == pytest.approx(0.0, abs=1e-9)
     assert one.cpu_s > 0.0
+
+
+def test_a_parameter_may_set_a_variable_of_another_name(bundle: Path, tmp_path: Path) -> None:
+    file, still = next(bundle.rglob("*.fmu")), np.zeros((3, 1))
+    given = {"constants": {}, "parameters": {"from": {"range": [1, 2], "variable": "y_at_rest"}}}
+    config = reference(file, **given)
+    with ReferenceRuns(config=config, folder=tmp_path, workers=1) as runs:
+        (one,) = runs.run([Case(name="a", inputs=still, parameters={"from": 2.0})])
+    assert one.trace is not None
+    np.testing.assert_allclose(one.trace["y"], 2.0 * 0.8 ** np.arange(1, 4), rtol=1e-9)
+    np.testing.assert_array_equal(one.trace["from"], 2.0)
+    wish = Wish(ranges={"u": (0, 1)}, parameters={"y": (1, 2)}, outputs=("y",), sample_time=0.1, duration=1.0)
+    fields, _, _ = proposed(file, wish)
+    assert fields["parameters"] == {"y_start": {"unit": "1", "range": [1, 2], "variable": "y"}}
+    with pytest.raises(ValueError, match="names a variable"):
+        reference(file, fmu=None, python="a:b", **given)
 
 
 def test_ports_and_interfaces_that_are_not_there_are_named(bundle: Path) -> None:

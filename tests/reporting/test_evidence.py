@@ -88,6 +88,13 @@ def test_the_sections_show_what_the_run_stored(run: Path) -> None:
     assert [part.caption.partition(":")[0] for part in response.parts] == ["ARX, ARX [2; 2 2; 1 1]", "ARX", "ARX"]
 
 
+def test_a_linear_model_that_no_input_moves_has_no_frequency_response(run: Path) -> None:
+    _, trace = arx()
+    fit = fit_arx([trace], Mapping.parse("u1+u2 -> y"), ARX(na=1, nb=(0, 0), nk=(1, 1)), rest_output=0.0)
+    (run / "fits" / "arx" / "fit.json").write_text(json.dumps(fit.to_dict()))
+    assert [one.anchor for one in evidence_sections(run, read_results(run))] == ["linearity", "residuals"]
+
+
 @pytest.mark.usefixtures("undrawn")
 def test_they_are_on_the_page_escaped_and_listed(run: Path) -> None:
     page = write_report(run).read_text(encoding="utf-8")

@@ -58,7 +58,10 @@ class Family:
 
 
 def _arx(looked: Looked) -> list[Try]:
-    return [Try(structure=one) for one in looked.orders]
+    m = looked.n_inputs
+    # In motion, one past output is known at the beginning, where that before it is not.
+    shortest = [ARX(na=1, nb=(1,) * m, nk=(looked.delay,) * m)] if looked.in_motion else []
+    return [Try(structure=one) for one in (*shortest, *looked.orders)]
 
 
 def _state_spaces(_: Looked) -> list[Try]:
@@ -79,6 +82,8 @@ def _neural(looked: Looked) -> list[Try]:
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
         for n, k, r in sizes
     ]
+    if looked.in_motion:
+        found = [Try(structure=NeuralStateSpace(states=n, neurons=k)) for n, k in ((1, 4), (2, 0), (3, 0))] + found
     if looked.never_negative:
         signless = NeuralStateSpace(states=3, neurons=4, output="absolute")
         found.append(Try(structure=signless, training={"regularisation": 1e-2}))
@@ -98,8 +103,18 @@ def _around_neural(one: Try, looked: Looked) -> list[Try]:
 
 
 def _narx(looked: Looked) -> list[Try]:
-    delays = f"{looked.delay}:{looked.delay + looked.lags - 1}" if looked.n_inputs else []
-    return [Try(structure=NARX(input_delays=delays, output_delays=looked.lags, neurons=k)) for k in (4, 10)]
+    wanted = [(looked.lags, k) for k in (4, 10)]
+    wanted = [(1, 10), *wanted] if looked.in_motion and looked.lags > 1 else wanted
+    return [
+        Try(
+            structure=NARX(
+                input_delays=f"{looked.delay}:{looked.delay + n - 1}" if looked.n_inputs else [],
+                output_delays=n,
+                neurons=k,
+            )
+        )
+        for n, k in wanted
+    ]
 
 
 def _around_narx(one: Try, _: Looked) -> list[Try]:

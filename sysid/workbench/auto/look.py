@@ -11,7 +11,7 @@ from sysid.advice import Verdict
 from sysid.api.looking import Advice, SystemAdvice, advise
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
-from sysid.models import ARX, AbstractStructure, Mapping, Start
+from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind
 from sysid.reporting.advice_section import lines
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.parts import ends_held_out
@@ -21,6 +21,8 @@ NOISE = 0.02
 """Share of its largest value by which a channel of one sign may be beyond nought."""
 ARX_TRIED = 3
 """Of the shortlist of an order search."""
+MOVED = 0.01
+"""Share of an output's range by which it may move while the inputs have yet to, and still be said to begin at rest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +36,8 @@ class Looked:
         never_negative: Whether no output ever is, so that its sensor may not tell a sign.
         suggested: What ``sysid advise`` suggests.
         cautions: What it asks to be looked at, in words.
+        in_motion: Whether outputs move before any input does though each run begins as if they had stood: then what
+            remembers one sample, or learns where it begins, is tried first.
     """
 
     n_inputs: int
@@ -42,6 +46,7 @@ class Looked:
     never_negative: bool = False
     suggested: tuple[AbstractStructure, ...] = ()
     cautions: tuple[str, ...] = ()
+    in_motion: bool = False
 
     @property
     def lags(self) -> int:
@@ -75,7 +80,32 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(one.structure for one in advice[0].suggestions) if len(advice) == 1 else (),
         cautions=tuple(_cautions(advice)),
+        in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
     )
+
+
+def in_motion(traces: Sequence[Trace], mapping: Mapping) -> dict[str, float]:
+    """Outputs that move before any input does, which those of a system at rest do not.
+
+    Args:
+        traces: The records.
+        mapping: What moves, and what answers.
+
+    Returns:
+        By how much each moves, in its unit, where that is more than :data:`MOVED` of its range.
+    """
+    moved = dict.fromkeys(mapping.outputs, 0.0)
+    for trace in traces:
+        inputs = trace.columns(mapping.inputs)
+        changed = np.flatnonzero((inputs != inputs[:1]).any(axis=1))
+        still = slice(0, int(changed[0]) if len(changed) else len(inputs))
+        moved = {name: max(most, float(np.ptp(trace[name][still]))) for name, most in moved.items()}
+    return {name: by for name, by in moved.items() if by > MOVED * span_of(traces, name)}
+
+
+def span_of(traces: Sequence[Trace], name: str) -> float:
+    """How far a channel moves over all records, in its unit."""
+    return float(max(one[name].max() for one in traces) - min(one[name].min() for one in traces))
 
 
 def _never_negative(traces: Sequence[Trace], name: str) -> bool:

@@ -10,14 +10,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.models import Mapping, Start
 from sysid.references.runs import ReferenceRuns
 from sysid.reporting.judging.results import FOLDER
 from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
-from sysid.traces import Role
+from sysid.traces import Role, Trace
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.look import MOVED, in_motion, span_of
 from sysid.workbench.auto.run import auto_of
 from sysid.workbench.auto.run import program_of as search_program
 from sysid.workbench.experiments.config import ExperimentConfig
@@ -34,8 +36,6 @@ Perform = Callable[[Program[Any], Path], Any]
 """Carries a program out in a folder, and gives its results."""
 SEARCHING = 0.5
 """Share of the time in which a model is looked for."""
-UNEQUAL = 0.01
-"""Share of an output's range by which it may begin at different values before that is told."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +91,7 @@ def make_surrogate(
     place, reference = folder / "experiment", config.reference.at(pipeline.resolve().parent)
     found: Experimented = perform(experiment_program(config, text=text, folder=pipeline.resolve().parent), place)
     mapping = Mapping(inputs=(*reference.inputs, *reference.parameters), outputs=tuple(reference.outputs))
-    notes = [*_uneven(found), *in_motion(found, mapping)]
+    notes = restless(found, mapping)
     for note in notes:  # before an hour is spent
         say(f"note: {note}")
     fields: dict[str, Any] = {
@@ -103,6 +103,7 @@ def make_surrogate(
     search = check(AutoConfig, fields, where=pipeline)
     perform(search_program(auto_of(search, load=lambda: data_of(found.traces, mapping))), folder / "model")
     bundle = read_bundle(folder / "model" / "bundle")
+    notes += beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if notes else []
     count = proof or _affordable(config, reference_runs=ReferenceRuns(config=reference), minutes=minutes)
     shown, section = prove(
         bundle, reference, config.experiment, found.traces, count=count, workers=config.workers,
@@ -126,43 +127,47 @@ def _affordable(config: ExperimentConfig, *, reference_runs: ReferenceRuns, minu
     return int(np.clip(RUNNING * 60.0 * minutes * config.workers / each, 20, 1000))
 
 
-def _uneven(found: Experimented) -> list[str]:
-    """Outputs that do not begin at one value, which a surrogate at rest does."""
-    spans = _spans(found)
-    return [
-        f"{name} begins at values up to {spread:.3g} apart, the surrogate always at {found.before[name]:.6g}: its "
-        "first samples are wrong where the reference begins elsewhere; give settling, or a start at which it is at rest"
-        for name, spread in found.spread.items()
-        if spread > UNEQUAL * spans[name]
-    ]
-
-
-def in_motion(found: Experimented, mapping: Mapping) -> list[str]:
-    """Outputs that move before any input does, which those of a surrogate at rest do not.
+def restless(found: Experimented, mapping: Mapping) -> list[str]:
+    """What of a reference does not begin at rest, in words.
 
     Args:
         found: The experiments.
         mapping: What moves, and what answers.
 
     Returns:
-        A sentence for each.
+        A sentence for each output that moves before any input does, or begins elsewhere from run to run.
     """
-    moved = dict.fromkeys(found.before, 0.0)
-    for trace in found.traces.with_role(Role.ESTIMATION):
-        inputs = trace.columns(mapping.inputs)
-        changed = np.flatnonzero((inputs != inputs[:1]).any(axis=1))
-        still = slice(0, int(changed[0]) if len(changed) else len(inputs))
-        moved = {name: max(most, float(np.ptp(trace[name][still]))) for name, most in moved.items()}
-    spans = _spans(found)
+    traces = found.traces.with_role(Role.ESTIMATION)
+    moving = in_motion(traces, mapping)
+    uneven = {name: by for name, by in found.spread.items() if by > MOVED * span_of(traces, name)}
+    told = [f"{name} moves by up to {by:.3g} while the inputs stand still" for name, by in moving.items()]
+    told += [f"{name} begins at values up to {by:.3g} apart" for name, by in uneven.items()]
     return [
-        f"{name} moves by up to {by:.3g} while the inputs stand still: the reference does not begin at rest, and the "
-        "surrogate does; give settling, or a start at which it is at rest"
-        for name, by in moved.items()
-        if by > UNEQUAL * spans[name]
+        f"{one}: the reference does not begin at rest, and where it begins is learnt with the model" for one in told
     ]
 
 
-def _spans(found: Experimented) -> dict[str, float]:
-    """How far each output moves over all that was fitted."""
-    traces = found.traces.with_role(Role.ESTIMATION)
-    return {name: float(np.ptp(np.concatenate([trace[name] for trace in traces]))) for name in found.before}
+def beginning_of(bundle: Bundle, traces: Sequence[Trace]) -> list[str]:
+    """How near a surrogate begins to where its reference does, on runs that were not fitted.
+
+    Args:
+        bundle: The surrogate.
+        traces: Those runs.
+
+    Returns:
+        A sentence for each output; none without runs.
+    """
+    names = [str(entry["name"]) for entry in bundle.outputs]
+    inputs = [str(entry["name"]) for entry in bundle.inputs]
+    off = [
+        np.abs(np.asarray(bundle.simulate({name: trace[name][:2] for name in inputs})).reshape(2, -1) - measured)[0]
+        for trace in traces
+        for measured in [trace.columns(names)[:2]]
+    ]
+    worst = dict(zip(names, np.max(off, axis=0, initial=0.0), strict=True)) if off else {}
+    shares = {name: 100.0 * float(by) / (span_of(traces, name) or 1.0) for name, by in worst.items()}
+    return [
+        f"at its first sample {name} is at most {share:.2g} % of its range off on {len(off)} runs that were not fitted"
+        + ("; give settling, a start at which it is at rest, or more experiments" if share > 100.0 * MOVED else "")
+        for name, share in shares.items()
+    ]

@@ -9,7 +9,7 @@ import pytest
 
 from sysid.models import Mapping, Start, StartKind
 from sysid.traces import Role, Trace
-from sysid.workbench.auto.look import Looked, look
+from sysid.workbench.auto.look import Looked, in_motion, look
 from tests.workbench.auto.conftest import data, record
 
 MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
@@ -30,6 +30,14 @@ def test_orders_dead_time_and_lags_are_found(looked: Looked) -> None:
     assert looked.delay >= 0
     assert 2 <= looked.lags <= 6
     assert looked.suggested
+
+
+def test_outputs_that_move_before_any_input_does_are_known() -> None:
+    u = np.repeat([0.0, 1.0], [10, 30])[:, np.newaxis]
+    channels = record("a", 40).channels
+    for name, y in (("decays", 5.0 * 0.8 ** np.arange(40)), ("rests", np.minimum(u[:, 0], 0.5))):
+        trace = Trace(name=name, sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
+        assert bool(in_motion([trace], MAPPING)) is (name == "decays")
 
 
 def test_what_asks_to_be_looked_at_is_told_in_words(looked: Looked) -> None:

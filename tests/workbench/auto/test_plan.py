@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -197,3 +198,10 @@ def test_the_median_of_its_errors_is_what_a_point_is_worth() -> None:
     assert error(with_repeats(lucky, [good, lost])) == 1.0
     assert error(with_repeats(lucky, [good])) == 1.0
     assert error(with_repeats(lucky, [lost, lost])) == math.inf
+
+
+def test_what_begins_in_motion_has_first_what_remembers_one_sample_or_learns_where_it_begins() -> None:
+    for in_motion in (False, True):
+        _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, in_motion=in_motion))
+        tried = [point.structure.label for points in rounds[:3] for point in points]
+        assert all((label in tried) is in_motion for label in ("ARX [1; 1; 1]", "NSS 2/0", "NSS 1/4", "NARX 1/1/10"))

@@ -16,7 +16,7 @@ from sysid.references.described import Wish, proposed
 from sysid.references.design import Design, designed
 from sysid.reporting.judging.results import JudgementRecord
 from sysid.workbench.experiments.run import Experimented
-from sysid.workbench.surrogates.make import in_motion
+from sysid.workbench.surrogates.make import beginning_of, restless
 from sysid.workbench.surrogates.plan import pairs
 from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
 
@@ -81,10 +81,32 @@ def test_a_range_that_is_none_is_refused(text: str) -> None:
         pairs([text], "--range")
 
 
-def test_a_reference_that_does_not_begin_at_rest_is_told() -> None:
+def test_what_does_not_begin_at_rest_is_told() -> None:
     u = np.repeat([0.0, 1.0], [10, 30])
     for name, y in (("decays", 5.0 * 0.8 ** np.arange(40)), ("rests", np.minimum(u, 0.5))):
         traces = sysid.data({"u": u, "y": y}, inputs="u", outputs="y", sample_time=0.5)
         found = Experimented(traces=traces, outcomes={}, before={"y": 0.0}, spread={"y": 0.0})
-        told = in_motion(found, Mapping(inputs=("u",), outputs=("y",)))
+        told = restless(found, Mapping(inputs=("u",), outputs=("y",)))
         assert [one.split(" while ")[0] for one in told] == (["y moves by up to 4.33"] if name == "decays" else [])
+
+
+def test_a_surrogate_and_its_fmu_begin_where_the_reference_does_and_follow_its_start_value(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lag that is let go from a value that is varied: its state before the first sample is learnt."""
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
+    reference = {**REFERENCE, "python": "slow_models:released"}
+    reference["parameters"] = {"from": {"unit": "V", "range": [2, 5]}, "tau": {"unit": "s", "range": [4, 4.0001]}}
+    traces = sysid.experiment(reference, DESIGN, workers=1)
+    fit = sysid.fit(
+        traces, "u+from+tau -> y", sysid.NeuralStateSpace(states=1, neurons=0), sysid.Training(starts=1),
+        start=Start(), rest_output=0.0,
+    )  # fmt: skip
+    assert not any("does not begin in equilibrium" in note for note in fit.notes)
+    bundle = sysid.save(fit, traces, tmp_path / "bundle", formats=("fmi2",), start=Start())
+    config, design = ReferenceConfig.model_validate(reference), Design.model_validate(DESIGN)
+    proof, _ = prove(bundle, config, design, traces, count=8, workers=1)
+    assert proof.largest.max() < 1e-3
+    assert proof.dropped is not None
+    assert proof.dropped < 1e-9
+    assert "at its first sample y is at most" in beginning_of(bundle, traces.traces)[0]
