@@ -14,6 +14,7 @@ from sysid.export.cpp_exporter import CppExporter
 from sysid.export.exporter import AbstractExporter
 from sysid.export.fmu_exporter import FmuExporter
 from sysid.export.jax_exporter import JaxExporter
+from sysid.export.matlab_exporter import MatlabExporter
 from sysid.export.onnx_exporter import OnnxExporter
 from sysid.export.torch_export import TorchExportExporter
 from sysid.export.torchscript import TorchScriptExporter
@@ -35,6 +36,7 @@ EXPORTERS: dict[str, AbstractExporter] = {
         CppExporter(),
         ArduinoExporter(),
         WasmExporter(),
+        MatlabExporter(),
     )
 }
 """Every format by name."""

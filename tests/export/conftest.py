@@ -73,11 +73,12 @@ ROWS = {
     "JAX, step": Row(format="jax", name="step.jax"),
     "C++": Row(format="cpp", name="{name}.hpp"),
     "WebAssembly": Row(format="wasm", name="{name}.wasm"),
+    "MATLAB": Row(format="matlab", name="{name}_run.m"),
     "Arduino": Row(format="arduino", name="{name}_arduino.zip", dtype="float32", tolerance=1e-3),
 }
 """Every file of every format: the table of the contract."""
-OPTIONAL = ("wasm",)
-"""Formats whose compiler is large, and is not among what the tests must have."""
+OPTIONAL = ("wasm", "matlab")
+"""Formats whose compiler or judge is large, and is not among what the tests must have."""
 FORMATS = tuple(dict.fromkeys(row.format for row in ROWS.values()))
 
 
@@ -89,11 +90,6 @@ def rows() -> dict[str, Row]:
 @pytest.fixture(params=FORMATS, scope="session")
 def format_name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
-
-
-@pytest.fixture(params=ROWS, scope="session")
-def row(request: pytest.FixtureRequest) -> Row:
-    return ROWS[request.param]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +161,16 @@ FEW_MODELS = (
 )
 WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino", "wasm", "jax")
 """Formats that meet one model of a kind: those around the C source or TorchScript's module, and what compiles long."""
-PAIRS = [(m, r) for m in MODELS for r, row in ROWS.items() if row.format not in WRAPPED or m in FEW_MODELS]
+INTERPRETED = ("matlab",)
+"""Formats that run slowly here, and meet what differs in them: sizes and bounds, every kind of stage."""
+MET = dict.fromkeys(WRAPPED, FEW_MODELS) | dict.fromkeys(INTERPRETED, FEW_MODELS[-1:])
+PAIRS = [(m, r) for m in MODELS for r, row in ROWS.items() if m in MET.get(row.format, MODELS)]
+WIRED = [
+    (c, r)
+    for c in CASCADES
+    for r, row in ROWS.items()
+    if row.format not in INTERPRETED or c == "every kind, limits and levels"
+]
 
 
 @pytest.fixture(params=PAIRS, ids=[" - ".join(pair) for pair in PAIRS], scope="session")
@@ -241,10 +246,11 @@ def cascade() -> Surrogate:
     return Surrogate.of(build_cascade(), {"STP": (0.0, 80.0)})
 
 
-@pytest.fixture(params=CASCADES, scope="session")
-def any_cascade(request: pytest.FixtureRequest) -> Surrogate:
-    build, outputs = CASCADES[request.param]
-    return Surrogate.of(build(), {"STP": (0.0, 80.0)}, outputs=outputs)
+@pytest.fixture(params=WIRED, ids=[" - ".join(pair) for pair in WIRED], scope="session")
+def wired(request: pytest.FixtureRequest) -> tuple[Surrogate, Row]:
+    name, row = request.param
+    build, outputs = CASCADES[name]
+    return Surrogate.of(build(), {"STP": (0.0, 80.0)}, outputs=outputs), ROWS[row]
 
 
 @pytest.fixture(scope="session")

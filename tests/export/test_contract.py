@@ -135,8 +135,8 @@ def test_no_input_brings_it_down_and_a_bounded_output_stays_bounded(exported, in
         assert (run.flags[5:8] & Flag.OUTSIDE_RANGE).all()
 
 
-def test_models_wired_run_as_one(any_cascade, row, opened, inputs, tmp_path):
-    surrogate = any_cascade
+def test_models_wired_run_as_one(wired, opened, inputs, tmp_path):
+    surrogate, row = wired
     exported = opened(row, surrogate, tmp_path)
     u = np.stack([inputs(200, len(surrogate.inputs), seed=i) for i in range(3)], axis=1)
     states = np.stack([surrogate.at_rest(u[0, i]) for i in range(3)])

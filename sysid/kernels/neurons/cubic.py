@@ -56,4 +56,5 @@ CUBIC = Neuron(
     onnx=_onnx,
     torch=_torch,
     jax=lambda: lambda x: x * x * x,  # what a power's derivative is at 0 depends on the library
+    matlab="x .* x .* x",
 )

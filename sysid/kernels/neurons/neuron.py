@@ -40,6 +40,7 @@ class Neuron:
         onnx: Adds the function's nodes to a graph, from the name of the sums and the name of what comes out.
         torch: Makes a torch module of the function that can be scripted.
         jax: Gives the function in ``jax.numpy``, elementwise.
+        matlab: The function as a MATLAB expression of ``x``, elementwise.
     """
 
     name: str
@@ -50,3 +51,4 @@ class Neuron:
     onnx: Callable[[Graph, str, str], str]
     torch: Callable[[], Any]
     jax: Callable[[], Callable[[Any], Any]]
+    matlab: str

@@ -55,4 +55,5 @@ TANH = Neuron(
     onnx=_onnx,
     torch=_torch,
     jax=_jax,
+    matlab="tanh(x)",
 )
