@@ -101,8 +101,9 @@ def test_an_example_of_a_task_runs(
 
 
 def test_the_example_of_linear_models_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    ((name, block),) = blocks_of("linear-models.md")
-    exec(compile(block, name, "exec"), {})  # noqa: S102 - our own page
+    names: dict[str, object] = {}
+    for name, block in blocks_of("linear-models.md"):
+        exec(compile(block, name, "exec"), names)  # noqa: S102 - our own page
     told = capsys.readouterr().out.splitlines()
     assert [line.split("  ")[0] for line in told[1:3]] == ["SS 3", "BJ [2; 1; 1; 2; 1]"]
     assert all(float(line.split()[-1]) > 80.0 for line in told[1:3])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -145,6 +146,31 @@ class Innovations:
             C=np.pad(self.C, beside),
             K=np.pad(self.K, below),
         )
+
+    def behind(self, shifts: Sequence[int]) -> Innovations:
+        """The same system with inputs that come later, by states that hand them on from sample to sample.
+
+        Args:
+            shifts: By how many samples each input is late.
+
+        Returns:
+            The system; its own states stand first.
+        """
+        n, at = self.n_state, self.n_state
+        if not any(shifts):
+            return self
+        system = self.padded(n + sum(shifts))
+        A, B, C, D = (part.copy() for part in (system.A, system.B, system.C, system.D))
+        for j, k in enumerate(shifts):
+            if not k:
+                continue
+            last = at + k - 1
+            A[at + 1 : at + k, at:last] = np.eye(k - 1)
+            A[:n, last], C[:, last] = self.B[:, j], self.D[:, j]
+            B[:, j], D[:, j] = 0.0, 0.0
+            B[at, j] = 1.0
+            at += k
+        return replace(system, A=A, B=B, C=C, D=D)
 
     def in_coordinates(self, T: Array, back: Array) -> Innovations:
         """The same system with the state ``T x``, where ``back`` is the inverse of ``T``."""

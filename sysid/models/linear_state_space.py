@@ -6,7 +6,7 @@ from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from dataclasses import fields as dataclass_fields
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractStructure, SeveralOutputs
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
-from sysid.models.lags import whole
+from sysid.models.lags import MOST, per_input, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
@@ -25,6 +25,8 @@ from sysid.models.to_control import Matrices, in_powers_of_z, state_space, trans
 
 MOST_STATES = 100
 """A subspace method compresses matrices of some times as many columns."""
+AUTO: Final = "auto"
+"""Dead times that are searched."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,21 +40,25 @@ class LinearStateSpace(AbstractStructure):
         noise: Whether the noise is modelled (``K``): one step ahead is then a Kalman filter's prediction. Without it
             noise is added to the output, and the free run is what is fitted.
         intercept: Fit a constant output.
+        nk: Dead time of each input in samples: the first lag at which it acts, as of ARX, not among the states. Without
+            any it is the shortest that there is, 1, or 0 with ``feedthrough``; ``"auto"`` searches for it.
 
     Raises:
-        ConfigError: If the number of states cannot be used.
+        ConfigError: If the number of states or a dead time cannot be used.
 
     Example:
-        >>> LinearStateSpace(states=4).label
-        'SS 4'
+        >>> LinearStateSpace(states=4).label, LinearStateSpace(states=2, nk=(5,)).label
+        ('SS 4', 'SS 2 nk 5')
     """
 
     states: Annotated[int, IntRange(low=1, high=10)]
     feedthrough: bool = False
     noise: bool = True
     intercept: bool = True
+    nk: tuple[int, ...] | Literal["auto"] = ()
 
     kind = "SS"
+    per_input = ("nk",)
 
     def __post_init__(self) -> None:
         if not whole(self.states) or not 1 <= self.states <= MOST_STATES:
@@ -63,12 +69,49 @@ class LinearStateSpace(AbstractStructure):
                 got=shortened(self.states),
                 remedy=f"write for example {{kind: {self.kind}, states: 4}}",
             )
+        if self.nk == AUTO:
+            return
+        object.__setattr__(self, "nk", per_input(self.nk))
+        if not all(whole(k) and self.shortest <= k <= MOST for k in self.nk):
+            direct = " (0 with feedthrough: true)" * (not self.feedthrough)
+            raise ConfigError(
+                "not the dead times of a state space",
+                where="nk",
+                expected=f"for each input a whole number of samples from {self.shortest}{direct} to {MOST:,}, or "
+                f"{AUTO} to search for them",
+                got=shortened(self.nk),
+                remedy=f"write for example {{kind: {self.kind}, states: 4, nk: [3]}}, or nk: {AUTO}",
+            )
 
     @property
     def label(self) -> str:
         """The states, and what is not the default."""
         words = ["direct"] * self.feedthrough + ["without noise model"] * (not self.noise)
-        return " ".join([self.kind, str(self.states), *words])
+        dead = ["nk", *("?" if self.nk == AUTO else map(str, self.nk))] if self.nk else []
+        return " ".join([self.kind, str(self.states), *words, *dead])
+
+    @property
+    def shortest(self) -> int:
+        """The dead time in samples of states that nothing stands before."""
+        return 0 if self.feedthrough else 1
+
+    def shifts(self, n_inputs: int) -> tuple[int, ...]:
+        """By how many samples each input comes later than states without a dead time have it.
+
+        Args:
+            n_inputs: Inputs.
+
+        Returns:
+            One number for each input; zeros where the dead times are yet to be found.
+        """
+        if self.nk == AUTO or not self.nk:
+            return (0,) * n_inputs
+        return tuple(int(k) - self.shortest for k in self.nk)
+
+    def check_inputs(self, n_inputs: int) -> None:
+        """Refuse dead times that are not one for each input; see the base class."""
+        if self.nk and self.nk != AUTO:
+            super().check_inputs(n_inputs)
 
     def for_outputs(self, n_outputs: int) -> LinearStateSpace:
         """One state space for all outputs, where there are several: what each says of the states is used for all."""
@@ -78,7 +121,8 @@ class LinearStateSpace(AbstractStructure):
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
-        return {"kind": self.kind, **{name: getattr(self, name) for name in self.__dataclass_fields__}}
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return {"kind": self.kind, **fields, "nk": self.nk if self.nk == AUTO else list(self.nk)}
 
     def n_parameters(self, n_inputs: int, n_outputs: int = 1) -> int:
         """Parameters that tell systems apart: entries of all matrices less those of a change of coordinates.
@@ -105,7 +149,7 @@ class LinearStateSpaceModel(InnovationModel):
 
     Args:
         orders: The structure.
-        system: The matrices, in scaled numbers.
+        system: The matrices, in scaled numbers, of inputs that come their dead times late.
         scaling: Between units and scaled numbers.
         mapping: Which channels go in, which comes out.
         sample_time: Seconds.
@@ -136,7 +180,12 @@ class LinearStateSpaceModel(InnovationModel):
     @cached_property
     def recursion(self) -> StateSpace:
         """The form that is run."""
-        return StateSpace.of(self.system, self.scaling, noise=self.orders.noise)
+        return StateSpace.of(self.lowered, self.scaling, noise=self.orders.noise)
+
+    @cached_property
+    def lowered(self) -> Innovations:
+        """The system with the dead times among its states."""
+        return self.system.behind(self.orders.shifts(len(self.mapping.inputs)))
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -161,9 +210,10 @@ class LinearStateSpaceModel(InnovationModel):
         """From one input to the output, in ``1/z``; all inputs share the denominator."""
         F, numerators, _ = polynomials(self.system)
         gain = self.scaling.output_scale / self.scaling.input_scale[j]
-        first = 0 if self.orders.feedthrough else 1
+        first = self.orders.shortest
+        late = self.orders.shifts(len(self.mapping.inputs))[j]
         return Ratio(
-            B=gain * numerators[0, j, first:], F=F, delay=first, discrete=True,
+            B=gain * numerators[0, j, first:], F=F, delay=first + late, discrete=True,
             of_numerator=f"B({self.mapping.inputs[j]}, ", of_denominator="F(",
         )  # fmt: skip
 
@@ -175,19 +225,21 @@ class LinearStateSpaceModel(InnovationModel):
         """
         F, numerators, _ = polynomials(self.system)
         gains = self.scaling.output_scale / np.array(self.scaling.input_scale)
-        ratios = [in_powers_of_z(gain * row, F) for gain, row in zip(gains, numerators[0], strict=True)]
+        late = self.orders.shifts(len(gains))
+        rows = [np.concatenate([np.zeros(k), row]) for k, row in zip(late, numerators[0], strict=True)]
+        ratios = [in_powers_of_z(gain * row, F) for gain, row in zip(gains, rows, strict=True)]
         return transfer_function(ratios, self.mapping, self.sample_time)
 
     @property
     def matrices(self) -> Matrices:
         """The state space in the channels' units."""
         gain, scale = self.scaling.output_scale, np.array(self.scaling.input_scale)
-        return self.system.A, self.system.B / scale, gain * self.system.C, gain * self.system.D / scale
+        return self.lowered.A, self.lowered.B / scale, gain * self.lowered.C, gain * self.lowered.D / scale
 
     @property
     def kalman_gain(self) -> NDArray[np.float64]:
         """``K`` from the innovation in the output's unit, for the state of :attr:`matrices`; shape ``(states, 1)``."""
-        return np.asarray(self.system.K / self.scaling.output_scale)
+        return np.asarray(self.lowered.K / self.scaling.output_scale)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""
@@ -237,7 +289,7 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
 
     Args:
         orders: The structure.
-        system: The matrices, in scaled numbers.
+        system: The matrices, in scaled numbers, of inputs that come their dead times late.
         scaling: Between units and scaled numbers.
         mapping: Which channels go in, which come out.
         sample_time: Seconds.
@@ -268,7 +320,12 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
     @cached_property
     def recursion(self) -> StateSpace:
         """The form that is run."""
-        return StateSpace.of(self.system, self.scaling, noise=self.orders.noise)
+        return StateSpace.of(self.lowered, self.scaling, noise=self.orders.noise)
+
+    @cached_property
+    def lowered(self) -> Innovations:
+        """The system with the dead times among its states."""
+        return self.system.behind(self.orders.shifts(len(self.mapping.inputs)))
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -293,11 +350,11 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
     def ratios(self) -> dict[tuple[int, int], Ratio]:
         """From each input to each output, in ``1/z``; all share the denominator."""
         F, numerators, _ = polynomials(self.system)
-        first = 0 if self.orders.feedthrough else 1
+        first, late = self.orders.shortest, self.orders.shifts(len(self.mapping.inputs))
         gains = np.array(self.scaling.output_scale)[:, np.newaxis] / np.array(self.scaling.input_scale)
         return {
             (o, j): Ratio(
-                B=gains[o, j] * numerators[o, j, first:], F=F, delay=first, discrete=True,
+                B=gains[o, j] * numerators[o, j, first:], F=F, delay=first + late[j], discrete=True,
                 of_numerator=f"B({output}, {name}, ", of_denominator="F(",
             )
             for o, output in enumerate(self.mapping.outputs)
@@ -312,12 +369,12 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
     def matrices(self) -> Matrices:
         """The state space in the channels' units."""
         gain, scale = np.array(self.scaling.output_scale)[:, np.newaxis], np.array(self.scaling.input_scale)
-        return self.system.A, self.system.B / scale, gain * self.system.C, gain * self.system.D / scale
+        return self.lowered.A, self.lowered.B / scale, gain * self.lowered.C, gain * self.lowered.D / scale
 
     @property
     def kalman_gain(self) -> NDArray[np.float64]:
         """``K`` from innovations in the outputs' units, for the state of :attr:`matrices`."""
-        return np.asarray(self.system.K / np.array(self.scaling.output_scale))
+        return np.asarray(self.lowered.K / np.array(self.scaling.output_scale))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""

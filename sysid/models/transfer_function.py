@@ -37,8 +37,8 @@ class TransferFunction(AbstractStructure):
     Args:
         poles: Number of poles.
         zeros: Number of zeros, at most that of the poles.
-        delays: Dead time in samples; ``None`` to search for it. A discrete transfer function without dead time reacts
-            to its input at once, and one that is sampled from a plant has a dead time of at least 1.
+        delays: Dead time in samples; ``None``, or ``"auto"``, to search for it. A discrete transfer function without
+            dead time reacts to its input at once, and one that is sampled from a plant has a dead time of at least 1.
         domain: ``discrete``: ``B(1/q) / F(1/q)``, where ``zeros`` is the degree of ``B``; or ``continuous``:
             ``B(s) / F(s)``, its input held between samples.
         intercept: Fit a constant output beside them.
@@ -63,11 +63,12 @@ class TransferFunction(AbstractStructure):
     def __post_init__(self) -> None:
         object.__setattr__(self, "poles", per_input(self.poles))
         object.__setattr__(self, "zeros", per_input(self.zeros))
-        object.__setattr__(self, "delays", None if self.delays is None else per_input(self.delays))
+        delays: object = self.delays
+        object.__setattr__(self, "delays", None if delays is None or delays == "auto" else per_input(delays))
         object.__setattr__(self, "domain", _domain(self.domain))
-        delays = self.delays or (0,) * len(self.poles)
-        same = len(self.poles) == len(self.zeros) == len(delays)
-        numbers = all(map(whole, (*self.poles, *self.zeros, *delays)))
+        known = self.delays or (0,) * len(self.poles)
+        same = len(self.poles) == len(self.zeros) == len(known)
+        numbers = all(map(whole, (*self.poles, *self.zeros, *known)))
         if not numbers or not same or not self.poles or not all(map(_proper, self.poles, self.zeros)):
             raise ConfigError(
                 "not the orders of a transfer function",

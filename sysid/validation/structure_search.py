@@ -21,7 +21,7 @@ ARX_KIND = "ARX"
 Dead = tuple[int, ...]
 
 KINDS: dict[str, Callable[[int, Dead], AbstractStructure]] = {
-    "SS": lambda n, _: LinearStateSpace(states=n),
+    "SS": lambda n, nk: LinearStateSpace(states=n, feedthrough=0 in nk, nk=nk),
     "TF": lambda n, nk: TransferFunction(poles=(n,) * len(nk), zeros=(n - 1,) * len(nk), delays=nk),
     "OE": lambda n, nk: OE(nb=(n,) * len(nk), nf=(n,) * len(nk), nk=nk),
     "ARMAX": lambda n, nk: ARMAX(na=n, nb=(n,) * len(nk), nc=n, nk=nk),
@@ -91,7 +91,7 @@ def run_structures(
         traces: Estimation traces.
         mapping: Which channels go in, which comes out.
         cases: What chooses.
-        dead_times: Of each input, in samples: those of the ARX model that was found. A state space has none.
+        dead_times: Of each input, in samples: those of the ARX model that was found.
         start: How each free run begins.
         most: The largest order.
 

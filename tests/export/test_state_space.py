@@ -125,7 +125,7 @@ def build_vector() -> VectorStateSpaceModel:
         input_offset=(45.0, 70.0), input_scale=(45.0, 20.0), output_offset=(38.0, 1.0), output_scale=(40.0, 0.5)
     )
     return VectorStateSpaceModel(
-        orders=VectorStateSpace(states=3, feedthrough=True), system=system, scaling=scaling,
+        orders=VectorStateSpace(states=3, feedthrough=True, nk=(3, 0)), system=system, scaling=scaling,
         mapping=Mapping.parse("BP+AR -> BC+ER"), sample_time=0.1, input_units=model.input_units,
         output_units=("psi", "bar"), rest_outputs=(5.0, 0.9),
     )  # fmt: skip

@@ -64,7 +64,9 @@ FITS = [
     pytest.param(ARX | {"intercept": False, "na": 4}, None, ALONE, id="ARX of another order"),
     pytest.param(TF, {"seed": 7, "scattered_starts": 1}, ALONE, id="TransferFunction"),
     pytest.param(SS, None, ALONE, id="SS"),
-    pytest.param(SS | {"noise": False}, {"method": "subspace", "weighting": "CVA"}, ALONE, id="SS by CVA"),
+    pytest.param(
+        SS | {"noise": False, "nk": "auto"}, {"method": "subspace", "weighting": "CVA"}, ALONE, id="SS by CVA, nk auto"
+    ),
     pytest.param(OE, None, ALONE, id="OE"),
     pytest.param(BJ, {"max_iterations": 3}, ALONE, id="BJ"),
     pytest.param(ARMAX, None, ALONE, id="ARMAX"),

@@ -30,6 +30,7 @@ def searched_delays(
         The dead times, and what is to be said of the search.
     """
     m = len(places)
+    places = [[min(max(place, least), most) for place in of] for of in places]
     few = range(least, min(FEW, most) + 1)
     known: dict[tuple[int, ...], float] = {}
     reach = [min(most, max(FEW, *(place for of in places for place in of)) + 2 * AROUND)]

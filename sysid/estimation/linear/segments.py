@@ -42,6 +42,28 @@ class Segment:
             self, inputs=self.inputs[at], outputs=self.outputs[at], root_weights=self.root_weights[at]
         )  # fmt: skip
 
+    def delayed(self, shifts: Sequence[int], *, unknown: int, masked: bool) -> Segment:
+        """The piece with inputs that come later; see :func:`delayed_inputs`.
+
+        Args:
+            shifts: By how many samples each input is late.
+            unknown: First samples that are left out where nothing is known of what came before: those whose input
+                stood there.
+            masked: Whether a sample whose input was masked counts no more than that input.
+
+        Returns:
+            The piece, without samples where it is no longer than that.
+        """
+        if not any(shifts) and not unknown:
+            return self
+        held = self.inputs[0] if self.rest is None else self.rest[0]
+        roots, at = self.root_weights, slice(unknown if self.rest is None else 0, None)
+        for k in set(shifts) if masked else ():
+            seen = np.concatenate([np.ones(min(k, len(roots))), roots[: max(len(roots) - k, 0)]]) > 0.0
+            roots = np.where(seen, roots, 0.0)
+        late = delayed_inputs(self.inputs, held, shifts)
+        return replace(self, inputs=late[at], outputs=self.outputs[at], root_weights=roots[at])
+
     @property
     def whole(self) -> bool:
         """Whether every sample counts."""
@@ -62,6 +84,26 @@ class Segment:
             )
             found.append(piece)
         return found
+
+
+def delayed_inputs(inputs: Array, held: Array, shifts: Sequence[int]) -> Array:
+    """Inputs that come later.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``.
+        held: What each had always been before, shape ``(n_inputs,)``.
+        shifts: By how many samples each is late.
+
+    Returns:
+        Shape ``(n_samples, n_inputs)``.
+
+    Example:
+        >>> delayed_inputs(np.array([[1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]), np.array([0.0, 9.0]), (0, 2)).T.tolist()
+        [[1.0, 2.0, 3.0], [9.0, 9.0, 1.0]]
+    """
+    n = len(inputs)
+    columns = [np.concatenate([np.full(min(k, n), held[j]), inputs[: max(n - k, 0), j]]) for j, k in enumerate(shifts)]
+    return np.column_stack(columns) if columns else inputs
 
 
 def scaling_of(experiments: Sequence[Experiment], *, constant: bool) -> Scaling:

@@ -18,7 +18,7 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.records import TimeRecord
-from sysid.estimation.linear.segments import scaling_of
+from sysid.estimation.linear.segments import delayed_inputs, scaling_of
 from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_search import AbstractProblem
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
@@ -219,13 +219,9 @@ class _Problem(AbstractProblem):
             output = np.concatenate([experiment.history.output, output])
             weights = np.concatenate([experiment.past_weights, weights])
         scaled, held = self.scaling.scale_inputs(inputs), self.scaling.scale_inputs(past[np.newaxis])[0]
-        columns = [
-            np.concatenate([np.full(min(k, len(scaled)), held[j]), scaled[: max(len(scaled) - k, 0), j]])
-            for j, k in enumerate(delays)
-        ]
         rows = slice(unknown if experiment.free else 0, None)
         return TimeRecord(
-            inputs=np.asfortranarray(np.column_stack(columns)[rows]),
+            inputs=np.asfortranarray(delayed_inputs(scaled, held, delays)[rows]),
             # From a state that is fitted any past can be reached, and zero is one that every system has.
             past=np.zeros(len(held)) if experiment.free else held,
             target=self.scaling.scale_output(output)[rows],

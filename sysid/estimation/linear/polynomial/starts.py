@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import UserError
-from sysid.estimation.linear.segments import Segment
+from sysid.estimation.linear.segments import Segment, delayed_inputs
 from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
 from sysid.estimation.linear.subspace.projections import arx_orders, regress
 from sysid.estimation.linear.subspace.windows import Windows
@@ -94,10 +94,7 @@ class LongARX:
         # Without D a state space has as many coefficients above as states, the first of them at a lag of one sample.
         direct = min(orders.nk) == 0 or max(orders.nb) > states
         dead = [nk - (not direct) for nk in orders.nk]
-        late = [
-            replace(p, inputs=np.column_stack([_back(u, k) for u, k in zip(p.inputs.T, dead, strict=True)]))
-            for p in pieces
-        ]
+        late = [replace(p, inputs=delayed_inputs(p.inputs, np.zeros(len(dead)), dead)) for p in pieces]
         asked = LinearStateSpace(states=states, feedthrough=direct, noise=False)
         try:
             system = search(late, asked, StateSpaceTraining(max_iterations=STEPS)).system

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from sysid.errors import TraceError
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, side_by_side
+from sysid.estimation.linear.state_space.dead_times import behind_dead_times, late
 from sysid.estimation.linear.state_space.search import METHODS, Found, StateSpaceTraining, around, search
 from sysid.estimation.linear.state_space.uncertainty import coordinates_root, state_space_uncertainty
 from sysid.estimation.result import FitResult, Loop
@@ -43,7 +46,7 @@ def fit_state_space(
     Args:
         traces: Estimation traces; never concatenated, each with an initial state of its own.
         mapping: Which channels go in, which comes out.
-        orders: The structure.
+        orders: The structure; dead times that it leaves open (``nk="auto"``) are searched, and told.
         training: How to fit.
         start: What stands before each trace; at rest by default.
         rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
@@ -59,6 +62,7 @@ def fit_state_space(
     began, training = time.perf_counter(), training or StateSpaceTraining()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     (scaling,), segments = records_of(traces, mapping, orders, start=start, rests=(rest,))
+    orders, segments, told = behind_dead_times(segments, orders, training)
     found = search(segments, orders, training)
     model = LinearStateSpaceModel(
         orders=orders,
@@ -71,7 +75,7 @@ def fit_state_space(
         rest_output=rest,
     )
     unit = float(found.covariance[0, 0]) * scaling.output_scale**2 / max(found.curve[-1].mse, _TINY)
-    return _result(model, found, orders, training, began=began, unit=unit)
+    return _result(model, replace(found, notes=(*told, *found.notes)), orders, training, began=began, unit=unit)
 
 
 def fit_vector_state_space(
@@ -104,6 +108,8 @@ def fit_vector_state_space(
     began, training, given = time.perf_counter(), training or StateSpaceTraining(), rest_output or {}
     rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
     scalings, segments = records_of(traces, mapping, orders, start=start, rests=rests)
+    known, segments, told = behind_dead_times(segments, orders, training)
+    orders = cast("VectorStateSpace", known)
     found = search(segments, orders, training)
     model = VectorStateSpaceModel(
         orders=orders,
@@ -115,7 +121,7 @@ def fit_vector_state_space(
         output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
         rest_outputs=rests,
     )
-    return _result(model, found, orders, training, began=began, unit=1.0)
+    return _result(model, replace(found, notes=(*told, *found.notes)), orders, training, began=began, unit=1.0)
 
 
 _TINY = 1e-300
@@ -129,7 +135,7 @@ def records_of(
     start: Start | None,
     rests: tuple[float, ...],
 ) -> tuple[list[Scaling], tuple[Segment, ...]]:
-    """The scaling of each output, and the records in scaled numbers.
+    """The scaling of each output, and the records in scaled numbers, before any dead time.
 
     Args:
         traces: Estimation traces.
@@ -174,7 +180,7 @@ def matrices_root(
     """
     rests = tuple(float(rest) for rest in model.ends.rest_outputs)
     _, segments = records_of(traces, model.mapping, model.orders, start=start, rests=rests)
-    found = around(model.system, segments, model.orders)
+    found = around(model.system, late(segments, model.orders), model.orders)
     return np.asarray(found.chart.basis @ coordinates_root(found))
 
 

@@ -44,6 +44,8 @@ NESTED = 200_000
 """Samples times squared states up to which systems of fewer states are fitted first."""
 POLES, LITTLE, CLEARLY = (0.0, 0.5, 0.9, 0.97, -0.5), 0.1, 1e-6
 """Poles that a further state may begin with, how strongly it is driven and read, and a gain that is one."""
+QUICK = 4
+"""Steps after which dead times are compared, from one subspace estimate: that which feedback does not bias."""
 CHARTS = 6
 """Charts that are laid at most."""
 
@@ -61,6 +63,8 @@ class StateSpaceTraining:
         stable: Keep all poles inside the unit circle; ``None`` does so where the noise is not modelled, since the free
             run of an unstable plant is then lost.
         max_iterations: Steps of the prediction-error method.
+        max_delay: Largest dead time that is tried where the structure leaves it open, in samples; by default a third of
+            the longest record.
         max_time_s: Wall time in seconds.
         seed: Nothing is random; here so that all training has one.
 
@@ -73,6 +77,7 @@ class StateSpaceTraining:
     horizon: int | None = None
     stable: bool | None = None
     max_iterations: int = 100
+    max_delay: int | None = None
     max_time_s: float = float("inf")
     seed: int = 0
 
@@ -86,7 +91,7 @@ class StateSpaceTraining:
                     got=getattr(self, name),
                     remedy=f"write for example {name}: {choices[0]}",
                 )
-        for name, least in (("max_iterations", 0), ("horizon", 2)):
+        for name, least in (("max_iterations", 0), ("horizon", 2), ("max_delay", 0)):
             value = getattr(self, name)
             if value is not None and value < least:
                 raise ConfigError(
@@ -165,6 +170,31 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         errors = None if orders.noise else problem.around_errors(found.system)
     told = slow_poles.notes(found.system.radius, problem.lengths, errors)
     return replace(found, singular_values=subspace.singular_values(), notes=told)
+
+
+def quick_size(segments: Sequence[Segment], orders: LinearStateSpace, training: StateSpaceTraining) -> float:
+    """How large the errors are after a few steps, to compare dead times by.
+
+    Args:
+        segments: The records, in scaled numbers.
+        orders: The structure.
+        training: How.
+
+    Returns:
+        The logarithm of the determinant of their covariance.
+
+    Raises:
+        TraceError: If no record is long enough.
+        FitDivergedError: If no start gives a finite prediction.
+    """
+    subspace = Subspace.of(
+        segments, states=orders.states, horizon=training.horizon, feedthrough=orders.feedthrough, noise=orders.noise
+    )
+    stable = not orders.noise if training.stable is None else training.stable
+    problem = _Problem(segments=_whole(segments, orders), orders=orders, stable=stable)
+    weighting = Weighting.SSARX.value if training.weighting == BEST else training.weighting
+    system, _ = problem.start(subspace, weighting)
+    return _size(problem.refined(system, QUICK, np.inf).covariance)
 
 
 def around(system: Innovations, segments: Sequence[Segment], orders: LinearStateSpace) -> Found:

@@ -83,7 +83,7 @@ def state_space_uncertainty(model: LinearStateSpaceModel | VectorStateSpaceModel
     scale, offset = np.atleast_1d(scaling.output_scale), np.atleast_1d(scaling.output_offset)
     gains = scale[:, np.newaxis] / np.array(scaling.input_scale)
     across = scale[:, np.newaxis] / scale
-    first, n = (0 if orders.feedthrough else 1), orders.states
+    first, n, late = orders.shortest, orders.states, orders.shifts(len(gains[0]))
 
     def coefficients(system: Innovations) -> NDArray[np.complex128]:
         F, numerators, noise = polynomials(system)
@@ -92,7 +92,8 @@ def state_space_uncertainty(model: LinearStateSpaceModel | VectorStateSpaceModel
         return np.concatenate([*parts, *[scale * system.constant] * orders.intercept])
 
     of = [""] if p == 1 else [f"{name}, " for name in outputs]
-    names = [f"B({o}{u}, {lag})" for o in of for u in model.mapping.inputs for lag in range(first, n + 1)]
+    lags = {u: range(first + k, n + 1 + k) for u, k in zip(model.mapping.inputs, late, strict=True)}
+    names = [f"B({o}{u}, {lag})" for o in of for u, at in lags.items() for lag in at]
     names += [f"F({lag})" for lag in range(1, n + 1)]
     names += [f"C({o}{e}{lag})" for o in of for e in of for lag in range(1, n + 1)] * orders.noise
     names += (["constant"] if p == 1 else [f"constant({name})" for name in outputs]) * orders.intercept
