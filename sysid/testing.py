@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.equations import RUNGE_KUTTA, implicit
 from sysid.equations.syntax import Call, Delayed, Name, Node, Number, Operation
 from sysid.kernels.neurons import NEURONS
 from sysid.models import Cascade, Ends, GreyBoxModel, History, Limit, Member, NeuralForm, Recursion
@@ -240,17 +241,17 @@ class EquationTwin:
             found.append([now[name] for name in model.mapping.outputs])
             later = {name: self._of(right[name], now) for name in system.discrete}
             remembered = dict(self.remembered)
-            moving = dict(states)
-            for _ in range(steps):
-                k: list[dict[str, complex]] = []
-                for ahead in (0.0, h / 2.0, h / 2.0, h):
-                    at = moving | {n: moving[n] + ahead * k[-1][n] for n in system.continuous if k}
-                    here = self._all(at)
-                    k.append({n: self._of(right[n], here) for n in system.continuous})
-                for n in system.continuous:
-                    moving[n] += h / 6.0 * (k[0][n] + 2.0 * k[1][n] + 2.0 * k[2][n] + k[3][n])
+            moving = np.array([states[n] for n in system.continuous], dtype=np.complex128)
+
+            def rates(x: NDArray[np.complex128], held: Dict[str, complex] = states) -> NDArray[np.complex128]:
+                here = self._all({**held, **dict(zip(system.continuous, x, strict=True))})
+                return np.array([self._of(right[n], here) for n in system.continuous], dtype=np.complex128)
+
+            for _ in range(steps if system.continuous else 0):
+                moving = moving + h * (_explicit if model.solver == RUNGE_KUTTA else _implicit)(rates, moving, h)
             self.past.append(now)
-            states, self.memory = moving | later, remembered
+            states = dict(zip(system.continuous, moving, strict=True)) | later
+            self.memory = remembered
         return np.array(found)
 
     def _all(self, states: Dict[str, complex]) -> dict[str, complex]:
@@ -323,6 +324,33 @@ class EquationTwin:
 
 
 _REMEMBERING = ("relay", "latch", "hold")
+
+_Rates = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+
+
+def _explicit(rates: _Rates, x: NDArray[np.complex128], h: float) -> NDArray[np.complex128]:
+    """The mean slope over a step of the classical Runge-Kutta method."""
+    first = rates(x)
+    second = rates(x + h / 2.0 * first)
+    third = rates(x + h / 2.0 * second)
+    return (first + 2.0 * second + 2.0 * third + rates(x + h * third)) / 6.0
+
+
+def _implicit(rates: _Rates, x: NDArray[np.complex128], h: float) -> NDArray[np.complex128]:
+    """The mean slope over a Rosenbrock step as its authors write it: ``k_i = f(x + h a k) + h J (gamma k)``."""
+    weights, apart = (1 / 280, -4 / 105, 1 / 5, -4 / 5), 0.01  # central differences of order 8
+    J = np.zeros((len(x), len(x)), dtype=np.complex128)
+    for j in range(len(x)):
+        for reach, weight in zip((4, 3, 2, 1), weights, strict=True):
+            away = reach * apart * np.eye(len(x))[j]
+            J[:, j] += weight * (rates(x - away) - rates(x + away)) / apart
+    k: list[NDArray[np.complex128]] = []
+    for i in range(4):
+        ahead = sum((implicit.ALPHAS[i, j] * k[j] for j in range(i)), np.zeros_like(x))
+        coupled = sum((implicit.GAMMAS[i, j] * k[j] for j in range(i)), np.zeros_like(x))
+        right = rates(x + h * ahead) + h * J @ coupled
+        k.append(np.asarray(np.linalg.solve(np.eye(len(x)) - h * implicit.GAMMA * J, right), dtype=np.complex128))
+    return np.asarray(implicit.WEIGHTS @ np.array(k))
 
 
 def _by_real(choose: Callable[..., complex]) -> Callable[..., complex]:

@@ -17,11 +17,11 @@ MOST_NODES = 50_000
 """Values of one set of equations."""
 
 CONSTANT = "constant"
-FREE, WEIGHT, FIXED, NORM = "free", "weight", "fixed", "norm"
-"""Parameters: those that have names and are estimated, weights of networks, those that are declared, and the levels and
-scales of what a network sees."""
+FREE, WEIGHT, FIXED, NORM, STEP = "free", "weight", "fixed", "norm", "step"
+"""Parameters: those that have names and are estimated, weights of networks, those that are declared, the levels and
+scales of what a network sees, and the seconds of a step."""
 CONTINUOUS_STATE, DISCRETE_STATE, INPUT = "continuous", "discrete", "input"
-LEAVES = (FREE, WEIGHT, FIXED, NORM, CONTINUOUS_STATE, DISCRETE_STATE, INPUT)
+LEAVES = (FREE, WEIGHT, FIXED, NORM, STEP, CONTINUOUS_STATE, DISCRETE_STATE, INPUT)
 """What is given to a program, in the order of its registers."""
 
 WITH_OWN = frozenset({machine.GREATER, machine.NOT_LESS, machine.SIGN, machine.SQRT, machine.TABLE})
@@ -181,13 +181,13 @@ class Graph:
         Returns:
             The program.
         """
-        needed = self._needed(results)
+        needed = self.needed(results)
         constants = [node for node in needed if self.nodes[node].kind == CONSTANT]
         place = {node: at for at, node in enumerate(constants)}
         at, firsts = len(constants), {}
         for kind in LEAVES:
             firsts[kind], at = at, at + counts[kind]
-        n_theta = counts[FREE] + counts[WEIGHT] + counts[FIXED] + counts[NORM]
+        n_theta = counts[FREE] + counts[WEIGHT] + counts[FIXED] + counts[NORM] + counts[STEP]
         sizes = (n_theta, counts[CONTINUOUS_STATE] + counts[DISCRETE_STATE], counts[INPUT])
         code: list[list[int]] = []
         for node in needed:
@@ -205,7 +205,26 @@ class Graph:
             sizes=sizes,
         )
 
-    def _needed(self, results: Sequence[int]) -> list[int]:
+    def replaced(self, results: Sequence[int], by: Mapping[int, int]) -> list[int]:
+        """The same values of other leaves.
+
+        Args:
+            results: The values.
+            by: What stands in the place of some leaves.
+
+        Returns:
+            The values.
+        """
+        found = dict(by)
+        for node in self.needed(results):
+            value = self.nodes[node]
+            if any(found.get(one, one) != one for one in value.reads):
+                a, b, c = [*(found.get(one, one) for one in value.reads), None, None][:3]
+                assert a is not None  # noqa: S101 - every operation reads something
+                found[node] = self.apply(value.place, a, b, c, own=value.own)
+        return [found.get(node, node) for node in results]
+
+    def needed(self, results: Sequence[int]) -> list[int]:
         """Every value that some need, in the order in which they can be computed."""
         found: set[int] = set()
         waiting = list(results)

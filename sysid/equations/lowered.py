@@ -11,6 +11,17 @@ from numpy.typing import NDArray
 
 from sysid.equations.graph import CONTINUOUS_STATE, WEIGHT, Program
 
+RUNGE_KUTTA, ROSENBROCK = "runge-kutta", "rosenbrock"
+SOLVERS = (RUNGE_KUTTA, ROSENBROCK)
+"""How continuous states go on: explicitly, or implicitly, for equations that are stiff."""
+
+METHODS = {
+    RUNGE_KUTTA: np.array([[1.0, 0.5], [2.0, 0.5], [2.0, 1.0], [1.0, 0.0]]),
+    ROSENBROCK: np.array([[1.0, 0.0]]),
+}
+"""Of each the stages of a step: how much a stage's slope counts, and how much of a step ahead the next one is. The
+slope of the one stage of ``rosenbrock`` is that over the whole implicit step."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Net:
@@ -70,10 +81,12 @@ class Switch:
 class Lowered:
     """Equations as programs.
 
-    Parameters are ``[free | weights | fixed | norms]``; those that have sensitivities are the first two.
+    Parameters are ``[free | weights | fixed | norms | step]``; those that have sensitivities are the first two.
 
     Args:
         rates: Of the continuous states.
+        slopes: What a step goes along: the rates, or the mean slopes of an implicit step.
+        solver: How the continuous states go on.
         updates: Of the other states.
         outputs: Of the outputs.
         probes: Arguments of networks and switches.
@@ -88,6 +101,8 @@ class Lowered:
     """
 
     rates: Program
+    slopes: Program
+    solver: str
     updates: Program
     outputs: Program
     probes: Program
@@ -104,6 +119,11 @@ class Lowered:
     def n_continuous(self) -> int:
         """States with a rate, the first ones."""
         return self.counts[CONTINUOUS_STATE]
+
+    @property
+    def method(self) -> NDArray[np.float64]:
+        """The stages of a step, a row each."""
+        return METHODS[self.solver]
 
     @property
     def n_states(self) -> int:
@@ -153,6 +173,7 @@ class Terms:
         free: Names of parameters that are estimated.
         fixed: Names of the others.
         tables: Points of each table.
+        solver: How the continuous states go on.
     """
 
     inputs: tuple[str, ...]
@@ -161,3 +182,4 @@ class Terms:
     free: tuple[str, ...]
     fixed: tuple[str, ...]
     tables: Dict[str, tuple[tuple[float, float], ...]]
+    solver: str = RUNGE_KUTTA

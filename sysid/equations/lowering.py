@@ -17,10 +17,13 @@ from sysid.equations.graph import (
     FREE,
     INPUT,
     NORM,
+    STEP,
     WEIGHT,
     Graph,
 )
-from sysid.equations.lowered import Lowered, Net, Switch, Terms
+from sysid.equations.implicit import MOST_STATES_IMPLICIT, implicit_slopes
+from sysid.equations.lowered import ROSENBROCK, Lowered, Net, Switch, Terms
+from sysid.equations.slopes import slopes_of
 from sysid.equations.syntax import Call, Delayed, Name, Node, Number, Operation, equation_error
 from sysid.equations.system import System
 from sysid.errors import ConfigError
@@ -56,7 +59,7 @@ def lower(system: System, terms: Terms) -> Lowered:
         work.updates[work.state(name)] = work.value(right[name])
     outputs = [work.named(name, 0) for name in terms.outputs]
     work.finish_delays()
-    return work.programs(rates, outputs)
+    return work.programs(rates, work.slopes(rates), outputs)
 
 
 @dataclass(kw_only=True)
@@ -78,6 +81,8 @@ class _Lowering:
     norms: list[float] = field(default_factory=list)
     switches: list[Switch] = field(default_factory=list)
     probed: list[int] = field(default_factory=list)
+    steep: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    """Tables that are slopes of others."""
 
     # What functions make values with
 
@@ -410,7 +415,26 @@ class _Lowering:
 
     # Programs
 
-    def programs(self, rates: list[int], outputs: list[int]) -> Lowered:
+    def slopes(self, rates: list[int]) -> list[int]:
+        """What a step goes along."""
+        if self.terms.solver != ROSENBROCK or not rates:
+            return rates
+        if len(rates) > MOST_STATES_IMPLICIT:
+            raise ConfigError(
+                "too many states for implicit steps",
+                where="solver",
+                expected=f"at most {MOST_STATES_IMPLICIT} states with a rate",
+                got=len(rates),
+                remedy="write solver: runge-kutta, or make what is fast algebraic",
+            )
+        return implicit_slopes(self.graph, rates, self._slope_of_table)
+
+    def _slope_of_table(self, own: int) -> int:
+        names = list(self.terms.tables)
+        self.steep.setdefault(names[own], slopes_of(self.terms.tables[names[own]]))
+        return len(names) + list(self.steep).index(names[own])
+
+    def programs(self, rates: list[int], slopes: list[int], outputs: list[int]) -> Lowered:
         """All that was lowered, as programs."""
         system, terms, graph = self.system, self.terms, self.graph
         names = (*system.continuous, *system.discrete, *self.hidden)
@@ -419,12 +443,14 @@ class _Lowering:
         counts[DISCRETE_STATE] = len(system.discrete) + len(self.hidden)
         counts[FREE], counts[FIXED] = len(terms.free), len(terms.fixed)
         counts[WEIGHT], counts[NORM] = (self.nets[-1].stop if self.nets else 0), len(self.norms)
-        counts[INPUT] = len(self.lagged)
+        counts[INPUT], counts[STEP] = len(self.lagged), 1
         updates = [self.updates[graph.leaf(DISCRETE_STATE, i)] for i in range(counts[DISCRETE_STATE])]
-        points = [terms.tables[name] for name in terms.tables]
+        points = [*terms.tables.values(), *self.steep.values()]
         begins = np.cumsum([0, *map(len, points)])
         return Lowered(
             rates=graph.program(rates, counts),
+            slopes=graph.program(slopes, counts),
+            solver=terms.solver,
             updates=graph.program(updates, counts),
             outputs=graph.program(outputs, counts),
             probes=graph.program(self.probed, counts),

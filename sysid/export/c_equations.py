@@ -32,9 +32,11 @@ def equation_values(stage: Stage, number: int) -> dict[str, Any]:
     """
     form, layout = stage.equations
     tables = _tables(form)
-    names = {name: _names(listing, tables, number) for name, listing in form.listings.items()}
-    tangents = {name: _tangents(listing, names[name]) for name, listing in form.listings.items() if form.searches}
-    used = {one.number for listing in form.listings.values() for one in listing.instructions}
+    stands = form.stands if form.searches else {}
+    listings = form.run | stands
+    names = {name: _names(listing, tables, number) for name, listing in listings.items()}
+    tangents = {name: _tangents(listing, names[name]) for name, listing in stands.items()}
+    used = {one.number for listing in listings.values() for one in listing.instructions}
     return {
         "kind": "equations",
         "short": True,
@@ -46,17 +48,17 @@ def equation_values(stage: Stage, number: int) -> dict[str, Any]:
         "n_given": max(1, len(form.given)),
         "states": form.states,
         "substeps": form.substeps,
-        "step": form.step,
+        "stages": [(share * form.step, ahead) for share, ahead in form.stages],
         "given": [_sum_of(layout, parts) for parts in form.given],
         "held": [form.given[j][0][0] for j in range(len(form.given))],
         "tables": tables,
         "programs": {
             name: {"lines": _lines(listing, names[name]), "results": [_read(one) for one in listing.results]}
-            for name, listing in form.listings.items()
+            for name, listing in form.run.items()
         },
         "tangents": tangents,
         "sloped": any("table_slope" in line for one in tangents.values() for line in one["lines"]),
-        "uses": {name: _kinds(listing) for name, listing in form.listings.items()},
+        "uses": {name: _kinds(listing) for name, listing in form.run.items()},
         "searches": form.searches,
         "terms": _terms(form),
         "lines": [
@@ -93,7 +95,7 @@ def _terms(form: ProgramForm) -> Dict[str, Any]:
 def _tables(form: ProgramForm) -> dict[Points, int]:
     """Every table once, with its number."""
     found: dict[Points, int] = {}
-    for listing in form.listings.values():
+    for listing in (*form.run.values(), *form.stands.values()):
         for one in listing.instructions:
             if one.points:
                 found.setdefault(one.points, len(found))

@@ -217,11 +217,11 @@ def _equations(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tupl
     now = x[:n_c]
     for _ in range(form.substeps if n_c else 0):
         at, moved = now, [0.0] * n_c
-        for weight, ahead in ((1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)):
-            slope = _listed(form.rates, [*at, *x[n_c:]], u)
-            moved = [one + weight * own for one, own in zip(moved, slope, strict=True)]
-            at = [one + ahead * form.step * own for one, own in zip(now, slope, strict=True)]
-        now = [one + form.step / 6.0 * own for one, own in zip(now, moved, strict=True)]
+        for share, ahead in form.stages:
+            slope = _listed(form.slopes, [*at, *x[n_c:]], u)
+            moved = [one + share * form.step * own for one, own in zip(moved, slope, strict=True)]
+            at = [one + ahead * own for one, own in zip(now, slope, strict=True)]
+        now = [one + own for one, own in zip(now, moved, strict=True)]
     after = [one + lost for one in (*now, *updates)] + [known[column] for column in layout.next_columns()]
     return outputs, lambda _: after
 

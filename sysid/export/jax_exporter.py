@@ -294,15 +294,13 @@ def _equations(stage: Stage, scaled: Any, past: Any) -> tuple[Any, Callable[[Any
     lost = jnp.where(jnp.isfinite(jnp.sum(x)), 0.0, np.nan)  # by a state that is no number
     outputs = _listed(form.outputs, x, u) + lost
 
-    def slopes(at: Any) -> Any:
-        return _listed(form.rates, jnp.concatenate([at, x[n_c:]]), u)
-
     def substep(now: Any, _: None) -> tuple[Any, None]:
-        first = slopes(now)
-        second = slopes(now + 0.5 * form.step * first)
-        third = slopes(now + 0.5 * form.step * second)
-        last = slopes(now + form.step * third)
-        return now + form.step / 6.0 * (first + 2.0 * second + 2.0 * third + last), None
+        at, total = now, 0.0
+        for share, ahead in form.stages:
+            slope = _listed(form.slopes, jnp.concatenate([at, x[n_c:]]), u)
+            total = total + share * form.step * slope
+            at = now + ahead * slope
+        return now + total, None
 
     now = jax.lax.scan(substep, x[:n_c], None, length=form.substeps)[0] if n_c else x[:0]
     after = jnp.concatenate([now, _listed(form.updates, x, u)]) + lost

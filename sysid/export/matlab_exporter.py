@@ -70,7 +70,7 @@ def prefix_of(surrogate: Surrogate) -> str:
 def _texts(surrogate: Surrogate, prefix: str) -> list[str]:
     stages = [plain_stage(stage) for stage in surrogate.stages]
     for stage in stages:
-        listings = stage["form"].listings if isinstance(stage["form"], ProgramForm) else {}
+        listings = stage["form"].run if isinstance(stage["form"], ProgramForm) else {}
         stage["programs"] = {name: _program(one) for name, one in listings.items() if one.results}
     values = {
         "s": surrogate,

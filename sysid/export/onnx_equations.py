@@ -1,4 +1,4 @@
-"""Equations as ONNX nodes: each value a row over cars; Runge-Kutta steps in a loop where there are several."""
+"""Equations as ONNX nodes: each value a row over cars; steps of the solver in a loop where there are several."""
 
 from __future__ import annotations
 
@@ -165,22 +165,22 @@ def _moved(nodes: Nodes, form: ProgramForm, given: Given, cars: _Rows, lost: str
 
 
 def _substep(nodes: Nodes, form: ProgramForm, given: Given, memory: str, moved: str) -> str:
-    """What one Runge-Kutta step adds."""
+    """What one step of the solver adds."""
     n_c, (x, u) = form.n_continuous, given
     begun = join_rows(nodes, x[:n_c], "begun_here")
     if moved:
         begun = nodes.add("Add", [begun, moved], "here")
     at, total = begun, ""
-    for part, (weight, ahead) in enumerate(((1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0))):
+    for part, (share, ahead) in enumerate(form.stages):
         own = nodes.within(f"{nodes.prefix}part{part}_")
         states = [*own.cut(at, {f"x{i}": 1 for i in range(n_c)}), *x[n_c:]]
-        slope = _Rows(own, memory).joined(_listed(own, form.rates, states, u, "f"), "slope")
-        counted = slope if weight == 1.0 else own.add("Mul", [slope, own.numbers("weight", weight)], "counted")
+        slope = _Rows(own, memory).joined(_listed(own, form.slopes, states, u, "f"), "slope")
+        counted = own.add("Mul", [slope, own.numbers("counts", share * form.step)], "counted")
         total = counted if not total else own.add("Add", [total, counted], "total")
         if ahead:
-            step = own.add("Mul", [slope, own.numbers("ahead", ahead * form.step)], "step")
+            step = own.add("Mul", [slope, own.numbers("ahead", ahead)], "step")
             at = own.add("Add", [begun, step], "at")
-    return nodes.add("Mul", [total, nodes.numbers("sixth", form.step / 6.0)], "added")
+    return total
 
 
 def _listed(

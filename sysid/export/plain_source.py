@@ -109,7 +109,7 @@ def tables(surrogate: Surrogate) -> dict[Points, int]:
     """Every table of a surrogate's equations once, with its number."""
     found: dict[Points, int] = {}
     for stage in surrogate.stages:
-        for listing in stage.form.listings.values() if isinstance(stage.form, ProgramForm) else ():
+        for listing in stage.form.run.values() if isinstance(stage.form, ProgramForm) else ():
             for one in listing.instructions:
                 if one.points:
                     found.setdefault(one.points, len(found))

@@ -80,7 +80,7 @@ class Listing:
             The listing.
         """
         low, (n_theta, n, m) = form.lowered, program.sizes
-        numbers = [*map(float, program.constants), *map(float, form.theta[:n_theta])]
+        numbers = [*map(float, program.constants), *map(float, form.filled[:n_theta])]
         known: list[Read] = [*numbers, *(Place(STATE, i) for i in range(n)), *(Place(INPUT, j) for j in range(m))]
         found: list[Instruction] = []
         for number, *registers, own in program.code.tolist():
@@ -110,7 +110,7 @@ def _value(number: int, reads: Sequence[Read], points: Sequence[tuple[float, flo
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProgramForm:
-    r"""``dx/dt = f(x, u)`` by Runge-Kutta steps, ``x(k+1) = g(x, u)``, ``y = h(x, u)``, all in units.
+    r"""``dx/dt = f(x, u)`` by steps of the solver, ``x(k+1) = g(x, u)``, ``y = h(x, u)``, all in units.
 
     The state is the states, those with a rate first, and the past samples of the inputs that are read.
 
@@ -133,6 +133,18 @@ class ProgramForm:
         return Listing.of(self.lowered.lowered.rates, self.lowered)
 
     @cached_property
+    def slopes(self) -> Listing:
+        """What a step goes along: ``f``, or the mean slope of an implicit step."""
+        return Listing.of(self.lowered.lowered.slopes, self.lowered)
+
+    @property
+    def stages(self) -> tuple[tuple[float, float], ...]:
+        """Of each stage of a step how much its slope counts, of one in all, and how many seconds ahead the next is."""
+        method = self.lowered.lowered.method
+        share = method[:, 0] / method[:, 0].sum()
+        return tuple(zip(map(float, share), map(float, method[:, 1] * self.step), strict=True))
+
+    @cached_property
     def updates(self) -> Listing:
         """``g``."""
         if not self.lowered.lowered.states:
@@ -145,8 +157,13 @@ class ProgramForm:
         return Listing.of(self.lowered.lowered.outputs, self.lowered)
 
     @property
-    def listings(self) -> dict[str, Listing]:
-        """All three, by name."""
+    def run(self) -> dict[str, Listing]:
+        """What is run, by name."""
+        return {"slopes": self.slopes, "updates": self.updates, "outputs": self.outputs}
+
+    @property
+    def stands(self) -> dict[str, Listing]:
+        """What tells whether anything changes at a state, by name."""
         return {"rates": self.rates, "updates": self.updates, "outputs": self.outputs}
 
     @property
@@ -166,13 +183,13 @@ class ProgramForm:
 
     @property
     def substeps(self) -> int:
-        """Runge-Kutta steps from sample to sample."""
+        """Steps of the solver from sample to sample."""
         return self.lowered.substeps
 
     @property
     def step(self) -> float:
         """Seconds of one of them."""
-        return self.lowered.sample_time / self.substeps
+        return self.lowered.step
 
     @property
     def n_inputs(self) -> int:

@@ -1,7 +1,7 @@
 """Equations as torch modules: a step of one stage, and the programs that it runs.
 
 Annotations are evaluated in this file, because TorchScript does not read them as text. TorchScript cannot script a
-program that is data, and does not have to: it is traced into straight lines, while the loop over Runge-Kutta steps is
+program that is data, and does not have to: it is traced into straight lines, while the loop over the solver's steps is
 scripted.
 """
 
@@ -65,6 +65,7 @@ class EquationStep(nn.Module):
     sources: Tensor
     line_columns: Tensor
     given: list[list[tuple[int, float]]]
+    stages: list[tuple[float, float]]
 
     def __init__(self, stage: Stage, limits: nn.Module) -> None:
         super().__init__()
@@ -78,14 +79,15 @@ class EquationStep(nn.Module):
         ]
         self.register_buffer("sources", torch.tensor(stage.known_sources, dtype=torch.long))
         self.register_buffer("line_columns", torch.tensor(layout.next_columns(), dtype=torch.long))
-        self.rates, self.updates, self.outputs = (Program(one) for one in form.listings.values())
+        self.slopes, self.updates, self.outputs = (Program(one) for one in form.run.values())
         self.first, self.size, self.n, self.n_continuous = (
             int(stage.first),
             layout.size,
             form.n_state,
             form.n_continuous,
         )
-        self.substeps, self.step, self.limited = form.substeps, form.step, stage.limited
+        self.stages = [(share * form.step, ahead) for share, ahead in form.stages]
+        self.substeps, self.limited = form.substeps, stage.limited
         self.limits = limits
 
     def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -115,11 +117,12 @@ class EquationStep(nn.Module):
             now = x.narrow(1, 0, self.n_continuous)
             others = x.narrow(1, self.n_continuous, self.n - self.n_continuous)
             for _ in range(self.substeps):
-                first = self.rates(torch.cat([now, others], dim=1), u, like)
-                second = self.rates(torch.cat([now + 0.5 * self.step * first, others], dim=1), u, like)
-                third = self.rates(torch.cat([now + 0.5 * self.step * second, others], dim=1), u, like)
-                fourth = self.rates(torch.cat([now + self.step * third, others], dim=1), u, like)
-                now = now + self.step / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+                at, total = now, torch.zeros_like(now)
+                for counts, ahead in self.stages:
+                    slope = self.slopes(torch.cat([at, others], dim=1), u, like)
+                    total = total + counts * slope
+                    at = now + ahead * slope
+                now = now + total
             parts_after.append(now + lost)
         if self.n > self.n_continuous:
             parts_after.append(self.updates(x, u, like) + lost)
@@ -129,7 +132,7 @@ class EquationStep(nn.Module):
     def traced(self) -> None:
         """Put traces in the place of the programs, so that the step can be scripted."""
         u, like = torch.zeros(2, len(self.given), dtype=torch.float64), torch.zeros(2, dtype=torch.float64)
-        for name in ("rates", "updates", "outputs"):
+        for name in ("slopes", "updates", "outputs"):
             program = getattr(self, name)
             if program.listing.results:
                 example = (torch.ones(2, self.n, dtype=torch.float64), u, like)

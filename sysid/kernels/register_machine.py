@@ -4,9 +4,10 @@ A program is a list of instructions over numbered registers, ``[constants | para
 each has an operation, up to three registers that it reads, and a number of its own (a switch, a table). Nothing is
 compiled for a new set of equations, and no text ever becomes code: equations are data here.
 
-Three programs make a model: the rates :math:`f = dx_c/dt` of the continuous states, the updates :math:`x_d(k+1)` of the
-others, and the outputs. Continuous states go from sample to sample by the classical Runge-Kutta method in ``substeps``
-equal steps, inputs and other states being held.
+Three programs make a model: the slopes :math:`f = dx_c/dt` of the continuous states, the updates :math:`x_d(k+1)` of
+the others, and the outputs. Continuous states go from sample to sample in ``substeps`` equal steps, inputs and other
+states being held: by the classical Runge-Kutta method, or by one stage whose slope is that over a whole implicit step
+(:mod:`sysid.equations.implicit`). The step itself is a parameter, the last.
 
 The sensitivities are those of what is computed, steps and all, not of the differential equation. Each instruction
 leaves its partial derivatives; one pass back over them per result gives a row of :math:`\partial f/\partial x` and
@@ -276,15 +277,16 @@ def values(program, theta, path, u, widths, places, table, y):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def free_run(programs, theta, x, u, substeps, step, widths, places, table, y, path):
+def free_run(programs, theta, x, u, method, substeps, step, widths, places, table, y, path):
     """Run a model, writing ``y`` and leaving in ``x`` the state after the last sample.
 
     Args:
-        programs: Rates, updates and outputs, each a tuple of code, results and constants.
+        programs: Slopes, updates and outputs, each a tuple of code, results and constants.
         theta: Parameters, those that are not fitted behind those that are.
         x: Continuous states, then the others, before the first sample, shape ``(n,)``; overwritten.
         u: Inputs, shape ``(n_samples, m)``.
-        substeps: Runge-Kutta steps from sample to sample.
+        method: Stages of a step: how much each counts, and how much of a step ahead the next is, shape ``(n, 2)``.
+        substeps: Steps from sample to sample.
         step: Seconds of one of them.
         widths: Of each switch; 0 is exact.
         places: Of each table its first row and its rows.
@@ -301,6 +303,7 @@ def free_run(programs, theta, x, u, substeps, step, widths, places, table, y, pa
     later = np.empty(n - n_c)
     slope, total = np.empty(n_c), np.empty(n_c)
     stage = x.copy()
+    counted = method[:, 0].sum()
     for t in range(len(u)):
         if not _finite(x):
             y[t:] = math.nan
@@ -322,18 +325,17 @@ def free_run(programs, theta, x, u, substeps, step, widths, places, table, y, pa
             for _ in range(substeps):
                 stage[:] = x
                 total[:] = 0.0
-                for s in range(4):
+                for s in range(len(method)):
                     for i in range(n_c):
                         vf[af + i] = stage[i]
                     evaluate(rates[0], vf, af + n + m, widths, places, table)
-                    weight = 2.0 if s in (1, 2) else 1.0
-                    ahead = step if s == 2 else 0.5 * step
+                    weight, ahead = method[s, 0], method[s, 1] * step
                     for i in range(n_c):
                         slope[i] = vf[rates[1][i]]
                         total[i] += weight * slope[i]
                         stage[i] = x[i] + ahead * slope[i]
                 for i in range(n_c):
-                    x[i] += step / 6.0 * total[i]
+                    x[i] += step / counted * total[i]
         for i in range(n - n_c):
             x[n_c + i] = later[i]
 
@@ -355,7 +357,7 @@ def _moves(program, d, bar, n_theta, first, S, p, result, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sensitivities(programs, theta, p, x, S, u, substeps, step, widths, places, table, y, J):
+def sensitivities(programs, theta, p, x, S, u, method, substeps, step, widths, places, table, y, J):
     """Run a model with the derivatives of its outputs.
 
     Args:
@@ -365,7 +367,8 @@ def sensitivities(programs, theta, p, x, S, u, substeps, step, widths, places, t
         x: State before the first sample, shape ``(n,)``; overwritten.
         S: Its derivatives, shape ``(n, n_columns)``; overwritten.
         u: Inputs, shape ``(n_samples, m)``.
-        substeps: Runge-Kutta steps from sample to sample.
+        method: Stages of a step: how much each counts, and how much of a step ahead the next is, shape ``(n, 2)``.
+        substeps: Steps from sample to sample.
         step: Seconds of one of them.
         widths: Of each switch; 0 is exact.
         places: Of each table.
@@ -385,6 +388,7 @@ def sensitivities(programs, theta, p, x, S, u, substeps, step, widths, places, t
     total, S_total = np.empty(n_c), np.empty((n_c, columns))
     slope, S_slope = np.empty(n_c), np.empty((n_c, columns))
     stage, S_stage = x.copy(), S.copy()
+    counted = method[:, 0].sum()
     for t in range(len(u)):
         if not _finite(x):
             y[t:] = math.nan
@@ -411,13 +415,12 @@ def sensitivities(programs, theta, p, x, S, u, substeps, step, widths, places, t
                 S_stage[:n_c] = S[:n_c]
                 total[:] = 0.0
                 S_total[:] = 0.0
-                for s in range(4):
+                for s in range(len(method)):
                     for i in range(n_c):
                         vf[af + i] = stage[i]
                     evaluate(rates[0], vf, af + n + m, widths, places, table)
                     _partials(rates[0], vf, af + n + m, widths, places, table, df)
-                    weight = 2.0 if s in (1, 2) else 1.0
-                    ahead = step if s == 2 else 0.5 * step
+                    weight, ahead = method[s, 0], method[s, 1] * step
                     for i in range(n_c):
                         slope[i] = vf[rates[1][i]]
                         total[i] += weight * slope[i]
@@ -428,9 +431,9 @@ def sensitivities(programs, theta, p, x, S, u, substeps, step, widths, places, t
                             S_total[i, q] += weight * S_slope[i, q]
                             S_stage[i, q] = S[i, q] + ahead * S_slope[i, q]
                 for i in range(n_c):
-                    x[i] += step / 6.0 * total[i]
+                    x[i] += step / counted * total[i]
                     for q in range(columns):
-                        S[i, q] += step / 6.0 * S_total[i, q]
+                        S[i, q] += step / counted * S_total[i, q]
         for i in range(n - n_c):
             x[n_c + i] = later[i]
             for q in range(columns):

@@ -59,7 +59,7 @@ class EquationForm(AbstractForm):
         theta: Parameters ``[free | weights | fixed | norms]``.
         scaling: Of the outputs; the equations themselves are in units.
         terms: What is known of the states.
-        substeps: Runge-Kutta steps from sample to sample.
+        substeps: Steps of the solver from sample to sample.
         sample_time: Seconds.
         widths: Of each switch, in the unit of its argument; 0 is exact.
         several: Whether outputs have columns.
@@ -96,9 +96,19 @@ class EquationForm(AbstractForm):
 
     @cached_property
     def programs(self) -> tuple[object, object, object]:
-        """Rates, updates and outputs, as the machine takes them."""
+        """Slopes, updates and outputs, as the machine takes them."""
         low = self.lowered
-        return low.rates.arrays, low.updates.arrays, low.outputs.arrays
+        return low.slopes.arrays, low.updates.arrays, low.outputs.arrays
+
+    @property
+    def step(self) -> float:
+        """Seconds of one step of the solver."""
+        return self.sample_time / self.substeps
+
+    @cached_property
+    def filled(self) -> Array:
+        """What stands in the programs' registers: parameters, and the step."""
+        return np.append(self.theta, self.step)
 
     @cached_property
     def output_scale(self) -> Array:
@@ -107,7 +117,7 @@ class EquationForm(AbstractForm):
 
     @property
     def _own(self) -> tuple[object, ...]:
-        return self.substeps, self.sample_time / self.substeps, *self._tables
+        return self.lowered.method, self.substeps, self.step, *self._tables
 
     @property
     def _tables(self) -> tuple[object, ...]:
@@ -196,7 +206,7 @@ class EquationForm(AbstractForm):
         """
         y = np.empty((len(u), self.n_outputs))
         path = np.empty((0, len(x))) if path is None else path
-        machine.free_run(self.programs, self.theta, x, u, *self._own, y, path)
+        machine.free_run(self.programs, self.filled, x, u, *self._own, y, path)
         return y
 
     def moved(self, u: Array, x: Array, S: Array, p: int) -> tuple[Array, Array]:
@@ -212,7 +222,7 @@ class EquationForm(AbstractForm):
             Output of shape ``(n_samples, n_outputs)``, in units, and ``(n_samples, n_outputs, n_columns)``.
         """
         y, J = np.empty((len(u), self.n_outputs)), np.empty((len(u), self.n_outputs, S.shape[1]))
-        machine.sensitivities(self.programs, self.theta, p, x, S, u, *self._own, y, J)
+        machine.sensitivities(self.programs, self.filled, p, x, S, u, *self._own, y, J)
         return y, J
 
     def probed(self, u: Array, path: Array) -> Array:
@@ -226,7 +236,7 @@ class EquationForm(AbstractForm):
             Shape ``(n_samples, n_probes)``.
         """
         found = np.empty((len(u), len(self.lowered.probes.results)))
-        machine.values(self.lowered.probes.arrays, self.theta, path, u, *self._tables, found)
+        machine.values(self.lowered.probes.arrays, self.filled, path, u, *self._tables, found)
         return found
 
     def resting(self, u: Array, output: Array) -> Array:
@@ -255,6 +265,18 @@ class EquationForm(AbstractForm):
         x, moves = at_rest(lambda x: self._standing(x, u, p), output, self.output_scale, self.terms)
         return x, moves
 
+    def rates_by_state(self, x: Array, u: Array) -> Array:
+        """How the rates move with the states.
+
+        Args:
+            x: State, shape ``(n_states,)``.
+            u: What the programs read, shape ``(n_lagged,)``.
+
+        Returns:
+            Shape ``(n_continuous, n_states)``.
+        """
+        return self._derived(self.lowered.rates, x, u, 0)[1]
+
     def _standing(
         self, x: Array, u: Array, p: int = 0
     ) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
@@ -270,7 +292,7 @@ class EquationForm(AbstractForm):
     def _derived(self, program: object, x: Array, u: Array, p: int) -> tuple[Array, Array, Array]:
         results = len(program.results)  # type: ignore[attr-defined]  # a Program
         r, Jx, Jp = np.empty(results), np.empty((results, len(x))), np.empty((results, p))
-        machine.derivatives(program.arrays, self.theta, p, x, u, *self._tables, r, Jx, Jp)  # type: ignore[attr-defined]
+        machine.derivatives(program.arrays, self.filled, p, x, u, *self._tables, r, Jx, Jp)  # type: ignore[attr-defined]
         return r, Jx, Jp
 
     def estimated(self, u: Array, output: Array, rest: Array, known: NDArray[np.bool_]) -> Array:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
-from sysid.equations import Lowered, System, Terms, lower
+from sysid.equations import RUNGE_KUTTA, SOLVERS, Lowered, System, Terms, lower
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractStructure
 from sysid.models.lags import whole
@@ -136,7 +136,9 @@ class GreyBox(AbstractStructure):
         initial: By state its value before the first sample, or ``{start:, low:, high:, fixed:}``. What is not named is
             at equilibrium in a record that begins at rest, and estimated in others.
         tables: By name the points ``[[x, y], ...]`` of a function that is interpolated between them.
-        substeps: Runge-Kutta steps from sample to sample; by default as many as the records need, which is told.
+        substeps: Steps of the solver from sample to sample; by default as many as the records need, which is told.
+        solver: ``runge-kutta``, or ``rosenbrock`` for stiff equations (implicit, as ``ode23s``); by default the one
+            that the equations need where their parameters start, which is told.
 
     Raises:
         ConfigError: With line and column of what is wrong with the equations, or naming another field.
@@ -152,6 +154,7 @@ class GreyBox(AbstractStructure):
     initial: tuple[InitialState, ...] | Dict[str, Any] = ()
     tables: tuple[Table, ...] | Dict[str, Any] = ()
     substeps: int | None = None
+    solver: str | None = None
 
     kind = "GreyBox"
 
@@ -173,12 +176,19 @@ class GreyBox(AbstractStructure):
                 "not a number of steps", where="substeps", expected=f"a whole number from 1 to {MOST_SUBSTEPS:,}",
                 got=shortened(self.substeps), remedy="leave substeps out: as many as are needed are chosen",
             )  # fmt: skip
+        if self.solver is not None and self.solver not in SOLVERS:
+            near = difflib.get_close_matches(str(self.solver), SOLVERS, n=1)
+            raise ConfigError(
+                "there is no such solver", where="solver", expected=f"one of {', '.join(SOLVERS)}",
+                got=shortened(self.solver),
+                remedy=f"did you mean {near[0]}?" if near else "leave solver out: the one that is needed is chosen",
+            )  # fmt: skip
         self._check_system()
 
     def _check_system(self) -> None:
         """Refuse equations that cannot be lowered for any mapping, before one is known."""
         system = self.system
-        lowered(self, system.others, (*system.states, *system.definitions), None)
+        lowered(self, system.others, (*system.states, *system.definitions), None, self.solver or RUNGE_KUTTA)
         for one in self._states_given:
             if one.name not in system.states:
                 near = difflib.get_close_matches(one.name, system.states, n=1)
@@ -246,6 +256,7 @@ class GreyBox(AbstractStructure):
             "initial": {one.name: one.to_dict() for one in self._states_given},
             "tables": {name: [list(point) for point in points] for name, points in self.points.items()},
             "substeps": self.substeps,
+            "solver": self.solver,
         }
 
 
@@ -264,7 +275,11 @@ def _system(text: str, parameters: tuple[str, ...], tables: tuple[str, ...]) -> 
 
 @lru_cache(maxsize=64)
 def lowered(
-    structure: GreyBox, inputs: tuple[str, ...], outputs: tuple[str, ...], sample_time: float | None
+    structure: GreyBox,
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    sample_time: float | None,
+    solver: str = RUNGE_KUTTA,
 ) -> Lowered:
     """The programs of a grey box.
 
@@ -273,6 +288,7 @@ def lowered(
         inputs: Channels that go in.
         outputs: Channels that come out.
         sample_time: Seconds; ``None`` to see whether there are such programs.
+        solver: How states with a rate go on.
 
     Returns:
         The programs.
@@ -287,6 +303,7 @@ def lowered(
         free=tuple(one.name for one in structure.free),
         fixed=tuple(one.name for one in structure.fixed),
         tables=structure.points,
+        solver=solver,
     )
     return lower(structure.system, terms)
 

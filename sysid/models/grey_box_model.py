@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.equations import Lowered
+from sysid.equations import RUNGE_KUTTA, Lowered
 from sysid.models.base import AbstractModel, SeveralOutputs
 from sysid.models.equation_form import EquationForm, StateTerms
 from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
@@ -38,6 +38,7 @@ class EquationModel(AbstractModel):
     mapping: Mapping
     sample_time: float
     input_units: tuple[str, ...]
+    solver: str = RUNGE_KUTTA
 
     clamp = np.inf
     """Bound of the output: none."""
@@ -68,7 +69,7 @@ class EquationModel(AbstractModel):
     @cached_property
     def lowered(self) -> Lowered:
         """The programs."""
-        return lowered(self.grey, self.mapping.inputs, self.mapping.outputs, self.sample_time)
+        return lowered(self.grey, self.mapping.inputs, self.mapping.outputs, self.sample_time, self.solver)
 
     @cached_property
     def recursion(self) -> EquationForm:
@@ -134,6 +135,7 @@ class EquationModel(AbstractModel):
             "sample_time": self.sample_time,
             "input_units": list(self.input_units),
             "substeps": self.substeps,
+            "solver": self.solver,
             "norms": list(self.norms),
             "levels": list(self.levels),
             "spans": list(self.spans),
@@ -147,6 +149,7 @@ class EquationModel(AbstractModel):
         given = ("sample_time", "substeps", "norms", "levels", "spans", "input_units")
         found = {name: fields[name] for name in given}
         theta = np.array(fields["theta"], dtype=np.float64)
+        found["solver"] = fields.get("solver", RUNGE_KUTTA)  # the only one, once
         return found | {"theta": theta, "mapping": Mapping.parse(fields["mapping"])}
 
 
@@ -160,7 +163,8 @@ class GreyBoxModel(EquationModel):
         norms: Levels and scales of what networks see.
         levels: An ordinary value of each state, in its unit.
         spans: How far each ordinarily goes from there.
-        substeps: Runge-Kutta steps from sample to sample.
+        substeps: Steps of the solver from sample to sample.
+        solver: ``runge-kutta``, or ``rosenbrock``.
         scaling: Of the output; the equations themselves are in units.
         mapping: Which channels go in, which comes out.
         sample_time: Seconds.

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from sysid.equations import ROSENBROCK, RUNGE_KUTTA
 from sysid.models import GreyBox, GreyBoxModel, Scaling, VectorGreyBox, VectorGreyBoxModel, VectorScaling
 from sysid.models import Mapping as Channels
 from sysid.models.grey_box import lowered
@@ -20,19 +21,20 @@ def build_grey(
     mapping: str = "BP+AR -> BC",
     substeps: int = 2,
     low: float = -np.inf,
+    solver: str = RUNGE_KUTTA,
     **fields: Mapping[str, Any],
 ) -> Model:
     """A grey box at the starts of its parameters, with random weights; every state is ordinarily 10 and moves by 20."""
     channels = Channels.parse(mapping)
     kind = GreyBox if len(channels.outputs) == 1 else VectorGreyBox
     grey = kind(equations=equations, substeps=substeps, **fields)
-    low_form = lowered(grey, channels.inputs, channels.outputs, 0.1)
+    low_form = lowered(grey, channels.inputs, channels.outputs, 0.1, solver)
     weights = 0.3 * np.random.default_rng(1).normal(size=low_form.n_weights)
     n, m, n_u = low_form.n_states, len(channels.outputs), len(channels.inputs)
     terms: dict[str, Any] = {
         "grey": grey, "theta": np.concatenate([[one.start for one in grey.free], weights]), "norms": low_form.norms,
         "levels": (10.0,) * n, "spans": (20.0,) * n, "substeps": substeps, "mapping": channels, "sample_time": 0.1,
-        "input_units": ("psi",) * n_u,
+        "input_units": ("psi",) * n_u, "solver": solver,
     }  # fmt: skip
     plain = {"input_offset": (0.0,) * n_u, "input_scale": (1.0,) * n_u}
     if m == 1:
@@ -53,6 +55,13 @@ EVERYTHING = """
 """
 VALVE = {"valve": [[0, 0], [40, 30], [70, 33], [95, 60]]}
 
+STIFF = """
+    dp/dt = 2e4*(valve(BP) - p) - 50*tanh((p - q)/0.2)*sqrt(abs(p - q)) - 3*max(p - AR, 0)
+    dq/dt = 0.5*(p - q) - 0.02*where(q > AR, q^1.5, 0.1*q^2) + net(0.02*q, 0.02*BP; neurons=2)
+    dw/dt = 900*min(q, 50) - 900*w*abs(w)/(1 + w) + sin(w) - exp(-w) + valve(w)
+    BC = w + 0.1*q
+"""
+
 GREY_BOXES: dict[str, Callable[[], Model]] = {
     "tanks": lambda: build_grey(
         "dx1/dt = k2*BP - k1*sqrt(x1)\ndBC/dt = k1*sqrt(x1) - k1*sqrt(max(BC, 0.1*AR))",
@@ -68,5 +77,6 @@ GREY_BOXES: dict[str, Callable[[], Model]] = {
     "an integrator, where it is said to be": lambda: build_grey(
         "dq/dt = v\ndv/dt = 0.1*(BP - AR) - v\nBC = q", substeps=1
     ),
+    "stiff": lambda: build_grey(STIFF, solver=ROSENBROCK, tables=VALVE),
     "declared states": lambda: build_grey("dBC/dt = 0.3*(BP - BC)", initial={"BC": {"start": 12, "fixed": True}}),
 }

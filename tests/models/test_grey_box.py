@@ -14,6 +14,7 @@ TANKS = {
     "initial": {"x1": {"start": 3.0, "low": 0.0}},
     "tables": {"valve": [[0.0, 0.0], [5.0, 0.2], [10.0, 0.3]]},
     "substeps": 4,
+    "solver": "rosenbrock",
 }
 
 
@@ -61,6 +62,11 @@ EQUATION = "dx/dt = -k*x + u\ny = x"
         ({"tables": {"f": "no"}}, "f is no table"),
         ({"substeps": 0}, "not a number of steps"),
         ({"substeps": 2.5}, "not a number of steps"),
+        ({"solver": "rosenbrok"}, "no such solver"),
+        (
+            {"equations": "\n".join(f"dx{i}/dt = -x{i}" for i in range(31)), "parameters": {}, "solver": "rosenbrock"},
+            "too many states for implicit steps",
+        ),
     ],
 )
 def test_fields_that_cannot_be_are_refused(fields: dict[str, object], words: str) -> None:

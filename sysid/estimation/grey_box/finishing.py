@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.grey_box.findings import with_evidence
-from sysid.estimation.grey_box.preparing import ACCURACY, ROUNDS, SHARPER, Stepping, seen_terms, substeps_for
+from sysid.estimation.grey_box.preparing import ROUNDS, SHARPER, seen_terms
 from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.grey_box.stepping import ACCURACY, Stepping, substeps_for
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.termination import Termination
@@ -126,7 +127,9 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stop
     exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
     if ready.template.grey.substeps is None and not stopped:
         for _ in range(STEP_ROUNDS):
-            stepping = substeps_for(exact, solution.theta, _accuracy(solution, exact))
+            stepping = replace(
+                substeps_for(exact, solution.theta, _accuracy(solution, exact)), explicit=stepping.explicit
+            )
             if stepping.substeps <= provider.form.substeps or np.isnan(stepping.change):
                 stepping = replace(stepping, substeps=provider.form.substeps)
                 break

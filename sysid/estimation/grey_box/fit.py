@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.equations import ROSENBROCK, RUNGE_KUTTA, Lowered
 from sysid.errors import TraceError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.grey_box.findings import Findings
@@ -19,14 +20,21 @@ from sysid.estimation.grey_box.finishing import Done, Ready, finished, settled
 from sysid.estimation.grey_box.layout import EquationLayout
 from sysid.estimation.grey_box.preparing import (
     WINDOW,
-    Stepping,
     first_terms,
     norms_for,
     seen_terms,
-    substeps_for,
     widths_for,
 )
 from sysid.estimation.grey_box.provider import EquationProvider, Record
+from sysid.estimation.grey_box.stepping import (
+    STIFF,
+    Stepping,
+    can_be_implicit,
+    explicit_steps,
+    solver_for,
+    step_note,
+    step_warning,
+)
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
@@ -38,7 +46,7 @@ from sysid.estimation.result import FitResult
 from sysid.models import AbstractStructure, Mapping, Start
 from sysid.models.built_model import BuiltModel
 from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
-from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
+from sysid.models.grey_box_model import GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]
@@ -47,7 +55,7 @@ STARTS = 4
 """Starts of a fit that asks for none: the declared parameters, and three around them. Halved at each checkpoint."""
 
 FIRST_SUBSTEPS = 8
-"""Runge-Kutta steps before it is known how many are needed."""
+"""Steps before it is known how many are needed."""
 
 check_training = partial(check_hidden_states, "a grey box")
 """Refuses options that do not apply to hidden states."""
@@ -265,6 +273,7 @@ def _common(first: Trace, mapping: Mapping, grey: GreyBox) -> dict[str, Any]:
     low = lowered(grey, mapping.inputs, mapping.outputs, first.sample_time)
     return {
         "grey": grey,
+        "solver": grey.solver or RUNGE_KUTTA,
         "theta": np.array([*(one.start for one in grey.free), *[0.0] * low.n_weights]),
         "norms": low.norms,
         "levels": (0.0,) * low.n_states,
@@ -291,11 +300,7 @@ def _ready(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence[Ex
     )
     theta = np.zeros(provider.n_parameters)
     theta[: len(grey.free)] = template.theta[: len(grey.free)] / provider.scale[: len(grey.free)]
-    theta = provider.with_states(theta, provider.states(theta, WINDOW))
-    stepping = Stepping(substeps=template.substeps, change=0.0)
-    if grey.substeps is None:
-        stepping = substeps_for(provider, theta)
-        provider = provider.with_form(replace(provider.form, substeps=stepping.substeps))
+    provider, theta, stepping = _stepping(template, provider, theta)
     seen, begun = seen_terms(provider, theta)
     provider = provider.with_form(seen)
     theta = provider.with_states(theta, begun)
@@ -307,11 +312,12 @@ def _ready(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence[Ex
             expected="numbers over every record",
             got="what grows without bound, or is no number",
             remedy="start the parameters and initial states at values with which the equations run: look for "
-            "a sign, a division by 0, or the logarithm of what is not above 0",
+            "a sign, a division by 0, or the logarithm of what is not above 0" + _stiff_remedy(grey, provider, theta),
         )
     seen = provider.form
     template = replace(
         template,
+        solver=seen.lowered.solver,
         norms=tuple(map(float, norms_for(provider, theta))),
         levels=tuple(map(float, seen.terms.level)),
         spans=tuple(map(float, seen.terms.scale)),
@@ -321,6 +327,40 @@ def _ready(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence[Ex
     return Ready(template=template, provider=provider, theta=theta, stepping=stepping)
 
 
+def _stiff_remedy(grey: GreyBox, provider: EquationProvider, theta: Array) -> str:
+    """What else helps where explicit steps were asked for that are too long."""
+    if grey.solver != RUNGE_KUTTA or not can_be_implicit(provider.form.lowered):
+        return ""
+    needed = explicit_steps(provider, theta)
+    return (
+        f". Runge-Kutta steps, which are asked for, would have to be {needed:,.0f} a sample to stay bounded: leave "
+        "solver out"
+    ) * (needed > provider.form.substeps)
+
+
+def _stepping(
+    template: GreyBoxModel | VectorGreyBoxModel, provider: EquationProvider, theta: Array
+) -> tuple[EquationProvider, Array, Stepping]:
+    """The solver and its steps; and what is trained, with the states from where the records are then looked at."""
+    explicit, asked = provider.form, template.grey.substeps
+    implicit = (
+        partial(_implicit, template) if template.grey.solver is None and can_be_implicit(explicit.lowered) else None
+    )
+    needed = 0.0 if implicit is None else explicit_steps(provider, theta)
+    stiff = implicit is not None and needed > max(STIFF, asked or 0)
+    if implicit is not None and stiff:  # explicitly the records would show no states
+        provider = provider.with_form(replace(explicit, lowered=implicit()))
+    theta = provider.with_states(theta, provider.states(theta, WINDOW))
+    if asked is not None:
+        return provider, theta, Stepping(substeps=asked, change=0.0, explicit=needed if stiff else 0.0)
+    provider, stepping = solver_for(provider.with_form(explicit), theta, implicit)
+    return provider, theta, stepping
+
+
+def _implicit(template: GreyBoxModel | VectorGreyBoxModel) -> Lowered:
+    return replace(template, solver=ROSENBROCK).lowered
+
+
 def _told(found: FitResult, done: Done, data: tuple[Sequence[Trace], Sequence[Trace], Start]) -> FitResult:
     """The result with what is known of its parameters, and what was chosen on the way."""
     model, solution = done.model, done.candidate.solution
@@ -328,7 +368,7 @@ def _told(found: FitResult, done: Done, data: tuple[Sequence[Trace], Sequence[Tr
     findings = Findings.of(solution, done.provider, model.grey.free)
     n = max(done.provider.n_samples - model.n_parameters, 1)
     variance = 2.0 * solution.at.loss / n * model.scaling.error_unit
-    notes = [_step_note(model, done.stepping)] if model.lowered.n_continuous else []
+    notes = [step_note(model, done.stepping)] if model.lowered.n_continuous else []
     unread = [one for i, one in enumerate(model.mapping.inputs) if i not in {i for i, _ in model.lowered.lagged}]
     notes += [f"The equations do not read {', '.join(unread)}."] if unread else []
     switches = sum(not one.root for one in model.lowered.switches)
@@ -339,30 +379,13 @@ def _told(found: FitResult, done: Done, data: tuple[Sequence[Trace], Sequence[Tr
         )
     warnings = list(findings.warnings)
     if model.lowered.n_continuous and not done.stepping.enough:
-        warnings.append(_step_warning(model, done.stepping))
+        warnings.append(step_warning(model, done.stepping))
     return replace(
         found,
         posterior=posterior,
         uncertainty=findings.uncertainty(variance) if model.grey.free else None,
         notes=(*found.notes, *notes, *warnings),
         warnings=(*found.warnings, *warnings),
-    )
-
-
-def _step_note(model: EquationModel, stepping: Stepping) -> str:
-    n = model.substeps
-    given = model.grey.substeps is not None
-    halved = "" if given else f"; half of that changes the output by {stepping.change:.1e} of its range"
-    return (
-        f"The equations go from sample to sample in {n} Runge-Kutta step{'s' * (n > 1)} of "
-        f"{model.sample_time / n:.4g} s{' as asked for' * given}{halved}."
-    )
-
-
-def _step_warning(model: EquationModel, stepping: Stepping) -> str:
-    return (
-        f"{model.substeps} Runge-Kutta steps between samples are not enough: twice as many change the output by "
-        f"{stepping.change:.1e} of its range. The equations are stiff; make what is fast algebraic, or slower."
     )
 
 

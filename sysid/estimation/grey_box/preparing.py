@@ -1,28 +1,21 @@
-"""What equations need to know of the records before a fit: levels and ranges of what is hidden, and a step."""
+"""What equations need to know of the records before a fit: levels and ranges of what is hidden."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.grey_box.stepping import STEPPED
 from sysid.models.equation_form import EquationForm
 
 Array = NDArray[np.float64]
 
 WINDOW = 50
 """Samples on which the states before a record are looked for."""
-
-ACCURACY = 1e-4
-"""How much half the step may change a free run, over the output's scale, before it is known what the records leave."""
-
-MOST_SUBSTEPS = 256
-
-STEPPED = 5_000
-"""Samples of a record on which a step is tried."""
 
 SOFT = 0.02
 """Width of a switch in training, over the range of its argument; then :data:`SHARPER` times that, again and again."""
@@ -31,65 +24,6 @@ SOFT_ROOT = 1e-3
 """Width of a root in training, over the largest magnitude of its argument."""
 
 SHARPER, ROUNDS = 0.25, 6
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Stepping:
-    """A number of Runge-Kutta steps and what is known of it.
-
-    Args:
-        substeps: From sample to sample.
-        change: What twice as many change of the free run, over the output's scale; not a number where the run is none.
-        accuracy: What they may change.
-    """
-
-    substeps: int
-    change: float
-    accuracy: float = ACCURACY
-
-    @property
-    def enough(self) -> bool:
-        """Whether more would change nothing."""
-        return self.change <= self.accuracy
-
-
-def substeps_for(provider: EquationProvider, theta: Array, accuracy: float = ACCURACY) -> Stepping:
-    """As few Runge-Kutta steps as the records need at some parameters.
-
-    Args:
-        provider: The records.
-        theta: What is trained.
-        accuracy: How much twice as many may change the free run, over the output's scale.
-
-    Returns:
-        The steps; the most accurate that were tried where none is enough.
-    """
-    form = provider.at(theta)
-    if form.lowered.n_continuous == 0:
-        return Stepping(substeps=1, change=0.0, accuracy=accuracy)
-    before: list[Array] | None = None
-    best = Stepping(substeps=1, change=float("nan"), accuracy=accuracy)
-    n = 1
-    while n <= 2 * MOST_SUBSTEPS:
-        runs = _runs(provider, theta, replace(form, substeps=n))
-        if before is not None:
-            change = max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(runs, before, strict=True))
-            if np.isfinite(change):
-                best = Stepping(substeps=n // 2, change=change, accuracy=accuracy)
-            if best.enough:
-                break
-        before, n = runs, 2 * n
-    return best
-
-
-def _runs(provider: EquationProvider, theta: Array, form: EquationForm) -> list[Array]:
-    """Free runs over the beginnings of the records, over the outputs' scales."""
-    found = []
-    with np.errstate(over="ignore", invalid="ignore"):  # a step that is too long explodes
-        for i, record in enumerate(provider.records):
-            x = provider.begin(form, theta, i)
-            found.append(form.run(record.u[:STEPPED], x) / form.output_scale)
-    return found
 
 
 def first_terms(form: EquationForm, outputs: Sequence[str], means: Array) -> EquationForm:

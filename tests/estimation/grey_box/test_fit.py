@@ -139,6 +139,28 @@ def test_the_step_is_chosen_and_told() -> None:
     assert any("2 Runge-Kutta steps of 0.25 s as asked for" in note for note in asked.notes)
 
 
+STIFF_LAG = {
+    "equations": "dq/dt = (gain*u - q)/fast; dx/dt = (q - x)/lag; y = x",
+    "parameters": {"gain": 1, "lag": 1, "fast": {"start": 1e-5, "fixed": True}},
+}
+
+
+def test_stiff_equations_are_stepped_implicitly_and_it_is_told() -> None:
+    fit = fitted([first_order(3.0, 4.0)], **STIFF_LAG)
+    model = fit.model
+    assert isinstance(model, GreyBoxModel)
+    assert (model.solver, model.substeps <= 8) == ("rosenbrock", True)
+    assert model.parameters == pytest.approx({"gain": 3.0, "lag": 4.0, "fast": 1e-5}, rel=0.01)
+    assert any("implicit" in note and "Runge-Kutta steps would be 17,953 from" in note for note in fit.notes)
+    again = FitResult.from_dict(fit.to_dict())
+    assert np.array_equal(again.model.simulate(steps(50)[:, None]), model.simulate(steps(50)[:, None]))
+
+
+def test_explicit_steps_of_stiff_equations_are_refused_with_the_remedy() -> None:
+    with pytest.raises(TraceError, match="17,953 a sample to stay bounded: leave solver out"):
+        fitted([first_order(3.0, 4.0)], solver="runge-kutta", **STIFF_LAG)
+
+
 def test_intervals_of_the_output_hold_the_measurement() -> None:
     fit = fitted([first_order(3.0, 4.0)], LAG, parameters={"gain": 1, "lag": 1})
     other = first_order(3.0, 4.0, seed=11)
