@@ -4,6 +4,7 @@ from sysid.estimation.attempts import Attempt
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
 from sysid.estimation.linear.instrumental import fit_iv4
+from sysid.estimation.linear.modes import Mode, modes
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
 from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
 from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
@@ -30,6 +31,7 @@ __all__ = [
     "FitResult",
     "JointTraining",
     "Loop",
+    "Mode",
     "OperatingPoint",
     "PolynomialTraining",
     "Posterior",
@@ -53,6 +55,7 @@ __all__ = [
     "fit_vector_narx",
     "fit_vector_neural_state_space",
     "fit_vector_state_space",
+    "modes",
     "state_orders",
     "with_upstream_outputs",
 ]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import ConfigError
+from sysid.models.continuous import rates
 
 Array = NDArray[np.float64]
 
@@ -61,21 +62,9 @@ def d2c(system: Any) -> Any:
 
     _check_time(system, discrete=True)
     given = state_space(system)
-    poles = given.poles()
-    bad = poles[(np.abs(poles.imag) < 1e-12) & (poles.real <= 1e-12)]
-    if len(bad):
-        raise ConfigError(
-            "no continuous system of this order gives the discrete one",
-            where="a pole",
-            expected="no pole on the negative real axis, nor at zero, which is a dead time",
-            got=", ".join(f"{pole.real:.4g}" for pole in bad),
-            remedy="take a dead time out of the model first, or fit a continuous transfer function",
-        )
-    n, m = given.nstates, given.ninputs
-    block = np.eye(n + m)
-    block[:n, :n], block[:n, n:] = given.A, given.B
-    rates = np.real(linalg.logm(block)) / given.dt
-    return control.StateSpace(rates[:n, :n], rates[:n, n:], given.C, given.D, 0, **_names(given))
+    remedy = "take a dead time out of the model first, or fit a continuous transfer function"
+    A, B = rates(given.A, given.B, given.dt, remedy=remedy)
+    return control.StateSpace(A, B, given.C, given.D, 0, **_names(given))
 
 
 def d2d(system: Any, sample_time: float) -> Any:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractStructure, SeveralOutputs
+from sysid.models.continuous import ContinuousStateSpace, rates
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
 from sysid.models.lags import MOST, per_input, whole
@@ -217,12 +218,26 @@ class LinearStateSpaceModel(InnovationModel):
             of_numerator=f"B({self.mapping.inputs[j]}, ", of_denominator="F(",
         )  # fmt: skip
 
-    def to_control(self) -> Any:
-        """The model as a ``control.TransferFunction``, from deviations of the inputs to deviations of the output.
+    def continuous(self) -> ContinuousStateSpace:
+        """The continuous system whose samples it is; see :func:`continuous_form`."""
+        return continuous_form(self)
+
+    def to_control(self, *, continuous: bool = False, pade_order: int = 3) -> Any:
+        """The model as an object of python-control, from deviations of the inputs to deviations of the output.
+
+        Args:
+            continuous: Give the continuous form, as a ``control.StateSpace``.
+            pade_order: Order of the Padé approximation that stands for its dead times.
 
         Returns:
-            One row, one column per input; :func:`sysid.models.to_control.state_space` keeps the states.
+            A ``control.TransferFunction`` of one row, one column per input;
+            :func:`sysid.models.to_control.state_space` keeps the states.
+
+        Raises:
+            ConfigError: If there is no continuous form.
         """
+        if continuous:
+            return self.continuous().to_control(pade_order=pade_order)
         F, numerators, _ = polynomials(self.system)
         gains = self.scaling.output_scale / np.array(self.scaling.input_scale)
         late = self.orders.shifts(len(gains))
@@ -361,9 +376,24 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
             for j, name in enumerate(self.mapping.inputs)
         }  # fmt: skip
 
-    def to_control(self) -> Any:
-        """The model as a discrete ``control.StateSpace`` in the channels' units, from deviations to deviations."""
-        return state_space(self)
+    def continuous(self) -> ContinuousStateSpace:
+        """The continuous system whose samples it is; see :func:`continuous_form`."""
+        return continuous_form(self)
+
+    def to_control(self, *, continuous: bool = False, pade_order: int = 3) -> Any:
+        """The model as a ``control.StateSpace`` in the channels' units, from deviations to deviations.
+
+        Args:
+            continuous: Give the continuous form, not the discrete one.
+            pade_order: Order of the Padé approximation that stands for its dead times.
+
+        Returns:
+            The state space.
+
+        Raises:
+            ConfigError: If there is no continuous form.
+        """
+        return self.continuous().to_control(pade_order=pade_order) if continuous else state_space(self)
 
     @property
     def matrices(self) -> Matrices:
@@ -402,6 +432,30 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
             sample_time=fields["sample_time"],
             **{name: tuple(fields[name]) for name in names},
         )
+
+
+def continuous_form(model: LinearStateSpaceModel | VectorStateSpaceModel) -> ContinuousStateSpace:
+    """The continuous system that gives a model's samples when its inputs are held between them, as ``d2c`` by zoh.
+
+    Args:
+        model: The model.
+
+    Returns:
+        The system in the channels' units, its dead times beside it; its output at the samples is the model's.
+
+    Raises:
+        ConfigError: If a pole is zero or lies on the negative real axis.
+    """
+    system, late = model.system, model.orders.shifts(len(model.mapping.inputs))
+    remedy = (
+        "fit fewer states, or a continuous transfer function (domain: continuous): such a pole mostly describes noise"
+    )
+    A, B = rates(system.A, system.B / np.array(model.scaling.input_scale), model.sample_time, remedy=remedy)
+    gain = np.atleast_1d(model.scaling.output_scale)[:, np.newaxis]
+    return ContinuousStateSpace(
+        A=A, B=B, C=gain * system.C, D=gain * system.D / np.array(model.scaling.input_scale),
+        delays=tuple(k * model.sample_time for k in late), mapping=model.mapping,
+    )  # fmt: skip
 
 
 def polynomials(system: Innovations) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:

@@ -57,7 +57,7 @@ def transfer_function(ratios: Sequence[Polynomials], mapping: Mapping, sample_ti
         [[num for num, _ in ratios]],
         [[den for _, den in ratios]],
         sample_time,
-        **_signals(mapping),
+        **signals(mapping),
     )
 
 
@@ -74,10 +74,10 @@ def state_space(model: Linear) -> Any:
     import control
 
     A, B, C, D = model.matrices
-    return control.StateSpace(A, B, C, D, model.sample_time, **_signals(model.mapping))
+    return control.StateSpace(A, B, C, D, model.sample_time, **signals(model.mapping))
 
 
-def _signals(mapping: Mapping) -> dict[str, list[str]]:
+def signals(mapping: Mapping) -> dict[str, list[str]]:
     """The names of the channels as python-control takes them, which has no dots in names."""
     names = distinct((*mapping.inputs, *mapping.outputs), signal_name)
     return {side: [names[name] for name in getattr(mapping, side)] for side in ("inputs", "outputs")}

@@ -11,6 +11,7 @@ from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.linear_view import linear_views
+from sysid.reporting.modes_table import modes_table
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.residuals import GroupRecord, read_residuals
 from sysid.reporting.results import FitRecord, LinearityRecord, Results
@@ -131,6 +132,7 @@ def _responses(folder: Path, fit: FitRecord) -> list[Part]:
     model, uncertainty, name = stored.model, stored.uncertainty, identifier(fit.slug)
     if not linear_views(model, None):  # no input moves it: there is no response to draw
         return []
+    poles = modes_table(fit.name, stored)
     band = "Grey: 95 % of what the covariance of the parameters allows." if uncertainty else "Uncertainty not known."
     return [
         picture(
@@ -152,6 +154,7 @@ def _responses(folder: Path, fit: FitRecord) -> list[Part]:
             "distribution of the parameters. What lies far outside the unit circle is counted in the legend.",
             f"poles-{name}",
         ),
+        *([] if poles is None else [poles]),
     ]
 
 

@@ -29,7 +29,18 @@ from sysid.estimation.estimators import fit
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.search import search
 from sysid.kernels import linear as kernel
-from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, VectorStateSpace
+from sysid.models import (
+    ARMAX,
+    ARX,
+    BJ,
+    OE,
+    AbstractStructure,
+    LinearStateSpace,
+    Mapping,
+    Start,
+    TransferFunction,
+    VectorStateSpace,
+)
 from sysid.models.innovations import Innovations
 from sysid.models.linear_state_space import polynomials
 from sysid.models.polynomial import AbstractPolynomial
@@ -117,14 +128,27 @@ def three_systems(seeds: range, *, beside: bool) -> None:
         found(f"{NAMES[system]}, {name}, processor time", seconds, "s")
 
 
-KNOWN: dict[str, tuple[AbstractPolynomial, list[float]]] = {
-    "OE": (OE(nb=2, nf=2, nk=1), [1.0, 0.5, -1.5, 0.7]),
-    "BJ": (BJ(nb=2, nc=1, nd=1, nf=2, nk=1), [1.0, 0.5, -1.5, 0.7, 0.5, -0.9]),
-    "ARMAX": (ARMAX(na=2, nb=2, nc=1, nk=1), [1.0, 0.5, -1.5, 0.7, 0.4]),
-    "ARIX": (ARMAX(na=2, nb=2, nc=0, nk=1, integrated=True), [1.0, 0.5, -1.5, 0.7]),
-    "SS": (ARMAX(na=2, nb=2, nc=2, nk=1), [1.0, 0.5, -1.5, 0.7, -0.6, 0.3]),
-}
-"""Structures and true coefficients as their uncertainty has them; a state space of two states is an ARMAX system."""
+PLANT = [1.0, 0.5, -1.5, 0.7]
+OF_STATES = [*PLANT, -0.6, 0.3]
+KNOWN: dict[str, tuple[AbstractStructure, AbstractPolynomial, list[float], list[float]]] = {
+    "ARX": (ARX(na=2, nb=2, nk=1), ARMAX(na=2, nb=2, nc=0, nk=1), PLANT, [1.0, 0.5, 1.5, -0.7]),
+    "TF": (TransferFunction(poles=2, zeros=1, delays=1), OE(nb=2, nf=2, nk=1), PLANT, PLANT),
+    "SS": (LinearStateSpace(states=2), ARMAX(na=2, nb=2, nc=2, nk=1), OF_STATES, OF_STATES),
+    "SS, dead time 6": (
+        LinearStateSpace(states=2, nk=6), ARMAX(na=2, nb=2, nc=2, nk=6), OF_STATES, OF_STATES
+    ),
+    **{
+        name: (orders, orders, truth, truth)
+        for name, orders, truth in (
+            ("OE", OE(nb=2, nf=2, nk=1), PLANT),
+            ("BJ", BJ(nb=2, nc=1, nd=1, nf=2, nk=1), [*PLANT, 0.5, -0.9]),
+            ("ARMAX", ARMAX(na=2, nb=2, nc=1, nk=1), [*PLANT, 0.4]),
+            ("ARIX", ARMAX(na=2, nb=2, nc=0, nk=1, integrated=True), PLANT),
+        )
+    },
+}  # fmt: skip
+"""What is fitted; the plant, with its coefficients; and these as the fit's uncertainty has them: ARX writes those of
+past outputs on the other side, and a state space of two states is an ARMAX system."""
 
 
 def record(orders: AbstractPolynomial, truth: list[float], seed: int, n: int = 1_000) -> tuple[Trace, Mapping]:
@@ -146,11 +170,10 @@ def held(result: FitResult, truth: list[float]) -> np.ndarray:
 
 def coverage(runs: int) -> None:
     """How often intervals of 95 % hold the truth."""
-    for name, (orders, truth) in KNOWN.items():
-        structure = LinearStateSpace(states=2) if name == "SS" else orders
+    for name, (structure, plant, coefficients, truth) in KNOWN.items():
         inside = []
         for seed in range(runs):
-            trace, mapping = record(orders, truth, seed)
+            trace, mapping = record(plant, coefficients, seed)
             inside.append(held(fit([trace], mapping, structure, start=FREE, stability=None), truth))
         share = 100.0 * float(np.mean(inside))
         found(f"{name}: intervals of 95 % that hold the truth", share, "%", note=f"92 to 98 asked; {runs} records")

@@ -85,7 +85,12 @@ def test_the_sections_show_what_the_run_stored(run: Path) -> None:
     assert isinstance(picture, Picture)
     assert "White at 99 %" in picture.caption
     assert "Independent of every past input" in picture.caption
-    assert [part.caption.partition(":")[0] for part in response.parts] == ["ARX, ARX [2; 2 2; 1 1]", "ARX", "ARX"]
+    *pictures, poles = response.parts
+    assert [part.caption.partition(":")[0] for part in pictures] == ["ARX, ARX [2; 2 2; 1 1]", "ARX", "ARX"]
+    assert isinstance(poles, Table)
+    (pair,) = poles.rows
+    low, high = (float(end) for end in pair[2].below.strip("()").split(" to "))
+    assert low < abs(np.log(0.75 + 0.3708j)) < high  # of z^2 - 1.5 z + 0.7, every second
 
 
 def test_a_linear_model_that_no_input_moves_has_no_frequency_response(run: Path) -> None:
