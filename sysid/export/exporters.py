@@ -16,6 +16,7 @@ from sysid.export.fmu_exporter import FmuExporter
 from sysid.export.jax_exporter import JaxExporter
 from sysid.export.matlab_exporter import MatlabExporter
 from sysid.export.onnx_exporter import OnnxExporter
+from sysid.export.st_exporter import StructuredTextExporter
 from sysid.export.torch_export import TorchExportExporter
 from sysid.export.torchscript import TorchScriptExporter
 from sysid.export.wasm_exporter import WasmExporter
@@ -37,6 +38,7 @@ EXPORTERS: dict[str, AbstractExporter] = {
         ArduinoExporter(),
         WasmExporter(),
         MatlabExporter(),
+        StructuredTextExporter(),
     )
 }
 """Every format by name."""

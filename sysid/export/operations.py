@@ -48,6 +48,8 @@ class Operation:
         jax: The same on JAX's numbers, given the module ``jax.numpy``.
         matlab: A MATLAB expression of scalars; C's where it is the same. Functions that MATLAB has not, or has
             otherwise for what is not a number, are those of ``templates/functions.m.j2``.
+        st: An expression of Structured Text; C's where it is the same. Functions in braces are those of
+            ``templates/functions.st.j2``.
     """
 
     c: str
@@ -57,10 +59,12 @@ class Operation:
     casadi: Callable[..., Any]
     jax: Callable[..., Any]
     matlab: str = ""
+    st: str = ""
 
     def __post_init__(self) -> None:
         """Fill in what is the same as in C."""
         object.__setattr__(self, "matlab", self.matlab or self.c)
+        object.__setattr__(self, "st", self.st or self.c)
 
 
 def _node(operator: str) -> Callable[..., str]:
@@ -252,7 +256,15 @@ _FIRST = ("({a} %s {b} ? R(1.0) : R(0.0))", "({a} %s {b} ? R(0.0) : R(1.0))")
 
 
 def _elementary(
-    name: str, slope: str, *, c: str = "", onnx: str = "", torch: str = "", jax: str = "", matlab: str = ""
+    name: str,
+    slope: str,
+    *,
+    c: str = "",
+    onnx: str = "",
+    torch: str = "",
+    jax: str = "",
+    matlab: str = "",
+    st: str = "",
 ) -> Operation:
     """A function of one number that every target has."""
     return Operation(
@@ -263,6 +275,7 @@ def _elementary(
         casadi=_same(name),
         jax=_same(jax or torch or name),
         matlab=f"{matlab or name}({{a}})",
+        st=f"{st or name.upper()}({{a}})",
     )
 
 
@@ -293,26 +306,27 @@ OPERATIONS: dict[int, Operation] = {
             "({a} > R(0.0) ? {r} * M(log)({a}) : R(0.0))",
         ),
         onnx=_node("Pow"), torch=_power_torch, casadi=_plain(lambda a, b: a**b),
-        jax=_plain(lambda a, b: a**b), matlab="power_of({a}, {b})",
+        jax=_plain(lambda a, b: a**b), matlab="power_of({a}, {b})", st="EXPT({a}, {b})",
     ),
     machine.FMA: Operation(
         c="{a} * {b} + {c}", slopes=("{b}", "{a}", "R(1.0)"), onnx=_fma_nodes,
         **_everywhere(lambda a, b, c: a * b + c),
     ),
     machine.ABS: _elementary(
-        "fabs", "({a} > R(0.0) ? R(1.0) : {a} < R(0.0) ? R(-1.0) : R(0.0))", onnx="Abs", torch="abs", matlab="abs"
+        "fabs", "({a} > R(0.0) ? R(1.0) : {a} < R(0.0) ? R(-1.0) : R(0.0))", onnx="Abs", torch="abs",
+        matlab="abs", st="ABS",
     ),
     machine.MIN: Operation(
         c=_MIN_C, slopes=tuple(one % "<=" for one in _FIRST), onnx=_least_nodes("LessOrEqual"),
         torch=lambda torch, a, b: torch.minimum(*_whole(torch, a, b)),
         casadi=lambda casadi, a, b: _least_casadi(casadi, a, b, a <= b), jax=_same("minimum"),
-        matlab="least({a}, {b})",
+        matlab="least({a}, {b})", st="{least}({a}, {b})",
     ),
     machine.MAX: Operation(
         c=_MIN_C.replace("<=", ">="), slopes=tuple(one % ">=" for one in _FIRST), onnx=_least_nodes("GreaterOrEqual"),
         torch=lambda torch, a, b: torch.maximum(*_whole(torch, a, b)),
         casadi=lambda casadi, a, b: _least_casadi(casadi, a, b, a >= b), jax=_same("maximum"),
-        matlab="greatest({a}, {b})",
+        matlab="greatest({a}, {b})", st="{greatest}({a}, {b})",
     ),
     machine.SQRT: Operation(
         c="({a} <= R(0.0) ? R(0.0) : M(sqrt)({a}))", slopes=("({r} > R(0.0) ? R(0.5) / {r} : R(0.0))",),
@@ -322,11 +336,11 @@ OPERATIONS: dict[int, Operation] = {
             a <= 0.0, torch.zeros_like(a), torch.sqrt(torch.where(a <= 0.0, torch.ones_like(a), a))
         ),
         casadi=lambda casadi, a: casadi.if_else(a <= 0, 0, casadi.sqrt(casadi.if_else(a <= 0, 1, a))),
-        jax=_root_jax, matlab="root({a})",
+        jax=_root_jax, matlab="root({a})", st="{root}({a})",
     ),
     machine.EXP: _elementary("exp", "{r}"),
-    machine.LOG: _elementary("log", "R(1.0) / {a}", matlab="logarithm"),
-    machine.TANH: _elementary("tanh", "R(1.0) - {r} * {r}", c="tanh_neuron({a})"),
+    machine.LOG: _elementary("log", "R(1.0) / {a}", matlab="logarithm", st="LN"),
+    machine.TANH: _elementary("tanh", "R(1.0) - {r} * {r}", c="tanh_neuron({a})", st="{tanh}"),
     machine.SIN: _elementary("sin", "M(cos)({a})"),
     machine.COS: _elementary("cos", "-M(sin)({a})"),
     machine.ATAN: replace(_elementary("atan", "R(1.0) / (R(1.0) + {a} * {a})", jax="arctan"), onnx=_atan_nodes),
@@ -335,17 +349,17 @@ OPERATIONS: dict[int, Operation] = {
         torch=lambda torch, a: _truth(torch, a > 0.0, a) - _truth(torch, a < 0.0, a),
         casadi=lambda casadi, a: casadi.if_else(a > 0, 1, casadi.if_else(a < 0, -1, 0)),
         jax=lambda jnp, a: jnp.where(a > 0.0, 1.0, jnp.where(a < 0.0, -1.0, 0.0)),
-        matlab="(double({a} > 0) - double({a} < 0))",
+        matlab="(double({a} > 0) - double({a} < 0))", st="{sign}({a})",
     ),
     machine.GREATER: Operation(
         c="({a} > R(0.0) ? R(1.0) : R(0.0))", slopes=("",), onnx=_switch_nodes("Greater"),
         torch=lambda torch, a: _truth(torch, a > 0.0, a), casadi=lambda casadi, a: casadi.if_else(a > 0, 1, 0),
-        jax=lambda jnp, a: jnp.where(a > 0.0, 1.0, 0.0), matlab="double({a} > 0)",
+        jax=lambda jnp, a: jnp.where(a > 0.0, 1.0, 0.0), matlab="double({a} > 0)", st="{above}({a})",
     ),
     machine.NOT_LESS: Operation(
         c="({a} >= R(0.0) ? R(1.0) : R(0.0))", slopes=("",), onnx=_switch_nodes("GreaterOrEqual"),
         torch=lambda torch, a: _truth(torch, a >= 0.0, a), casadi=lambda casadi, a: casadi.if_else(a >= 0, 1, 0),
-        jax=lambda jnp, a: jnp.where(a >= 0.0, 1.0, 0.0), matlab="double({a} >= 0)",
+        jax=lambda jnp, a: jnp.where(a >= 0.0, 1.0, 0.0), matlab="double({a} >= 0)", st="{not_below}({a})",
     ),
     machine.SELECT: Operation(
         c="({a} >= R(1.0) ? {b} : {a} <= R(0.0) ? {c} : {c} + {a} * ({b} - {c}))",
@@ -355,11 +369,11 @@ OPERATIONS: dict[int, Operation] = {
             "({a} >= R(1.0) ? R(0.0) : {a} <= R(0.0) ? R(1.0) : R(1.0) - {a})",
         ),
         onnx=_select_nodes, torch=_select_torch, casadi=_select_casadi, jax=_select_jax,
-        matlab="choice({a}, {b}, {c})",
+        matlab="choice({a}, {b}, {c})", st="{choice}({a}, {b}, {c})",
     ),
     machine.TABLE: Operation(
         c="table({a}, {points})", slopes=("table_slope({a}, {points})",), onnx=_table_nodes, torch=_table_torch,
-        casadi=_table_casadi, jax=_table_jax, matlab="table_at({a}, {points})",
+        casadi=_table_casadi, jax=_table_jax, matlab="table_at({a}, {points})", st="{points}({a})",
     ),
 }  # fmt: skip
 """By the machine's number."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,10 @@ def plain_stage(stage: Stage) -> dict[str, Any]:
         "low": form.low if np.isfinite(form.low) else None,
         "high": form.high if np.isfinite(form.high) else None,
         "n": n,
+        # each delay line: where it begins, its length, and what comes into it, an input or, behind them, an output
+        "moves": [
+            (stage.first + line.first, line.length, i) for i, line in enumerate(stage.state.lines) if line.length
+        ],
     }
     if isinstance(form, ProgramForm):
         return common | {"kind": "equations"} | _equations(stage)
@@ -76,7 +81,13 @@ def _equations(stage: Stage) -> dict[str, Any]:
 
 
 def program_lines(
-    listing: Listing, text: Callable[[Operation], str], *, number: Callable[[float], str], first: int, points: Any
+    listing: Listing,
+    text: Callable[[Operation], str],
+    *,
+    number: Callable[[float], str],
+    first: int,
+    points: Callable[[Points], str],
+    functions: Dict[str, str] | None = None,
 ) -> tuple[list[tuple[str, str]], list[str]]:
     """A program in a language.
 
@@ -86,6 +97,7 @@ def program_lines(
         number: What it makes of a number.
         first: Where its arrays begin.
         points: What it makes of a table.
+        functions: What functions that the texts name in braces are called.
 
     Returns:
         A name and an expression an instruction; and the results.
@@ -101,7 +113,7 @@ def program_lines(
     lines = []
     for at, one in enumerate(listing.instructions):
         reads = dict(zip("abc", map(read, one.reads), strict=False))
-        lines.append((f"v{at}", text(one.operation).format(**reads, points=points(one.points))))
+        lines.append((f"v{at}", text(one.operation).format(**reads, points=points(one.points), **(functions or {}))))
     return lines, [read(one) for one in listing.results]
 
 

@@ -74,10 +74,11 @@ ROWS = {
     "C++": Row(format="cpp", name="{name}.hpp"),
     "WebAssembly": Row(format="wasm", name="{name}.wasm"),
     "MATLAB": Row(format="matlab", name="{name}_run.m"),
+    "Structured Text": Row(format="st", name="{name}.st"),
     "Arduino": Row(format="arduino", name="{name}_arduino.zip", dtype="float32", tolerance=1e-3),
 }
 """Every file of every format: the table of the contract."""
-OPTIONAL = ("wasm", "matlab")
+OPTIONAL = ("wasm", "matlab", "st")
 """Formats whose compiler or judge is large, and is not among what the tests must have."""
 FORMATS = tuple(dict.fromkeys(row.format for row in ROWS.values()))
 
@@ -161,8 +162,8 @@ FEW_MODELS = (
 )
 WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino", "wasm", "jax")
 """Formats that meet one model of a kind: those around the C source or TorchScript's module, and what compiles long."""
-INTERPRETED = ("matlab",)
-"""Formats that run slowly here, and meet what differs in them: sizes and bounds, every kind of stage."""
+INTERPRETED = ("matlab", "st")
+"""Formats that start or run slowly here, and meet what differs in them: sizes and bounds, every kind of stage."""
 MET = dict.fromkeys(WRAPPED, FEW_MODELS) | dict.fromkeys(INTERPRETED, FEW_MODELS[-1:])
 PAIRS = [(m, r) for m in MODELS for r, row in ROWS.items() if m in MET.get(row.format, MODELS)]
 WIRED = [

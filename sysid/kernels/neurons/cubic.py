@@ -57,4 +57,5 @@ CUBIC = Neuron(
     torch=_torch,
     jax=lambda: lambda x: x * x * x,  # what a power's derivative is at 0 depends on the library
     matlab="x .* x .* x",
+    st="{x} * {x} * {x}",
 )

@@ -41,6 +41,7 @@ class Neuron:
         torch: Makes a torch module of the function that can be scripted.
         jax: Gives the function in ``jax.numpy``, elementwise.
         matlab: The function as a MATLAB expression of ``x``, elementwise.
+        st: The function as an expression of Structured Text (IEC 61131-3) of ``{x}``; ``{tanh}`` is a function's name.
     """
 
     name: str
@@ -52,3 +53,4 @@ class Neuron:
     torch: Callable[[], Any]
     jax: Callable[[], Callable[[Any], Any]]
     matlab: str
+    st: str

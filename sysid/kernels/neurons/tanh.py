@@ -56,4 +56,5 @@ TANH = Neuron(
     torch=_torch,
     jax=_jax,
     matlab="tanh(x)",
+    st="{tanh}({x})",
 )
