@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from sysid.airbrake import kernel
 from sysid.airbrake.consist import TEMPERATURE, Consist
-from sysid.airbrake.flow import GAS_CONSTANT, HEAT_RATIO
+from sysid.airbrake.flow import GAS_CONSTANT, HEAT_RATIO, flow_table
 from sysid.airbrake.variant import QuickService, Variant
 from sysid.units import STANDARD_ATMOSPHERE_PA
 
@@ -76,7 +78,16 @@ def kernel_constants(consist: Consist, variant: Variant, dt: float) -> kernel.Co
         exhaust_as_printed=variant.exhaust_as_printed,
         pipe_momentum=variant.pipe_momentum,
         momentum_step=HEAT_RATIO * dt * pipe_section / consist.pipe.length,
+        leak_area=_leak_area(consist, variant),
         speed_gates=variant.speed_gates,
         accelerated_service=variant.accelerated_service,
         accelerated_emergency=variant.accelerated_emergency,
     )
+
+
+def _leak_area(consist: Consist, variant: Variant) -> float:
+    """m2 of a hole through which the charged pipe of one vehicle falls at the variant's rate."""
+    kilograms = variant.leakage * consist.pipe.volume / (GAS_CONSTANT * TEMPERATURE)
+    ratio = np.array([STANDARD_ATMOSPHERE_PA / consist.charged])
+    table = flow_table(laminar_ratio=variant.laminar_ratio)
+    return float(kilograms / (table(ratio)[0] / math.sqrt(TEMPERATURE) * consist.charged))

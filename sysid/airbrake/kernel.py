@@ -72,6 +72,7 @@ class Constants(NamedTuple):
     exhaust_as_printed: bool
     pipe_momentum: bool
     momentum_step: float  # gamma dt S / L of the pipe of one vehicle, in kg/s per Pa
+    leak_area: float  # m2 to the atmosphere in the pipe of every vehicle
     speed_gates: bool
     accelerated_service: bool
     accelerated_emergency: bool
@@ -311,6 +312,18 @@ def _ports(x, port, port_nodes, net, command, moving, c, values, slopes):
 
 
 @numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _leaks(x, net, c, values, slopes):
+    """What leaks from the pipe of every vehicle behind the head; returns the flow."""
+    lost = 0.0
+    for i in range(1, len(net)):
+        if x[i] > c.atmosphere:
+            flow = _flow(c.leak_area, x[i], c.atmosphere, values, slopes)
+            net[i] -= flow
+            lost += flow
+    return lost
+
+
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
 def _step(
     command, moving, tail_area, x, content, port, releasing, tripped, history, cursor,
     valve_nodes, port_nodes, flows, net, c, values, slopes,
@@ -325,6 +338,8 @@ def _step(
     gained = flows[0] - flows[nodes - 1]
     for i in range(1, nodes):
         net[i] = flows[i - 1] - flows[i]
+    if c.leak_area > 0.0:
+        gained -= _leaks(x, net, c, values, slopes)
     gained += _ports(x, port, port_nodes, net, command, moving, c, values, slopes)
     row = cursor[0]
     for j in range(valves):

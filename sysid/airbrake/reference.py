@@ -81,6 +81,12 @@ class PlainTrain:
         opening = 1.0 if emergency else min(1.0, (local - held) / self.variant.relay_band)
         return -self._flow(opening * exhaust, local, PATM)
 
+    def _leak(self, p: float) -> float:
+        """Flow to the atmosphere through a hole that would let the charged pipe of a vehicle fall at the given rate."""
+        charged, rate = self.consist.charged, self.variant.leakage
+        at_charge = rate * self.consist.pipe.volume / (GAS_CONSTANT * TEMPERATURE)
+        return at_charge * self._flow(1.0, p, PATM) / self._flow(1.0, charged, PATM) if p > PATM else 0.0
+
     def _held(self, held: float, sensed: float, command: float, moving: bool) -> float:
         """What a locomotive's brake valve holds next."""
         if not moving:
@@ -107,6 +113,7 @@ class PlainTrain:
         ]
         flows = [self._head(pipe[0], pipe[1], command), *self.between, self._flow(tail_area, pipe[-1], PATM)]
         net = [0.0, *(into - out for into, out in itertools.pairwise(flows))]
+        net = [net[0], *(n - self._leak(p) for n, p in zip(net[1:], pipe[1:], strict=True))]
         for index, node in enumerate(consist.port_nodes):
             local = pipe[node - 1]
             net[node - 1] += self._head(self.port[index], local, command)

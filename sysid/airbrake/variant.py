@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -73,6 +74,9 @@ class Variant:
             isothermal). The print's flow follows at once, and the wave of a release, which every valve pushes on,
             runs at 407 m/s through 101 vehicles; with momentum at 316 m/s, and an emergency at 248 m/s, a tenth below
             the 900 ft/s of manuals. Needs ``laminar_ratio``.
+        leakage: The pipe of every vehicle leaks: Pa/s by which it falls at the running pressure where nothing feeds it
+            (a hole of constant area, so that the flow falls with the pressure). 574.6 Pa/s are the 5 psi/min that
+            49 CFR 232.205 (c) allows; the print's pipe is tight.
         speed_gates: A train at rest vents nothing, releases its brakes and is recharged, as printed.
         accelerated_service: Emergency reservoir to pipe on a service release (ABD and later; not AB).
         accelerated_emergency: Cylinder to pipe on a release after an emergency (ABD and later; not AB).
@@ -97,6 +101,7 @@ class Variant:
     laminar_ratio: float | None = None
     exhaust_as_printed: bool = False
     pipe_momentum: bool = False
+    leakage: float = 0.0
     speed_gates: bool = True
     accelerated_service: bool = True
     accelerated_emergency: bool = True
@@ -117,6 +122,11 @@ class Variant:
                     got=f"{name} alone",
                     remedy=f"set {other} too, or leave {name} out",
                 )
+        if not 0.0 <= self.leakage < math.inf:
+            raise ConfigError(
+                "the leakage is not a rate", where="variant", expected="Pa/s, 0 or above", got=self.leakage,
+                remedy="write for example leakage: 574.6, which is 5 psi/min",
+            )  # fmt: skip
         for name in ("relay_band", "equalising_rate", "rising_delay", "quick_service_limit"):
             value = getattr(self, name)
             if value is not None and not value > 0.0:

@@ -271,3 +271,23 @@ def test_a14_air_is_conserved(variant: Variant, pairs: int) -> None:
     before, after = record.stored
     assert after != before
     assert after - before == pytest.approx(record.gained, abs=1e-9 * before)
+
+
+def test_a_leak_at_every_car_has_the_rate_that_is_declared() -> None:
+    """49 CFR 232.205 (c): at most 5 psi/min; far from the feed the pipe falls at just that, before a valve answers."""
+    leaking = PHYSICAL.with_options({"leakage": 5.0 * PSI_IN_PA / 60.0})
+    pipe = run(((0.0, 90.0), (2.0, 90.0)), 50, leaking).gauge_psi("pipe", 101)
+    assert pipe[10] - pipe[0] == pytest.approx(-5.0 / 60.0, rel=0.01)
+
+
+def test_a_leak_makes_a_gradient_along_a_charged_train() -> None:
+    """The feed at the head holds what leaks behind it: the pipe falls from vehicle to vehicle, less and less."""
+    leaking = PHYSICAL.with_options({"leakage": 5.0 * PSI_IN_PA / 60.0})
+    record = simulate(
+        Command.from_rows(((0.0, 90.0), (600.0, 90.0))), consist=Consist(pairs=50), variant=leaking, probes=None
+    )
+    along = [record.gauge_psi("pipe", node)[-1] for node in (3, 35, 67, 101)]
+    drops = -np.diff(along)
+    assert np.all(drops > 0.0)
+    assert np.all(np.diff(drops) < 0.0)
+    assert 0.0 < 90.0 - along[-1] < 15.0

@@ -35,6 +35,7 @@ def single_switches() -> dict[str, Variant]:
     variants["physical, no quick service"] = PHYSICAL.with_options({"quick_service": "none"})
     variants["listing, no quick service"] = LISTING.with_options({"quick_service": "none"})
     variants["physical, air with momentum"] = ACOUSTIC
+    variants["physical, leaking"] = PHYSICAL.with_options({"leakage": 574.6})
     variants["listing, exhaust as printed"] = LISTING.with_options({"exhaust_as_printed": True})
     for name in ("accelerated_service", "accelerated_emergency"):
         variants[f"physical, no {name}"] = PHYSICAL.with_options({name: False})

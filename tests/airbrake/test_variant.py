@@ -31,6 +31,8 @@ def test_switches_change_one_thing() -> None:
         ({"pipe_momentum": True}, "needs laminar_ratio"),
         ({"rising_delay": 0.0}, "not positive"),
         ({"relay_band": -1.0}, "not positive"),
+        ({"leakage": -1.0}, "not a rate"),
+        ({"leakage": float("nan")}, "not a rate"),
         ({"rising_delay": None}, "wrong type"),
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",

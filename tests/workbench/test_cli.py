@@ -65,6 +65,11 @@ def test_every_command_has_a_line_of_help_and_an_example(command: str, capsys: p
     assert command in capsys.readouterr().out
 
 
+def test_it_runs_as_a_module_where_the_script_is_not_on_the_path() -> None:
+    told = subprocess.run([sys.executable, "-m", "sysid", "--version"], check=True, capture_output=True, text=True)
+    assert told.stdout.startswith("sysid ")
+
+
 def test_no_tracking_command_names_itself(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_cli(["--version"]) == 0
     assert capsys.readouterr().out.startswith("sysid ")
