@@ -71,7 +71,7 @@ def _text(surrogate: Surrogate) -> str:
     functions = {name: f"{prefix}_{name}" for name in FUNCTIONS}
     for stage in stages:
         form = stage["form"]
-        listings = form.listings if isinstance(form, ProgramForm) else {}
+        listings = form.run if isinstance(form, ProgramForm) else {}
         stage["programs"] = {
             name: _program(one, functions, {points: f"{prefix}_table{at}" for points, at in own.items()})
             for name, one in listings.items()
@@ -92,6 +92,7 @@ def _text(surrogate: Surrogate) -> str:
         "meaning": MEANING,
         "number": _number,
         "array": _array,
+        "columns": lambda rows: np.array(rows).T,
         "words": _words,
         **rest_values(surrogate),
     }
