@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError, TraceError
 from sysid.units import Reference
 
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Magnitudes between which a channel's largest value may lie: the square of its squares is a number in float64."""
+
 
 def check_text(text: str, what: str) -> None:
     """Refuse text that is not made of whole characters: a lone surrogate, as from names of files that are no text.
@@ -109,7 +112,8 @@ class Trace:
             not know them. ``None`` means that all count alike.
 
     Raises:
-        TraceError: If shapes disagree, a value is not finite, or the sample time is not positive.
+        TraceError: If shapes disagree, a value is not finite or too large to be squared, or the sample time is not
+            positive.
 
     Example:
         >>> trace = Trace(name="a", sample_time=0.1, channels=(Channel(name="u", unit="V"),), values=np.zeros((3, 1)))
@@ -197,6 +201,7 @@ class Trace:
                 got=self.values[row, column],
                 remedy="ask for a repair at ingest, or mark the samples as not usable",
             )
+        self._check_sizes()
         if self.usable is not None and np.shape(self.usable) != (len(self.values),):
             raise TraceError(
                 "the usable mask does not match the samples",
@@ -205,6 +210,20 @@ class Trace:
                 got=f"shape {np.shape(self.usable)}",
                 remedy="give one truth value per sample",
             )
+
+    def _check_sizes(self) -> None:
+        """Refuse channels whose squares are no numbers any more: no sum of squares, and so no fit, would be right."""
+        size = np.maximum(self.values.max(axis=0), -self.values.min(axis=0))
+        for name, largest in zip(self.channel_names, size, strict=True):
+            if not (largest == 0.0 or SMALLEST <= largest <= LARGEST):
+                raise TraceError(
+                    f"the values are too {'large' if largest > LARGEST else 'small'} to be squared",
+                    where=f"trace {self.name}, channel {name}",
+                    expected=f"a largest magnitude between {SMALLEST:g} and {LARGEST:g}, or 0",
+                    got=f"{largest:.4g}",
+                    remedy="multiply the channel by a power of ten, or give it in another unit; where such a value "
+                    "stands for a missing one, name it under missing",
+                )
 
     def __len__(self) -> int:
         return len(self.values)

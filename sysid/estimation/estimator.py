@@ -19,7 +19,7 @@ from sysid.estimation.linear_posteriors import LinearPosterior
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import Training
-from sysid.estimation.record_notes import contradicted, undetermined
+from sysid.estimation.record_notes import contradicted, outnumbered, undetermined
 from sysid.estimation.result import FitResult
 from sysid.estimation.stability.check import (
     AbstractStabilityCheck,
@@ -199,7 +199,7 @@ class Estimator:
             told = () if found.posterior is not None else (f"No interval of the output: {self.no_posterior}.",)
             off = equilibrium_notes(found.model, traces, named["start"])
             against = contradicted(found.model, traces, named["start"])
-            warned = (*undetermined(traces, mapping), *against, *off)
+            warned = (*undetermined(traces, mapping), *outnumbered(found.model, traces), *against, *off)
             return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
 
         return checked.fitted(noted, traces, mapping, structure, *chosen, **known)

@@ -62,6 +62,25 @@ def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
     return tuple(told)
 
 
+def outnumbered(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...]:
+    """Whether a model has more parameters than the records have numbers to tell of them.
+
+    Args:
+        model: The fitted model.
+        traces: The records that were fitted.
+
+    Returns:
+        None, or a sentence.
+    """
+    samples = sum(int(trace.usable_samples.sum()) for trace in traces)
+    if model.n_parameters < samples * len(model.mapping.outputs):
+        return ()
+    return (
+        f"The model has {model.n_parameters} parameters and the records have {samples} samples: most of them are not "
+        "told by the records, and a close fit says nothing. Record longer, or take a smaller model.",
+    )
+
+
 def informative(inputs: NDArray[np.float64]) -> tuple[int, ...]:
     """The inputs whose effects records tell: those that move, and are not made of ones before them.
 

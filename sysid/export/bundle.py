@@ -70,7 +70,7 @@ class BundleFile:
     tolerance: float
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Bundle:
     """A bundle on disk.
 
@@ -85,6 +85,10 @@ class Bundle:
     model: AbstractModel | Cascade
     metadata: dict[str, Any]
     files: tuple[BundleFile, ...]
+
+    def __repr__(self) -> str:
+        files = ", ".join(file.name for file in self.files) or "no files"
+        return f"<Bundle of {self.metadata.get('label', 'a model')} in {self.folder}: {files}>"
 
     @property
     def inputs(self) -> tuple[dict[str, Any], ...]:

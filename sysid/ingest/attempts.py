@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError, UserError
-from sysid.ingest.numbers import usually_missing
+from sysid.ingest.numbers import spaced, usually_missing
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.reading import read_table
 from sysid.ingest.table import RawColumn, RawTable
@@ -90,7 +90,7 @@ def _given(files: FileOptions) -> dict[str, Any]:
 
 def _with(best: Attempt, more: dict[str, Any], path: Path) -> Attempt | None:
     """The attempt with further options, or ``None`` if they do not help."""
-    told = frozenset(more) if "time" not in more else frozenset({"zone"})
+    told = frozenset(more) if "time" not in more else frozenset({"zone", "format"} & set(more["time"]))
     options = FileOptions.model_validate({**_given(best.files), **more})
     try:
         table = read_table(path, files=options, repairs=best.repairs)
@@ -103,7 +103,7 @@ def _with(best: Attempt, more: dict[str, Any], path: Path) -> Attempt | None:
 def _thousands(table: RawTable) -> dict[str, Any] | None:
     """The mark that separates thousands, where it keeps a column from being one of numbers."""
     decimal = str(table.settings.get("decimal", "."))
-    strange = [text for column in table.columns for text in column.strange]
+    strange = [spaced(text) for column in table.columns for text in column.strange]
     for mark in (".", ",", "'", " "):
         grouped = re.compile(rf"[+-]?[0-9]{{1,3}}(?:{re.escape(mark)}[0-9]{{3}})+(?:{re.escape(decimal)}[0-9]*)?")
         if strange and all(grouped.fullmatch(text) for text in strange):
@@ -218,5 +218,40 @@ def _zone(table: RawTable) -> dict[str, Any] | None:
     return {"time": {"column": table.time, "unit": "datetime", "zone": zone}} if zone and table.time else None
 
 
-SUGGESTIONS: tuple[Callable[[RawTable], dict[str, Any] | None], ...] = (_thousands, _missing, _states, _zone, _long)
+def _packed(table: RawTable) -> dict[str, Any] | None:
+    """Numbers that are the digits of a date and a time: 20240312235958."""
+    if table.reader != "csv" or table.settings.get("calendar"):
+        return None
+    for column in table.columns:
+        known = column.values[np.isfinite(column.values)]
+        possible = column.name == table.time if table.time else len(known) > 1 and bool((np.diff(known) >= 0.0).all())
+        pattern = _digits_of(known) if possible and len(known) > 1 else None
+        if pattern:
+            return {"time": {"column": column.name, "unit": "datetime", "format": pattern}}
+    return None
+
+
+def _digits_of(known: NDArray[np.float64]) -> str | None:
+    """As what pattern of digits numbers are dates and times; ``None`` where they are none."""
+    if (known != np.round(known)).any():
+        return None
+    for parts, pattern in ((6, "%Y%m%d%H%M%S"), (5, "%Y%m%d%H%M")):
+        digits = [known // 100.0**i % 100.0 for i in range(parts - 1)]  # from the seconds, or the minutes, up
+        times, day, month = digits[:-2], digits[-2], digits[-1]
+        year = known // 100.0 ** (parts - 1)
+        limits = (60, 60, 24)[-len(times) :]
+        calendar = (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31) & (year >= 1900) & (year < 2200)
+        if calendar.all() and all((one < most).all() for one, most in zip(times, limits, strict=True)):
+            return pattern
+    return None
+
+
+SUGGESTIONS: tuple[Callable[[RawTable], dict[str, Any] | None], ...] = (
+    _thousands,
+    _missing,
+    _states,
+    _zone,
+    _packed,
+    _long,
+)
 """What a table says of the options that it needs, in the order in which they are tried."""

@@ -126,7 +126,9 @@ class FileFinding:
         """What a data set of this file has to deal with, one phrase each."""
         found = list(self.notes)
         given = self.files.model_dump(exclude_none=True)
-        found += [f"{name}: {given[name]} is a guess" for name in sorted(self.guessed - {"zone"}) if name in given]
+        found += [
+            f"{name}: {given[name]} is a guess" for name in sorted(self.guessed - {"zone", "format"}) if name in given
+        ]
         found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
         timing = self.timing
         if timing is None:
@@ -208,6 +210,8 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
     clock = time.column
     if "zone" in attempt.guessed:
         told = f"guessed: the clock on the wall of {time.zone}, as it jumps by an hour"
+    if "format" in attempt.guessed:
+        told = f"guessed: {time.column} is the digits of dates, {time.format}"
     timing, unstamped, step = None, 0, time.step or 1.0
     needs: dict[str, object] = {}
     if time.step is None:

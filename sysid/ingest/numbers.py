@@ -37,6 +37,8 @@ def usually_missing(text: str) -> bool:
     return text.casefold() in USUAL_MISSING or (len(text) > 0 and not text.strip("*#?-_."))
 
 
+_BLANKS = dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f"), " ")
+
 MOST_WORDS = 64
 """Different texts that are no numbers, above which a column is one of remarks."""
 
@@ -75,7 +77,7 @@ class NumberFormat:
             >>> NumberFormat(decimal=",", thousands=".").parse("1.5") is None
             True
         """
-        text = cell.strip()
+        text = spaced(cell.strip()) if self.thousands == " " else cell.strip()
         if self.suffix:
             text = text.removesuffix(self.suffix).rstrip()
         if text.lower() in MISSING or text in self.missing:
@@ -147,6 +149,22 @@ class NumberFormat:
             return np.array([float(cell) for cell in joined.replace(self.decimal, ".").split("\n")])
         except ValueError:
             return None
+
+
+def spaced(text: str) -> str:
+    r"""A text with a plain blank for each that typographers use between thousands.
+
+    Args:
+        text: Of a cell.
+
+    Returns:
+        The text.
+
+    Example:
+        >>> spaced("1\u202f000\xa0000")
+        '1 000 000'
+    """
+    return text.translate(_BLANKS)
 
 
 def _float(text: str) -> float:

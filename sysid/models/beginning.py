@@ -47,17 +47,20 @@ def window(memory: int, usable: NDArray[np.bool_], *, asked: int = 0) -> int:
         asked: A length that somebody chose; 0 for none.
 
     Returns:
-        The number, masked samples included, at most all but the last of the record.
+        The number, masked samples included, at most all before the last sample that is not masked: one is left to be
+        scored.
 
     Example:
         >>> [window(memory, np.ones(n, dtype=bool)) for memory, n in ((3, 100), (3, 1000), (9, 25))]
         [20, 50, 9]
+        >>> window(3, np.arange(300) < 5)
+        3
     """
-    n = len(usable)
-    wanted = asked or max(min(LONGEST_WINDOW, n // SHARE_OF_RECORD), memory, 1)
-    seen = np.cumsum(usable)
-    length = int(np.searchsorted(seen, wanted)) + 1
-    return max(0, min(length, n - 1))
+    places = np.flatnonzero(usable)
+    if not len(places):
+        return 0
+    wanted = asked or max(min(LONGEST_WINDOW, len(places) // SHARE_OF_RECORD), memory, 1)
+    return int(min(places[min(wanted, len(places)) - 1] + 1, places[-1]))
 
 
 def beginning(

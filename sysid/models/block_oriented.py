@@ -55,11 +55,19 @@ class BlockStructure(AbstractStructure):
     def check_inputs(self, n_inputs: int) -> None:
         """Refuse a number of inputs that the structure is not for."""
         given = self.delays
-        if n_inputs < 1 or (not isinstance(given, int) and len(given) != n_inputs):
+        if n_inputs < 1:
+            raise ConfigError(
+                f"{self.kind} needs an input: its curves bend one",
+                where="mapping",
+                expected="u -> y",
+                got="no input",
+                remedy="name an input, or fit an ARX model, a NARX network or a neural state space, which need none",
+            )
+        if not isinstance(given, int) and len(given) != n_inputs:
             raise ConfigError(
                 "the dead times do not match the inputs",
                 where="delays",
-                expected=f"{max(n_inputs, 1)} values, one for each input" if n_inputs else "an input",
+                expected=f"{n_inputs} values, one for each input",
                 got=f"{given} and {n_inputs} inputs",
                 remedy="write one number for all inputs, or one for each",
             )

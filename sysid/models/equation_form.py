@@ -15,9 +15,12 @@ from sysid.kernels import register_machine as machine
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
 from sysid.models.scaling import Scaling, VectorScaling
-from sysid.models.state_search import StateSearch, at_rest
+from sysid.models.state_search import LARGEST, StateSearch, at_rest
 
 Array = NDArray[np.float64]
+
+INTEGRATES = 1e-9
+"""Singular value of what changes from sample to sample, in states' scales, up to which there is no equilibrium."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -281,13 +284,28 @@ class EquationForm(AbstractForm):
         self, x: Array, u: Array, p: int = 0
     ) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
         """What changes at a state, and the outputs there, each with its derivatives by state and parameters."""
-        low, n = self.lowered, len(x)
+        low = self.lowered
         changes = [self._derived(program, x, u, p) for program in (low.rates, low.updates)]
         change, by_state, by_parameter = (np.concatenate(parts) for parts in zip(*changes, strict=True))
         first = low.n_continuous
         change[first:] -= x[first:]
-        by_state[first:, first:] -= np.eye(n - first)
+        by_state[first:, first:] = self._settling(by_state[first:, first:])
         return (change, by_state, by_parameter), self._derived(low.outputs, x, u, p)
+
+    def _settling(self, by_state: Array) -> Array:
+        """How what changes from sample to sample moves with the states; a rounding off an integrator is one.
+
+        A pole that is off 1 by a rounding has an equilibrium where no plant ever was.
+        """
+        found = by_state - np.eye(len(by_state))
+        if not len(found) or not np.all(np.abs(found) < LARGEST):
+            return found
+        scale = self.terms.scale[-len(found) :]
+        left, sizes, right = np.linalg.svd(found * scale / scale[:, None])
+        small = sizes < INTEGRATES
+        if small.any():
+            found -= (left[:, small] * sizes[small]) @ right[small] * scale[:, None] / scale
+        return np.asarray(found)
 
     def _derived(self, program: object, x: Array, u: Array, p: int) -> tuple[Array, Array, Array]:
         results = len(program.results)  # type: ignore[attr-defined]  # a Program

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 APART = 1e-4
 """Step of a difference, in standard deviations, where those are no larger than the coefficients."""
+NOTHING = 1e-14
+"""Part of the largest coefficient of a numerator below which one is a rounding."""
 AT_ONE = 1e-6
 """Distance of a denominator's sum from 0 below which its response to a constant is not told from an integrator's."""
 
@@ -87,8 +89,15 @@ class Polynomials:
         B, F = self.numerators[j], self.denominators[j]
         if self.sample_time is None:
             return B, F
-        num, den, _ = scipy.signal.cont2discrete((B[::-1], F[::-1]), self.sample_time, method="zoh")
-        return np.atleast_1d(np.squeeze(num)), np.asarray(den)
+        # With the sample time as the unit of time and the numerator's size as that of the output: coefficients below
+        # 1e-14 would be taken for zeros.
+        powers = self.sample_time ** (len(F) - 1.0 - np.arange(len(F)))
+        top, size = B * powers[: len(B)], float(np.abs(B * powers[: len(B)]).max(initial=0.0))
+        leading = np.trim_zeros(np.where(np.abs(top) > NOTHING * size, top, 0.0), "b")
+        if not len(leading):
+            return np.zeros(1), np.asarray(scipy.signal.cont2discrete(([1.0], (F * powers)[::-1]), 1.0)[1])
+        num, den, _ = scipy.signal.cont2discrete((leading[::-1] / size, (F * powers)[::-1]), 1.0, method="zoh")
+        return np.atleast_1d(size * np.squeeze(num)), np.asarray(den)
 
     def _levels(self, first: NDArray[np.float64]) -> NDArray[np.float64]:
         """What each input holds the output at; 0 where it would hold it nowhere."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from math import comb
@@ -9,7 +10,7 @@ from typing import Annotated, Any
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractStructure
-from sysid.models.curves import quoted
+from sysid.models.curves import number, quoted
 from sysid.models.lags import Lags, LagSpec, parse_lags, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
@@ -98,11 +99,24 @@ class PolynomialNARX(AbstractStructure):
         n = self.lags(n_inputs).n_regressors
         return [term for d in range(self.degree + 1) for term in combinations_with_replacement(range(n), d)]
 
-    def regressors(self, mapping: Mapping) -> list[str]:
-        """The regressors as equations have them, inputs first."""
+    def regressors(self, mapping: Mapping, origin: Iterable[float] | None = None) -> list[str]:
+        """The regressors as equations have them, inputs first.
+
+        Args:
+            mapping: Which channels go in, which comes out.
+            origin: What each channel is counted from, inputs first; nothing by default.
+
+        Returns:
+            Their texts.
+        """
         lags = self.lags(len(mapping.inputs))
-        rows = [*zip(mapping.inputs, lags.inputs, strict=True), (mapping.output, lags.output)]
-        return [f"{quoted(name)}[k-{lag}]" if lag else quoted(name) for name, each in rows for lag in each]
+        names = (*mapping.inputs, mapping.output)
+        found = []
+        levels = (0.0,) * len(names) if origin is None else origin
+        for name, each, at in zip(names, (*lags.inputs, lags.output), levels, strict=True):
+            plain = [f"{quoted(name)}[k-{lag}]" if lag else quoted(name) for lag in each]
+            found += [f"({one} - {number(float(at))})" if at else one for one in plain]
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""

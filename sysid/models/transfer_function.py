@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -286,6 +286,10 @@ class TransferFunctionModel(AbstractModel):
     def recursion(self) -> StateSpace:
         """The state space that is run and exported: block by block, each input's dead time, then its basis."""
         parts = [self._block(j) for j in range(len(self.sections))]
+        if not any(taps.any() for taps in self.taps):
+            # Nothing drives it, and the records still said how it leaves the state in which it begins.
+            first, n, k = parts[0], len(parts[0].A), self.delays[0]
+            parts[0] = replace(first, B=np.zeros(n), C=(np.arange(n) >= k).astype(np.float64)[np.newaxis])
         B = np.zeros((sum(len(part.A) for part in parts), len(parts)))
         at = 0
         for j, part in enumerate(parts):

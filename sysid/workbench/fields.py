@@ -31,6 +31,34 @@ STRUCTURES: dict[str, type[AbstractStructure]] = {kind: row.structure for kind, 
 """Structures that a pipeline can fit; their fields are those of the classes."""
 
 _KINDS = {structure.__name__: kind for kind, structure in STRUCTURES.items()}
+_ALSO = {"TF": "TransferFunction"}
+"""Words of reports and of ``sysid orders`` that are no names of classes."""
+
+_ELSEWHERE = {
+    **dict.fromkeys(("tfest", "idtf", "procest", "idproc", "transfer function"), "TransferFunction"),
+    **dict.fromkeys(("ssest", "n4sid", "idss", "statespace", "state space"), "LinearStateSpace"),
+    **dict.fromkeys(("nlarx", "idnlarx", "narxnet", "nnarx"), "NARX"),
+    **dict.fromkeys(("nlhw", "idnlhw", "hammerstein", "wiener", "hw"), "HammersteinWiener"),
+    **dict.fromkeys(("greyest", "nlgreyest", "idgrey", "idnlgrey", "graybox", "grey box"), "GreyBox"),
+    **dict.fromkeys(("idneuralstatespace", "nlssest"), "NeuralStateSpace"),
+    **dict.fromkeys(("frols", "polynomial"), "PolynomialNARX"),
+    **dict.fromkeys(("ar", "fir", "idpoly", "impulseest"), "ARX"),
+}
+"""What the same is called in other tools, in small letters."""
+
+_EXAMPLES = {
+    **dict.fromkeys(("poles", "nb", "nf"), "[2]"), **dict.fromkeys(("zeros", "nk"), "[1]"), "na": "2", "nc": "1",
+    "nd": "1", "states": "2", "neurons": "10", "input_delays": "2", "output_delays": "2", "first": "1", "second": "1",
+    "equations": '"y[k+1] = a*y + b*u"',
+}  # fmt: skip
+"""What a field may look like, for one input."""
+
+
+def _meant(kind: str) -> str | None:
+    """The kind that somebody meant by a word, by its letters or from another tool."""
+    small = {name.casefold(): name for name in (*_KINDS, *STRUCTURES, *_ALSO)} | _ELSEWHERE
+    near = [kind.casefold()] if kind.casefold() in small else difflib.get_close_matches(kind.casefold(), small, n=1)
+    return small[near[0]] if near else None
 
 
 def with_short_kind(value: object) -> object:
@@ -47,7 +75,7 @@ def with_short_kind(value: object) -> object:
         {'kind': 'NSS', 'states': 2}
     """
     if isinstance(value, Dict) and isinstance(value.get("kind"), str):
-        return {**value, "kind": _KINDS.get(value["kind"], value["kind"])}
+        return {**value, "kind": _KINDS.get(value["kind"], _ALSO.get(value["kind"], value["kind"]))}
     return value
 
 
@@ -82,8 +110,8 @@ def _structure(value: object) -> AbstractStructure:
         )
     kind = value["kind"]
     if not isinstance(kind, str) or kind not in STRUCTURES:
-        near = difflib.get_close_matches(shortened(kind).strip("'"), _KINDS, n=1)
-        remedy = f"did you mean {near[0]}?" if near else "choose one of these kinds"
+        meant = _meant(shortened(kind).strip("'"))
+        remedy = f"did you mean {meant}?" if meant else "choose one of these kinds"
         raise FieldError("unknown kind of structure", expected=f"one of {kinds}", got=shortened(kind), remedy=remedy)
     parameters = inspect.signature(STRUCTURES[kind]).parameters
     for name in value:
@@ -101,7 +129,9 @@ def _structure(value: object) -> AbstractStructure:
             f"the structure {kind} lacks {', '.join(missing)}",
             expected=", ".join(parameters),
             got=", ".join(str(name) for name in value),
-            remedy=f"add {missing[0]}: ...",
+            remedy="add "
+            + ", ".join(f"{name}: {_EXAMPLES.get(name, '...')}" for name in missing)
+            + ("; a list has one number for each input" if {"poles", "zeros", "nb", "nk", "nf"} & set(missing) else ""),
         )
     try:
         return structure_from_dict(value)
@@ -121,7 +151,7 @@ def _structure_schema() -> dict[str, Any]:
     choices = []
     for kind, structure in STRUCTURES.items():
         parameters = inspect.signature(structure).parameters
-        names = list(dict.fromkeys([structure.__name__, kind]))
+        names = list(dict.fromkeys([structure.__name__, kind, *(also for also, one in _ALSO.items() if one == kind)]))
         choices.append(
             {
                 "type": "object",

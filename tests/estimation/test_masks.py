@@ -9,12 +9,24 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from sysid.errors import TraceError
 from sysid.estimation import Loop, Training, fit_arx, fit_narx
-from sysid.estimation.experiment import experiments_of
+from sysid.estimation.estimators import fit
+from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.linear.instrumental import fit_iv4
 from sysid.estimation.linear.order_search import OrderGrid, search_orders
 from sysid.estimation.networks.provider import RecursionProvider
-from sysid.models import ARX, NARX, Mapping, Start, StartKind
+from sysid.models import (
+    ARX,
+    NARX,
+    OE,
+    AbstractStructure,
+    Mapping,
+    PolynomialNARX,
+    Start,
+    StartKind,
+    TransferFunction,
+)
 from sysid.traces import Channel, Trace
 
 MAPPING = Mapping.parse("u -> y")
@@ -95,3 +107,33 @@ def test_over_a_horizon_no_run_begins_at_a_masked_output() -> None:
     counted = {k for k in range(10, 600) if trace.usable_samples[k]}
     lost = {k for k in range(10, 600) if not trace.usable_samples[10 + (k - 10) // 20 * 20 - 1]}
     assert provider.n_samples == len(counted - lost)
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [ARX(na=1, nb=(1,), nk=(1,)), OE(nb=(1,), nf=(1,), nk=(1,)), PolynomialNARX(input_delays=1, output_delays=1)],
+    ids=lambda one: one.kind,
+)
+def test_a_mask_on_every_other_sample_is_refused_where_a_sample_needs_its_past(structure: AbstractStructure) -> None:
+    trace = masked(gap=slice(0, None, 2))
+    with pytest.raises(TraceError, match="in a row") as refused:
+        fit((trace,), MAPPING, structure, stability=None)
+    assert "transfer function" in refused.value.remedy
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [
+        ARX(na=1, nb=(1,), nk=(1,)),
+        TransferFunction(poles=(1,), zeros=(0,)),
+        PolynomialNARX(input_delays=1, output_delays=1, degree=1, terms=3),
+    ],
+    ids=lambda one: one.kind,
+)
+def test_a_record_of_which_little_is_left_is_fitted_by_what_is_left(structure: AbstractStructure) -> None:
+    trace = masked(gap=slice(40, None))
+    found = fit((trace,), MAPPING, structure, stability=None, start=Start(kind=StartKind.ESTIMATED))
+    begun = Experiment.for_model(trace, found.model, Start(kind=StartKind.ESTIMATED))
+    away = (found.model.simulate(begun.inputs, begun.history) - begun.output)[begun.weights > 0.0]
+    assert len(away) > 20
+    assert np.abs(away).max() < 1e-6

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid.estimation.record_notes import contradicted
+from sysid.estimation.record_notes import contradicted, outnumbered
 from sysid.models import Start
 
 N = 400
@@ -99,3 +99,31 @@ def test_a_free_run_that_a_constant_beats_is_told() -> None:
     assert told.startswith("Over the records that were fitted the free run of y is hardly better than a constant")
     (as_it_is,) = sysid.data((u, y), sample_time=1.0)
     assert contradicted(fit.model, [as_it_is], Start()) == ()
+
+
+def test_more_parameters_than_samples_are_told() -> None:
+    u = _u()
+    (told,) = outnumbered(
+        _fit(u, _y(u, 1), sysid.ARX(na=1, nb=1, nk=1)).model, sysid.data((u[:3], u[:3]), sample_time=1.0)
+    )
+    assert "3 parameters" in told
+    assert "3 samples" in told
+    few = sysid.data((u[:4], u[:4] + 1.0), sample_time=1.0)
+    assert outnumbered(_fit(u, _y(u, 1), sysid.ARX(na=1, nb=1, nk=1)).model, tuple(few)) == ()
+
+
+def test_an_output_that_never_changes_is_the_constant_of_an_arx_model() -> None:
+    found = _fit(_u(), np.full(N, 0.3), sysid.ARX(na=1, nb=1, nk=1)).model
+    assert found.intercept == pytest.approx(0.3, abs=1e-12)
+    assert np.abs(found.coefficients).max() < 1e-12
+
+
+@pytest.mark.parametrize("domain", ["discrete", "continuous"])
+def test_a_transfer_function_without_effect_still_leaves_the_state_in_which_it_begins(domain: str) -> None:
+    y = 2.0 - 2.0 * 0.9 ** np.arange(N)
+    traces = sysid.data((np.full(N, 2.0), y), sample_time=1.0)
+    structure = sysid.TransferFunction(poles=(1,), zeros=(0,), delays=(2,), domain=domain)
+    fit = sysid.fit(traces, "u -> y", structure, stability=sysid.StabilityOptions(count=0))
+    (case,) = next(iter(sysid.compare(traces, fit).evaluations.values())).cases.values()
+    assert case.free_run.max_abs_error < 1e-9
+    assert not fit.model.recursion.B.any()

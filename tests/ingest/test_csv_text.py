@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sysid.errors import ReaderError
-from sysid.ingest import FileOptions, RepairOptions, read_table
+from sysid.ingest import FileOptions, RepairOptions, inspect_file, read_table
 
 Write = Callable[[str, str | bytes], Path]
 
@@ -97,6 +98,7 @@ def test_a_column_of_remarks_does_no_harm(write: Write) -> None:
 
 REFUSED = {
     "several points": ("t;u\n0.000;1\n1.003.000;2\n", {}, "t", r"(?s)line 3, column t.*'1\.003\.000'.*thousands: '\.'"),
+    "commas in numbers and between them": ("t,u\n0,1,1,5\n0,2,2,5\n", {}, "t", r"(?s)twice as many.*semicolons"),
     "calendar time beside time": ("t;when\n0;2024-05-01 10:00\n1;2024-05-01 10:01\n", {}, "when", "unit: datetime"),
     "wrong decimal mark": ("t,u\n0,1.5\n1,2;5\n", {}, "u", r"(?s)line 3, column u.*'2;5'.*decimal"),
     "two decimal marks": ("t;u\n0,5;1\n1.5;2\n", {}, "t", r"(?s)decimal comma and.*lines 2 and 3.*decimal: ','"),
@@ -166,3 +168,16 @@ def test_any_text_that_looks_like_csv_is_read_or_refused(
     else:
         assert table.lines is not None
         assert (np.diff(table.lines) > 0).all()
+
+
+@pytest.mark.parametrize("blank", [" ", "\u00a0", "\u202f", "\u2009"])
+def test_thousands_may_stand_behind_any_blank(write: Write, blank: str) -> None:
+    found = inspect_file(write("run.csv", f"t;u\n0,0;1{blank}000,5\n0,1;1{blank}234{blank}567,0\n0,2;12,0\n"))
+    assert found.table.find("u").values.tolist() == [1000.5, 1234567.0, 12.0]
+
+
+def test_a_packed_file_is_told_to_be_unpacked(write: Write) -> None:
+    path = write("run.csv", "")
+    path.write_bytes(gzip.compress(b"t,u\n0,1\n1,2\n"))
+    with pytest.raises(ReaderError, match=r"(?s)packed with gzip.*unpack"):
+        read_table(path)

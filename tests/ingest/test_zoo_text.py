@@ -72,6 +72,9 @@ class Animal:
 
 HEAD = "t [s],u [V],y [V]"
 ZOO = {
+    "digits of dates": Animal(
+        text=table(lambda k: f"202403122359{40 + k},{U[k]},{Y[k]}", "stamp,u [V],y [V]"), step=1.0, told=("%Y%m%d",)
+    ),
     "comma": Animal(text=table(plain, HEAD)),
     "semicolon, decimal comma, Windows": Animal(
         text=table(lambda k: plain(k, ";", ","), "t [s];u [V];y [°C]").replace("\n", "\r\n"), encoding="cp1252"

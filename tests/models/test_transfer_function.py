@@ -12,6 +12,7 @@ from scipy import linalg, signal
 from sysid.errors import ConfigError, TraceError
 from sysid.models import ARX, ARXModel, Domain, History, Mapping, Scaling, TransferFunction, model_from_dict
 from sysid.models.orthonormal_basis import basis_of, numerators
+from sysid.models.polynomial_moves import Polynomials
 from sysid.models.to_control import state_space
 from sysid.models.transfer_function import TransferFunctionModel
 
@@ -192,3 +193,18 @@ def test_impossible_orders_are_refused(fields: dict) -> None:
 def test_a_wrong_number_of_inputs_is_refused() -> None:
     with pytest.raises(TraceError, match="do not fit"):
         build().simulate(np.zeros((5, 3)))
+
+
+def test_moves_do_not_depend_on_the_units_of_time_and_output() -> None:
+    """Coefficients of 1e-20 are small in their unit and no zeros."""
+    u = np.random.default_rng(0).normal(size=(50, 1))
+    powers = np.array([1.0, 1e-6, 1e-12])
+    found = []
+    for scale, gain, T_ in ((np.ones(3), 1.0, 0.1), (powers, 1e-9, 1e-7)):
+        F = np.array([4.0, 1.0, 1.0]) * scale / scale[-1]
+        B = gain * np.array([3.0, 2.0]) * scale[:2] / scale[-1]
+        model = Polynomials(numerators=[B], denominators=[F], constant=0.0, delays=(0,), sample_time=T_)
+        found.append(model.moves(np.diag(model.vector)[:, :4], u, known=False) / gain)
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6, atol=1e-9)
+    nothing = Polynomials(numerators=[np.zeros(2)], denominators=[F], constant=0.0, delays=(0,), sample_time=T_)
+    assert not nothing.moves(np.diag(nothing.vector), u, known=False)[:, 2:].any()

@@ -17,14 +17,18 @@ from sysid.estimation.blocks.selection import Chosen, choose_terms
 from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.grey_box.fit import built_template, fit_equations
 from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.regression import nothing_in_a_row
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.result import FitResult
 from sysid.models import BuiltModel, GreyBox, Lags, Mapping, PolynomialNARX, Start
-from sysid.models.curves import Text, quoted
+from sysid.models.curves import Text, number, quoted
 from sysid.models.polynomial_narx import Term
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]
+
+FAR = 10.0
+"""Level of a channel, in standard deviations, from which its polynomials are of what is above it."""
 
 check_training = partial(check_hidden_states, "a polynomial NARX model")
 """Refuses options that do not apply: its terms are chosen one step ahead, and refined for the free run."""
@@ -68,9 +72,16 @@ def fit_polynomial_narx(
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     start = start or Start()
     lags = structure.lags(len(mapping.inputs))
-    X, y = _rows(experiments_of(traces, mapping, start, rest), lags)
-    found = choose_terms(X, y, structure.candidates(len(mapping.inputs)), structure.terms)
-    best = _best(found, structure, mapping, data=(traces, selection), start=start, rest=rest)
+    experiments = experiments_of(traces, mapping, start, rest)
+    X, y = _rows(experiments, lags)
+    if not len(y):
+        raise nothing_in_a_row(lags.depth + 1, experiments)
+    origin = _origin(traces, mapping)
+    places = [i for i, lags_i in enumerate((*lags.inputs, lags.output)) for _ in lags_i]
+    found = choose_terms(
+        X - origin[places][:, None], y - origin[-1], structure.candidates(len(mapping.inputs)), structure.terms
+    )
+    best = _best(found, structure, mapping, data=(traces, selection), start=start, rest=rest, origin=origin)
     fitted = fit_equations(
         *built_template(traces, mapping, best.grey, built_of=structure, start=start, rest_output=rest),
         training, (traces, selection, start),
@@ -78,12 +89,29 @@ def fit_polynomial_narx(
     )  # fmt: skip
     model = fitted.model
     assert isinstance(model, BuiltModel)  # noqa: S101 - the template is one
+    names = structure.regressors(mapping, origin)
     explained = ", ".join(
-        f"{_written(term, structure.regressors(mapping)) or 'constant'} {share:.2%}"
+        f"{_written(term, names) or 'constant'} {share:.2%}"
         for term, share in zip(found.terms[: best.terms], found.reductions, strict=False)
     )
-    notes = (f"{model.equations}", f"One step ahead the terms explain, in the order in which they came: {explained}.")
-    return replace(fitted, notes=(*fitted.notes, *notes))
+    told = [f"One step ahead the terms explain, in the order in which they came: {explained}."] * bool(explained)
+    return replace(fitted, notes=(*fitted.notes, model.equations, *told))
+
+
+def _origin(traces: Sequence[Trace], mapping: Mapping) -> Array:
+    """What each channel is counted from, inputs first: 0, but for one that hardly moves beside its level.
+
+    Powers of 1000.1, 1000.2 ... are all but one number; those of what is above 1000 are not.
+    """
+    found = []
+    for name in (*mapping.inputs, *mapping.outputs):
+        x = np.concatenate([trace[name][trace.usable_samples] for trace in traces])
+        if not len(x) or np.ptp(x) == 0.0:
+            found.append(float(x[0]) if len(x) else 0.0)
+            continue
+        middle, moves = float(x.mean()), float(x.std())
+        found.append(round(middle, -math.floor(math.log10(moves))) if abs(middle) > FAR * moves else 0.0)
+    return np.array(found)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,12 +146,13 @@ def _best(
     data: tuple[Sequence[Trace], Sequence[Trace]],
     start: Start,
     rest: float,
+    origin: Array,
 ) -> _Candidate:
     """The number of terms whose free run is best, over the traces that choose where there are any."""
     traces, selection = data
     tried: list[_Candidate] = []
     for n, coefficients in enumerate(found.coefficients, start=1):
-        grey = equations(structure, mapping, found.terms[:n], coefficients)
+        grey = equations(structure, mapping, found.terms[:n], coefficients, origin)
         template, _ = built_template(traces, mapping, grey, built_of=structure, start=start, rest_output=rest)
         squares, count = 0.0, 0
         with np.errstate(over="ignore", invalid="ignore"):  # polynomials explode
@@ -145,7 +174,11 @@ def _best(
 
 
 def equations(
-    structure: PolynomialNARX, mapping: Mapping, terms: Sequence[Term], coefficients: Sequence[float]
+    structure: PolynomialNARX,
+    mapping: Mapping,
+    terms: Sequence[Term],
+    coefficients: Sequence[float],
+    origin: Array | None = None,
 ) -> GreyBox:
     """A polynomial as equations, its coefficients to be estimated.
 
@@ -154,16 +187,18 @@ def equations(
         mapping: Which channels go in, which comes out.
         terms: Its terms.
         coefficients: Where they start, in units.
+        origin: What each channel is counted from, inputs first; nothing by default.
 
     Returns:
         The grey box.
     """
-    text, names = Text(taken=frozenset((*mapping.inputs, *mapping.outputs))), structure.regressors(mapping)
+    text, names = Text(taken=frozenset((*mapping.inputs, *mapping.outputs))), structure.regressors(mapping, origin)
+    level = [number(float(origin[-1]))] if origin is not None and origin[-1] else []
     parts = [
         "*".join(filter(None, [text.estimated(f"c{i}", c), _written(term, names)]))
         for i, (term, c) in enumerate(zip(terms, coefficients, strict=True), start=1)
     ]
-    text.lines.append(f"{quoted(mapping.output)} = {' + '.join(parts)}")
+    text.lines.append(f"{quoted(mapping.output)} = {' + '.join(level + parts)}")
     return GreyBox(equations="\n".join(text.lines), parameters=tuple(text.parameters))
 
 

@@ -83,7 +83,8 @@ def choose_terms(regressors: Array, output: Array, candidates: Sequence[Term], m
             along = products(scaled, [candidates[i] for i in part]) @ q
             energy[part] -= along**2
             agreement[part] -= along * shown
-    terms = [candidates[i] for i in taken]
+    # Where nothing is explained, the constant is what there is.
+    terms = [candidates[i] for i in taken] or [()]
     return Chosen(
         terms=tuple(terms), reductions=tuple(reductions), coefficients=_least_squares(scaled, scale, output, terms)
     )
@@ -108,8 +109,6 @@ def products(regressors: Array, terms: Sequence[Term]) -> Array:
 
 def _least_squares(scaled: Array, scale: Array, output: Array, terms: Sequence[Term]) -> tuple[tuple[float, ...], ...]:
     """The coefficients of the first terms, for each number of them, by one orthogonal decomposition."""
-    if not terms:
-        return ()
     Q, R = np.linalg.qr(products(scaled, terms).T)
     along = Q.T @ output
     sizes = np.array([float(np.prod(scale[list(term)])) for term in terms])

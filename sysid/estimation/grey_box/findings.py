@@ -21,6 +21,12 @@ OPEN = 0.5
 TOGETHER = 0.99
 """Correlation above which two parameters cannot be told apart."""
 
+MOST_NAMES = 4
+"""Parameters that a sentence names."""
+
+ALIKE = 0.9999
+"""The same of parameters that nobody named: coefficients of one smooth response are nearly as correlated as a rule."""
+
 EVIDENCE_STEPS = 3
 """Steps of the evidence of a fit that ended before its first."""
 
@@ -109,6 +115,32 @@ class Findings:
         """
         names = tuple(f"{one.name} [{one.unit}]" if one.unit else one.name for one in self.parameters)
         return Uncertainty(names=names, values=self.values, covariance=self.covariance, noise_variance=noise_variance)
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """Names of the parameters that the records leave open, or do not tell from one before."""
+        deviations = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore"):
+            correlation = np.abs(self.covariance / np.outer(deviations, deviations))
+        named = zip(self.parameters, deviations, self.bound, strict=True)
+        return tuple(
+            one.name
+            for i, (one, deviation, side) in enumerate(named)
+            if (np.isnan(deviation) and not side) or (correlation[i, :i] > ALIKE).any()
+        )
+
+    @property
+    def more_than_shown(self) -> tuple[str, ...]:
+        """Of equations that nobody wrote, whose parameters nobody can fix: that they hold more than records show."""
+        left, n = self.open, len(self.parameters)
+        if not left:
+            return ()
+        names = ", ".join(left[:MOST_NAMES]) + (", ..." if len(left) > MOST_NAMES else "")
+        return (
+            f"The records do not tell {len(left)} of {n} parameters apart from the others ({names}): the free run "
+            "beyond what was recorded is open there. A simpler curve, fewer pieces, states or terms would do; or "
+            "record more of the range.",
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from sysid.estimation.grey_box.preparing import ROUNDS, SHARPER, seen_terms
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.stepping import ACCURACY, Stepping, substeps_for
 from sysid.estimation.least_squares.damping import DAMPINGS
-from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, at_minimum
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.training import Training
@@ -20,12 +20,6 @@ from sysid.estimation.result import Status
 from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 
 Array = NDArray[np.float64]
-
-FLAT = 1e-8
-"""Share of the loss that one more Newton step would take away, below which a fit stands at a minimum."""
-
-NOTHING_LEFT = 1e-24
-"""Mean squared error over the output's scale that is rounding."""
 
 SAME = 1e-4
 """By how much the loss of exact switches may differ from that of soft ones and be the same."""
@@ -84,26 +78,9 @@ def settled(candidate: starts.Candidate, provider: EquationProvider) -> starts.C
         The candidate.
     """
     solution = with_evidence(candidate.solution, provider)
-    if solution.status in {Status.STALLED, Status.NOT_IMPROVED} and _at_minimum(solution, provider):
+    if solution.status in {Status.STALLED, Status.NOT_IMPROVED} and at_minimum(solution.state, provider):
         solution = replace(solution, status=Status.CONVERGED)
     return replace(candidate, solution=solution)
-
-
-def _at_minimum(solution: Solution, provider: EquationProvider) -> bool:
-    at, prior = solution.at, solution.state.prior
-    if 2.0 * at.loss <= NOTHING_LEFT * provider.n_samples:
-        return True
-    if not at.finite:
-        return False
-    ridge = prior.precision / prior.beta
-    g = at.gradient + ridge * (solution.theta - prior.centre)
-    low, high = provider.bounds
-    free = ~(((solution.theta <= low) & (g > 0.0)) | ((solution.theta >= high) & (g < 0.0)))
-    H = at.gauss_newton + np.diag(ridge)
-    root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
-    scaled = g[free] / root
-    step = np.linalg.lstsq(H[np.ix_(free, free)] / np.outer(root, root), scaled, rcond=1e-12)[0]
-    return bool(scaled @ step <= FLAT * at.loss)
 
 
 def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stopped: bool) -> Done:

@@ -377,7 +377,8 @@ def _told(found: FitResult, done: Done, data: tuple[Sequence[Trace], Sequence[Tr
             f"{switches} switch{'es' * (switches > 1)} were trained through a soft form and are exact in the model; "
             f"the squared error of the exact form is {done.softened:.3g} times that of the soft one."
         )
-    warnings = list(findings.warnings)
+    built = isinstance(model, BuiltModel)
+    warnings = list(findings.more_than_shown if built else findings.warnings)
     if model.lowered.n_continuous and not done.stepping.enough:
         warnings.append(step_warning(model, done.stepping))
     return replace(

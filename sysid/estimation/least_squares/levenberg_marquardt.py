@@ -147,6 +147,41 @@ def _ignore(_: Iteration) -> None:
     """The callback of those who do not watch."""
 
 
+FLAT = 1e-8
+"""Share of the loss that one more Newton step would take away, below which a fit stands at a minimum."""
+
+NOTHING_LEFT = 1e-24
+"""Mean squared error over the output's scale that is rounding."""
+
+
+def at_minimum(state: State, provider: AbstractProvider) -> bool:
+    """Whether a fit that finds no better step stands where there is none: its gradient is zero to rounding.
+
+    Args:
+        state: Where it stands.
+        provider: Residuals and Jacobians.
+
+    Returns:
+        Whether it does.
+    """
+    at, prior = state.at, state.prior
+    if 2.0 * at.loss <= NOTHING_LEFT * provider.n_samples:
+        return True
+    if not at.finite:
+        return False
+    ridge = prior.precision / prior.beta
+    g = at.gradient + ridge * (state.theta - prior.centre)
+    free = np.ones(len(g), dtype=np.bool_)
+    if provider.bounds is not None:
+        low, high = provider.bounds
+        free = ~(((state.theta <= low) & (g > 0.0)) | ((state.theta >= high) & (g < 0.0)))
+    H = at.gauss_newton + np.diag(ridge)
+    root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
+    scaled = g[free] / root
+    step = np.linalg.lstsq(H[np.ix_(free, free)] / np.outer(root, root), scaled, rcond=1e-12)[0]
+    return bool(scaled @ step <= FLAT * at.loss)
+
+
 @dataclass(frozen=True, kw_only=True)
 class LevenbergMarquardt:
     """The engine.
@@ -221,6 +256,8 @@ class LevenbergMarquardt:
                         status = Status.INTERRUPTED
             except KeyboardInterrupt:
                 status = Status.INTERRUPTED
+        if status is Status.STALLED and at_minimum(state, provider):
+            status = Status.CONVERGED
         if status is Status.STALLED and state.at.loss >= first:
             status = Status.NOT_IMPROVED
         return Solution(state=state, status=status)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.experiment import Experiment, experiments_of
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.regression import Solution, deviation, solve, stack
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.estimation.result import FitResult, Loop, Status
@@ -53,7 +54,7 @@ def fit_arx(
         traces, mapping, orders, start=start or Start(), rest_output=rest, operating_point=operating_point
     )
     X, y = stack(experiments, orders.lags, intercept=orders.intercept)
-    solution = solve(X, y, ridge=ridge)
+    solution = solve(X, y, ridge=ridge, constant=orders.intercept)
     residual = y - X @ solution.coefficients
     model = arx_model(
         solution.coefficients, orders, mapping, traces[0], rest_output=rest, operating_point=operating_point
@@ -208,6 +209,4 @@ def stability_note(model: ARXModel) -> str:
     Returns:
         The sentence, with the largest pole.
     """
-    largest = float(np.abs(model.poles).max(initial=0.0))
-    verdict = "stable" if largest < 1.0 else "not stable"
-    return f"The free run is {verdict}: the largest pole has magnitude {largest:.6f}."
+    return slow_poles.stability(float(np.abs(model.poles).max(initial=0.0)))

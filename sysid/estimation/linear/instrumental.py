@@ -67,7 +67,8 @@ def fit_iv4(
         return arx_model(theta, orders, mapping, traces[0], rest_output=rest, operating_point=None)
 
     unfiltered = np.ones(1)
-    theta = solve(*stack(experiments, orders.lags, intercept=orders.intercept)).coefficients
+    X, y = stack(experiments, orders.lags, intercept=orders.intercept)
+    theta = solve(X, y, constant=orders.intercept).coefficients
     theta = _estimate(experiments, model_of(theta), unfiltered).coefficients
     whitening = _whitening(experiments, model_of(theta), orders.na + sum(orders.nb))
     solution = _estimate(experiments, model_of(theta), whitening)

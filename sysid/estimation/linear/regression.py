@@ -14,6 +14,9 @@ from sysid.estimation.experiment import Experiment
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.models import Lags
 
+FIRST = 1e-6
+"""Part by which a column is made longer that pivoting shall take before others of its direction."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solution:
@@ -109,6 +112,9 @@ def stack(
 
     Returns:
         Matrix of shape ``(n_rows, n_columns)`` and target of shape ``(n_rows,)``.
+
+    Raises:
+        TraceError: If no row counts.
     """
     X = np.concatenate([regressor_matrix(experiment, lags) for experiment in experiments])
     y = np.concatenate([experiment.output for experiment in experiments])
@@ -116,10 +122,36 @@ def stack(
         X = np.column_stack([X, np.ones(len(X))])
     root = root_weights(experiments)
     kept = root > 0.0
+    if not kept.any():
+        raise nothing_in_a_row(lags.depth + 1, experiments)
     return X[kept] * root[kept, None], y[kept] * root[kept]
 
 
-def solve(X: NDArray[np.float64], y: NDArray[np.float64], *, ridge: float = 0.0) -> Solution:
+def nothing_in_a_row(needed: int, experiments: Sequence[Experiment]) -> TraceError:
+    """The refusal of records of which no sample has its past beside it.
+
+    Args:
+        needed: Samples in a row that are asked for.
+        experiments: The records.
+
+    Returns:
+        The error.
+    """
+    runs = [0]
+    for e in experiments:
+        usable = np.ones(len(e.output), dtype=np.bool_) if e.usable is None else e.usable
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], usable, [False]]).astype(np.int8)))
+        runs += list(edges[1::2] - edges[::2])
+    return TraceError(
+        "no sample has its past beside it: the records are too short, or masked samples stand between the others",
+        expected=f"at least {needed} samples in a row that are not masked",
+        got=f"{max(runs)} in a row at most",
+        remedy="fill short gaps, with repairs: {nan: interpolate}, ask for fewer lags, or fit what needs no past: a "
+        "transfer function or a neural state space",
+    )
+
+
+def solve(X: NDArray[np.float64], y: NDArray[np.float64], *, ridge: float = 0.0, constant: bool = False) -> Solution:
     r"""Least squares by QR with column pivoting on columns of unit length.
 
     Args:
@@ -127,6 +159,8 @@ def solve(X: NDArray[np.float64], y: NDArray[np.float64], *, ridge: float = 0.0)
         y: Shape ``(n_rows,)``.
         ridge: Weight :math:`\rho` of the penalty :math:`\rho\sum_i \|x_i\|^2\theta_i^2`, which does not depend on
             the units of the columns; 0 for none.
+        constant: Whether the last column is that of a constant: where it and another say the same, as the past of an
+            output that never changes, the constant is what is told.
 
     Returns:
         The solution.
@@ -144,6 +178,8 @@ def solve(X: NDArray[np.float64], y: NDArray[np.float64], *, ridge: float = 0.0)
     n = X.shape[1]
     norms = np.linalg.norm(X, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
+    if constant:
+        scale[-1] *= 1.0 - FIRST
     A = X / scale
     if ridge > 0.0:
         A, y = np.concatenate([A, np.sqrt(ridge) * np.eye(n)]), np.concatenate([y, np.zeros(n)])

@@ -25,6 +25,9 @@ HANGS_TOGETHER = 0.9
 ROUNDING = 1e-6
 """Root mean square of errors in scaled numbers below which they are rounding, of which nothing is said."""
 
+INTEGRATES, FAR = 1e-9, 1e-6
+"""Distance of a pole's magnitude from 1 within which it is one, and beyond which six digits tell it from 1."""
+
 Errors = Sequence[NDArray[np.float64]]
 
 
@@ -51,6 +54,28 @@ def unseen(radius: float, lengths: Sequence[int]) -> bool:
         Whether it is.
     """
     return radius >= 1.0 - 1.0 / max(NEAR * max(lengths), 2.0)
+
+
+def stability(radius: float) -> str:
+    """Whether a free run is stable, as a sentence.
+
+    Args:
+        radius: Magnitude of the largest pole.
+
+    Returns:
+        The sentence.
+
+    Example:
+        >>> stability(0.5)
+        'The free run is stable: the largest pole has magnitude 0.500000.'
+        >>> stability(1.0 - 1e-12)
+        'The free run neither settles nor grows: the largest pole has magnitude 1, so that an error of it stays.'
+    """
+    if abs(radius - 1.0) <= INTEGRATES:
+        return "The free run neither settles nor grows: the largest pole has magnitude 1, so that an error of it stays."
+    digits = 6 if abs(radius - 1.0) > FAR else 9
+    verdict = "stable" if radius < 1.0 else "not stable"
+    return f"The free run is {verdict}: the largest pole has magnitude {radius:.{digits}f}."
 
 
 def autocorrelation(errors: Errors) -> float:
@@ -100,7 +125,8 @@ def notes(radius: float, lengths: Sequence[int], errors: Errors | None) -> tuple
         None, one or two.
     """
     told = []
-    if unseen(radius, lengths):
+    # One that grows within the record is no slow one: the sentence on stability tells of it.
+    if unseen(min(radius, 2.0 - radius), lengths):
         told.append(
             f"The slowest pole, of magnitude {radius:.6f}, is as slow as the longest record of {max(lengths)} samples, "
             "or slower: the plant may integrate, or a drift of the output is taken for its response, and these records "

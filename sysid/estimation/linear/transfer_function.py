@@ -106,6 +106,15 @@ def fit_transfer_function(
     return replace(fit, model=of_all_inputs(fit.model))
 
 
+def _third(experiment: Experiment) -> int:
+    """Samples before which a third of those that are not masked lie: so many may be left out for a dead time."""
+    usable = experiment.usable
+    if usable is None or not usable.any():
+        return len(experiment.output)
+    places = np.flatnonzero(usable)
+    return int(places[len(places) // 3])
+
+
 def _bridged(experiment: Experiment) -> Experiment:
     """The record with straight lines under the mask, for filters that run through it; what is there does not count."""
     usable = experiment.usable
@@ -167,6 +176,7 @@ class _Problem(AbstractProblem):
         most = self.training.max_delay
         if most is None:
             most = longest_dead_time([len(experiment.output) for experiment in self.experiments])
+            most = min(most, max(map(_third, self.experiments)))
         return 0 if self.orders.domain is Domain.CONTINUOUS else min(1, most), most
 
     def likely_delays(self, least: int, most: int) -> list[list[int]]:

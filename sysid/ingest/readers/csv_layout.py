@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from sysid.errors import ReaderError
+from sysid.errors import ReaderError, shortened
 from sysid.ingest.headers import parse_header
 from sysid.ingest.numbers import NumberFormat
 from sysid.ingest.options import FileOptions
@@ -327,6 +327,15 @@ def _header(split: _Split, first: int, comments: list[tuple[int, str]], options:
         if cells is not None:
             found.names, found.line = [re.sub(r"^(?:%|//|!|;|\*)+\s*(?=\S)", "", cells[0]), *cells[1:]], row.line
             return found
+        if split.separator == "," and len(row.cells) > 1 and 2 * len(row.cells) == split.width:
+            raise ReaderError(
+                "every row has twice as many cells as the header has names: a comma may stand in each number",
+                where=f"line {row.line}",
+                expected="another mark between the columns than in the numbers",
+                got=f"{len(row.cells)} names over {split.width} cells: {shortened(','.join(row.cells))}",
+                remedy="export with semicolons between the columns, or with decimal points; if these are whole numbers "
+                "in columns of their own, leave the header out and name them (skip_lines, names: [...])",
+            )
         if split.separator != BLANKS and len(row.cells) > 1:
             found.notes.append(
                 f"line {row.line} before the numbers has {len(row.cells)} cells for {split.width} columns, "

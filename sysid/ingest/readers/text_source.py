@@ -23,6 +23,14 @@ _HEAD = 1 << 18
 _ASCII_INSIDE = {"utf-8", "utf-8-sig", "cp1252", "iso8859-1", "iso8859-15", "ascii"}
 _HEAD_LINES = 400
 _FEWEST_LINES = 8
+_PACKED = (
+    (b"\x1f\x8b", "gzip"),
+    (b"BZh", "bzip2"),
+    (b"\xfd7zXZ\x00", "xz"),
+    (b"\x28\xb5\x2f\xfd", "zstd"),
+    (b"PK\x03\x04", "zip"),
+    (b"7z\xbc\xaf\x27\x1c", "7-Zip"),
+)
 _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
@@ -159,6 +167,14 @@ def not_text(path: Path, tries: list[str], problem: Exception) -> ReaderError:
     Returns:
         The error to raise.
     """
+    with path.open("rb") as file:
+        begin = file.read(8)
+    packed = next((kind for mark, kind in _PACKED if begin.startswith(mark)), None)
+    if packed:
+        return ReaderError(
+            f"the file is packed with {packed}", where=path, expected="a file as it was recorded", got=f"{packed} data",
+            remedy="unpack it, and give the file that was in it",
+        )  # fmt: skip
     return ReaderError(
         "the file is not text",
         where=path,

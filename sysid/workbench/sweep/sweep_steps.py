@@ -233,7 +233,7 @@ class SweepSteps:
                 where="choose.on",
                 expected="a data set with cases whose role is selection",
                 got=f"selection: {self.config.selection}",
-                remedy="name one with selection: ..., or choose on estimation, which favours the largest network",
+                remedy="name one with selection: ..., or choose on estimation, which favours the largest model",
             )
         return data
 

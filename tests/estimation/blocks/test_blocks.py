@@ -18,7 +18,17 @@ from sysid.estimation.blocks.sections import block_of, responses, sections_of
 from sysid.estimation.blocks.selection import choose_terms, products
 from sysid.estimation.networks.training import Training
 from sysid.export import EXPORTERS, Surrogate
-from sysid.models import BuiltModel, HammersteinWiener, Mapping, PolynomialNARX, WienerHammerstein, model_from_dict
+from sysid.models import (
+    BuiltModel,
+    HammersteinWiener,
+    History,
+    Mapping,
+    PolynomialNARX,
+    Start,
+    StartKind,
+    WienerHammerstein,
+    model_from_dict,
+)
 from sysid.models.curves import Curve
 from sysid.traces import Channel, Trace
 
@@ -224,3 +234,32 @@ def test_a_known_curve_is_written_as_it_was_given() -> None:
     assert structure.to_dict()["input"] == [{"dead zone": [-1, 1]}]
     assert HammersteinWiener(**{k: v for k, v in structure.to_dict().items() if k != "kind"}) == structure
     assert Curve.parse("network 5", "input").size == 5
+
+
+def first_order(u: np.ndarray, pole: float, level: float) -> np.ndarray:
+    return np.asarray(level + lfilter((0.0, 0.2), (1.0, -pole), u))
+
+
+@pytest.mark.parametrize(("pole", "level"), [(0.8, 1e9), (0.8, 1e3), (1.0, 0.0), (1.0 - 1e-16, 2.0)])
+def test_a_polynomial_is_found_far_from_zero_and_where_it_integrates(pole: float, level: float) -> None:
+    u = steps(1)
+    y = first_order(u, pole, level)
+    linear = PolynomialNARX(input_delays=1, output_delays=1, degree=2, terms=4)
+    fit = fit_polynomial_narx([a_trace(u, y)], MAPPING, linear, ONE, start=Start(kind=StartKind.ESTIMATED))
+    run = fit.model.simulate(u[:, None], History.at_rest(inputs=u[:1], output=y[0]))
+    assert np.abs(run - y).max() < 1e-6 * np.ptp(y) + 1e-15 * level * len(y)
+
+
+def test_an_output_that_never_changes_is_a_constant_and_no_power_of_itself() -> None:
+    fit = fit_polynomial_narx([a_trace(steps(1), np.full(400, 0.3))], MAPPING, PolynomialNARX(), ONE)
+    assert fit.model.equations == "y = 0.3 + 0"
+
+
+def test_a_curve_with_more_pieces_than_the_record_shows_is_told_in_one_sentence() -> None:
+    u = steps(1)
+    y = first_order(u, 0.8, 0.0)
+    fit = fit_wiener_hammerstein([a_trace(u, y)], MAPPING, WienerHammerstein(first=1, second=1), ONE)
+    (told,) = fit.warnings
+    assert "simpler curve" in told
+    plain = fit_hammerstein_wiener([a_trace(u, block(u))], MAPPING, HammersteinWiener(states=2), Training(starts=1))
+    assert plain.warnings == ()

@@ -30,6 +30,9 @@ from sysid.models import Mapping, Start
 from sysid.models.polynomial import AbstractPolynomial, PolynomialModel
 from sysid.traces import Trace
 
+SHORTEST = 4
+"""Samples in a row that a start is looked for in."""
+
 Array = NDArray[np.float64]
 
 SHORT, TRIED = 6, 5
@@ -126,7 +129,7 @@ def fit_polynomial(
         },
         train_time_s=time.perf_counter() - began,
         uncertainty=_uncertainty(model, at, errors.n_samples, variance * unit),
-        notes=(*slow_poles.notes(model.pole_radius, lengths, told), _stability(model)),
+        notes=(*slow_poles.notes(model.pole_radius, lengths, told), slow_poles.stability(model.pole_radius)),
     )
 
 
@@ -198,7 +201,15 @@ def _starts(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Array
     reach = [orders.order("na"), *(nb + nk for nb, nk in zip(orders.nb, orders.nk, strict=True))]
     least = max(*reach, *orders.denominators, 1) if len(reach) + len(orders.denominators) > 0 else 1
     looked = [_differenced(piece) for piece in pieces] if orders.drifts else list(pieces)
-    looked = [piece for piece in looked if len(piece) > 3]
+    looked = [piece for piece in looked if len(piece) >= SHORTEST]
+    if not looked:
+        raise TraceError(
+            "no record is long enough to begin from",
+            expected=f"at least {SHORTEST} samples in a row that are not masked",
+            got=f"{max(map(len, pieces), default=0)} in a row at most",
+            remedy="fill short gaps, with repairs: {nan: interpolate}, use longer records, or fit what needs no past: "
+            "a transfer function or a neural state space",
+        )
     longs = [LongARX.of(looked, least), LongARX.of(looked, least, more=2.0)]
     if orders.order("na") or not orders.nb:
         found = [armax_start(looked, orders, long) for long in longs]
@@ -261,12 +272,6 @@ def _uncertainty(model: PolynomialModel, at: Linearisation, n: int, noise_varian
         half = gains[:, np.newaxis] * (vectors / np.sqrt(sizes)) / root[:, np.newaxis]
         covariance = 2.0 * at.loss / max(n - P, 1) * (half @ half.T)
     return Uncertainty(names=names, values=values, covariance=covariance, noise_variance=noise_variance)
-
-
-def _stability(model: PolynomialModel) -> str:
-    """Whether the free run is stable, as a sentence."""
-    verdict = "stable" if model.pole_radius < 1.0 else "not stable"
-    return f"The free run is {verdict}: the largest pole has magnitude {model.pole_radius:.6f}."
 
 
 def _check(orders: AbstractPolynomial, experiments: Sequence[Experiment]) -> None:

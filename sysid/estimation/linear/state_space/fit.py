@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.experiment import experiments_of
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, side_by_side
 from sysid.estimation.linear.state_space.dead_times import behind_dead_times, late
@@ -204,7 +205,7 @@ def _result(
         },
         train_time_s=time.perf_counter() - began,
         uncertainty=None if by_subspace else state_space_uncertainty(model, found),
-        notes=(*_notes(found, orders), *found.notes, _stability(model)),
+        notes=(*_notes(found, orders), *found.notes, slow_poles.stability(model.pole_radius)),
     )
 
 
@@ -212,10 +213,6 @@ def _notes(found: Found, orders: LinearStateSpace) -> tuple[str, ...]:
     sizes = found.singular_values[: orders.states + 3]
     told = ", ".join(f"{size:.3f}" for size in sizes)
     begun = f"The subspace estimate is by {found.weighting.value}."
+    if not told:
+        return (begun,)
     return (begun, f"Canonical correlations of past and future: {told}; the states are those that stand out.")
-
-
-def _stability(model: LinearStateSpaceModel | VectorStateSpaceModel) -> str:
-    """Whether the free run is stable, as a sentence."""
-    verdict = "stable" if model.pole_radius < 1.0 else "not stable"
-    return f"The free run is {verdict}: the largest pole has magnitude {model.pole_radius:.6f}."
