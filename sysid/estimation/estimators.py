@@ -40,6 +40,7 @@ from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.narx import fit_narx
 from sysid.estimation.networks.neural_state_space import (
     STARTS,
+    check_neural_initial,
     check_training,
     fit_neural_state_space,
     fit_vector_neural_state_space,
@@ -110,8 +111,8 @@ ESTIMATORS: dict[str, Estimator] = {
                 fit=fit_by,
                 training=Training,
                 check_training=check_training,
+                initial=check_neural_initial,
                 no_posterior=ENDED,
-                begins="a neural state space begins at the best linear one",
                 starts=STARTS,
             )
             for structure, name, fit_by in (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from sysid.errors import UnitError
-from sysid.units import check_unit
+from sysid.units import check_unit, plain_unit
 from sysid.yaml_files import FieldError
 
 MOST_SAMPLES = 5_000_000
@@ -20,7 +20,8 @@ MOST_SAMPLES = 5_000_000
 
 def _unit(text: str) -> str:
     try:
-        return check_unit(text)
+        # As the head of a column has it, where records are written: K for kelvin.
+        return plain_unit(check_unit(text)) or text
     except UnitError as error:
         raise FieldError(
             error.what, expected=error.expected, got=error.got, remedy=error.remedy or "correct the unit"

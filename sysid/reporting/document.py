@@ -25,6 +25,7 @@ from sysid.reporting.fit_tables import (
     scored_cases,
     systems_table,
 )
+from sysid.reporting.growth import growth_section
 from sysid.reporting.judging.document import judgement_sections
 from sysid.reporting.numbers import quantity
 from sysid.reporting.orders_view import orders_section
@@ -76,7 +77,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     sections += [] if orders is None else [orders]
     sections += [*trust_sections(results), *evidence_sections(folder, results)]
     states = state_section(results)
-    sections += ([] if states is None else [states]) + judgement_sections(folder)
+    sections += ([] if states is None else [states]) + growth_section(folder) + judgement_sections(folder)
     sections += [_run_times(results, published), _tried(results)]
     exports = export_table(
         [(fit.name, export) for fit in results.fits for export in fit.exports],

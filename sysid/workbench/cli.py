@@ -334,6 +334,9 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
     proof: Annotated[
         int | None, typer.Option(min=1, help="New experiments of the proof; 1000, or as many as there is time for.")
     ] = None,
+    rounds: Annotated[
+        int | None, typer.Option(min=1, help="Rounds of experiments that are added where the surrogate is worst.")
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/surrogate-<name> by default.")] = None,
@@ -348,7 +351,15 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
     wish = wish_of(span or [], parameter or [], output or [], sample_time=sample_time, duration=duration)
     raise typer.Exit(
         surrogate_command(
-            source, wish, minutes=minutes, proof=proof, workers=workers, seed=seed, out=out, tracking=not no_tracking
+            source,
+            wish,
+            minutes=minutes,
+            proof=proof,
+            rounds=rounds,
+            workers=workers,
+            seed=seed,
+            out=out,
+            tracking=not no_tracking,
         )
     )
 
@@ -561,11 +572,27 @@ def schema(
         schema_command(folder)
 
 
-@app.command(epilog="Example: sysid init mine")
-def init(
+@app.command(epilog="Example: sysid init mine  sysid init mine --reference cylinder.fmu --range valve=-10:10")
+def init(  # noqa: PLR0917 - one parameter an option, by name on the command line
     folder: Annotated[Path, typer.Argument(help="Folder to make.")],
+    reference: Annotated[
+        Path | None, typer.Option(help="An FMU: the workspace has a pipeline of experiments on it. Nothing is run.")
+    ] = None,
+    span: Annotated[
+        list[str] | None, typer.Option("--range", metavar="NAME=LOW:HIGH", help="Of an input of the FMU; repeated.")
+    ] = None,
+    parameter: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=LOW:HIGH", help="A parameter that varies; repeated.")
+    ] = None,
+    output: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="An output; all by default; repeated.")
+    ] = None,
+    sample_time: Annotated[float | None, typer.Option(help="Seconds; as the FMU says by default.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Seconds an experiment; as the FMU says by default.")] = None,
 ) -> None:
     """Make a workspace: folders for data sets, pipelines and reports, with a first pipeline that runs in seconds."""
     from sysid.workbench.commands.init import init_command
+    from sysid.workbench.commands.surrogate import wish_of
 
-    init_command(folder)
+    wish = wish_of(span or [], parameter or [], output or [], sample_time=sample_time, duration=duration)
+    init_command(folder, reference=reference, wish=wish)

@@ -34,6 +34,15 @@ def released(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arr
     return y
 
 
+def stiffens(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """A lag behind a spring that stiffens: what it does far out, small experiments do not show."""
+    y, at = np.empty(len(time)), 0.0
+    for k, u in enumerate(inputs[:, 0]):
+        at += 0.3 * (u - at - 0.3 * at**3)
+        y[k] = at
+    return y
+
+
 def thermal(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A wall of 200 layers, heated on one side and cooled by radiation and convection on the other: stiff.
 

@@ -277,7 +277,7 @@ def test_what_does_not_apply_is_refused_in_the_same_words_at_every_door(
     [
         (ARX, NARX, "an ARX model takes no initial fit"),
         (TF, ARX, "a transfer function takes no initial fit"),
-        (NSS, NARX, "a neural state space takes no initial fit"),
+        (NSS, NARX, "the initial fit has other hidden states"),
         (NARX, NARX | {"neurons": 3}, "the initial fit is not contained"),
         (NARX, ARX | {"na": 2}, "the initial fit is not contained"),
         (NARX, TF, "the initial fit is not contained"),

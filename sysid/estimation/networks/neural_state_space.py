@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
@@ -24,6 +25,7 @@ from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.result import FitResult
 from sysid.models import (
+    AbstractStructure,
     Mapping,
     NeuralStateSpace,
     NeuralStateSpaceModel,
@@ -53,6 +55,7 @@ def fit_neural_state_space(
     start: Start | None = None,
     rest_output: float | None = None,
     selection: Sequence[Trace] = (),
+    initial: FitResult | None = None,
     vet: Callable[[starts.Network], bool] | None = None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> FitResult:
@@ -69,6 +72,7 @@ def fit_neural_state_space(
         start: What stands before each trace; at rest by default.
         rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
         selection: Traces that choose between starts; without them the evidence chooses.
+        initial: A fit of the same structure, whose parameters are the first start, in its scaled numbers.
         vet: Whether a model's free run is stable; the best stable one of the ten best candidates is then chosen.
         on_progress: Called after every iteration, from the threads that train.
 
@@ -85,14 +89,16 @@ def fit_neural_state_space(
     template = NeuralStateSpaceModel(
         network=network,
         theta=np.zeros(network.sizes(len(mapping.inputs)).count),
-        scaling=_signed(unit_range(experiments), network, experiments),
+        scaling=_signed(unit_range(experiments), network, experiments) if initial is None else _scaling(initial),
         mapping=mapping,
         sample_time=traces[0].sample_time,
         input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
         output_unit=traces[0].channel(mapping.output).unit,
         rest_output=rest,
     )
-    records = Records(traces=traces, selection=selection, start=start or Start(), experiments=experiments)
+    records = Records(
+        traces=traces, selection=selection, start=start or Start(), experiments=experiments, initial=initial
+    )
     return _fit(template, records, training, vet, on_progress)
 
 
@@ -105,6 +111,7 @@ def fit_vector_neural_state_space(
     start: Start | None = None,
     rest_output: Dict[str, float] | None = None,
     selection: Sequence[Trace] = (),
+    initial: FitResult | None = None,
     vet: Callable[[starts.Network], bool] | None = None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> FitResult:
@@ -121,6 +128,7 @@ def fit_vector_neural_state_space(
         start: What stands before each trace; at rest by default.
         rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
         selection: Traces that choose between starts.
+        initial: A fit of the same structure, whose parameters are the first start.
         vet: Whether a model's free run is stable.
         on_progress: Called after every iteration.
 
@@ -137,14 +145,16 @@ def fit_vector_neural_state_space(
     template = VectorNeuralStateSpaceModel(
         network=network,
         theta=np.zeros(network.sizes(len(mapping.inputs), len(mapping.outputs)).count),
-        scaling=_signed(unit_ranges(experiments), network, experiments),
+        scaling=_signed(unit_ranges(experiments), network, experiments) if initial is None else _scaling(initial),
         mapping=mapping,
         sample_time=traces[0].sample_time,
         input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
         output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
         rest_outputs=rests,
     )
-    records = Records(traces=traces, selection=selection, start=start or Start(), experiments=experiments)
+    records = Records(
+        traces=traces, selection=selection, start=start or Start(), experiments=experiments, initial=initial
+    )
     return _fit(template, records, training, vet, on_progress)
 
 
@@ -157,12 +167,14 @@ class Records:
         selection: Traces that choose.
         start: What stands before each.
         experiments: The estimation traces as the fit sees them.
+        initial: A fit whose parameters are the first start.
     """
 
     traces: Sequence[Trace]
     selection: Sequence[Trace]
     start: Start
     experiments: tuple[Experiment, ...]
+    initial: FitResult | None = None
 
     def runs(self, model: starts.Network) -> tuple[list[Experiment], list[Experiment]]:
         """Estimation and selection traces as the model's free run goes over them."""
@@ -196,7 +208,7 @@ def _fit(
         template=template,
         selection=records.selection,
         start=records.start,
-        initial=None,
+        initial=None if records.initial is None else records.initial.model.recursion.numbers,
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
     )
@@ -224,6 +236,30 @@ def _posterior(chosen: starts.Candidate, provider: NeuralProvider, records: Reco
     runs, others = records.runs(model)
     found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
     return None if found is None else calibrate(found, model, others)
+
+
+def check_neural_initial(network: AbstractStructure, initial: AbstractStructure, n_inputs: int) -> None:  # noqa: ARG001
+    """Refuse an initial fit of another structure: hidden states of another one are others.
+
+    Args:
+        network: The structure that is to start from it.
+        initial: The structure of the initial fit.
+        n_inputs: Inputs of the mapping.
+
+    Raises:
+        ConfigError: If they differ.
+    """
+    if network != initial:
+        raise ConfigError(
+            "the initial fit has other hidden states than what is to start from it", where="initial",
+            expected=network.label, got=initial.label,
+            remedy="start from a fit of the same structure, or leave initial out",
+        )  # fmt: skip
+
+
+def _scaling(initial: FitResult) -> Any:
+    """The scaled numbers that an initial fit's parameters are for."""
+    return initial.model.recursion.scaling
 
 
 _Scaling = TypeVar("_Scaling", Scaling, VectorScaling)

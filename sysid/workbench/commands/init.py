@@ -4,20 +4,31 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sysid.references.described import Wish
 from sysid.workbench.runner.console import console
 from sysid.workbench.workspace import make_workspace
 
 
-def init_command(folder: Path) -> None:
+def init_command(folder: Path, *, reference: Path | None, wish: Wish) -> None:
     """Make a workspace and say what to do next.
 
     Args:
         folder: Where.
+        reference: An FMU that the workspace is for. It is read, not run.
+        wish: What is said beside its description.
 
     Raises:
-        ConfigError: If one is there already, or the folder cannot be written to.
+        ConfigError: If one is there already, the folder cannot be written to, or the FMU does not say enough.
     """
-    files = make_workspace(folder)
     target = console()
+    if reference is None:
+        files, commands = make_workspace(folder), ["sysid run tank", "sysid ui"]
+    else:
+        from sysid.workbench.surrogates.begun import make_reference_workspace
+
+        files, name, notes = make_reference_workspace(folder, reference, wish)
+        commands = [f"sysid run {name} --dry-run", f"sysid surrogate {name} --minutes 60"]
+        for note in notes:
+            target.print(note, soft_wrap=True, markup=False)
     target.print(f"Made {len(files)} files in {folder}. Next:", soft_wrap=True)
-    target.print(f"  cd {folder}\n  sysid run tank\n  sysid ui", soft_wrap=True)
+    target.print("\n".join(f"  {one}" for one in (f"cd {folder}", *commands)), soft_wrap=True, markup=False)

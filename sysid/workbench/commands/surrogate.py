@@ -23,8 +23,8 @@ def wish_of(ranges: Sequence[str], parameters: Sequence[str], outputs: Sequence[
 
 
 def surrogate_command(
-    source: str, wish: Wish, *, minutes: float, proof: int | None, workers: int, seed: int, out: Path | None,
-    tracking: bool,
+    source: str, wish: Wish, *, minutes: float, proof: int | None, rounds: int | None, workers: int, seed: int,
+    out: Path | None, tracking: bool,
 ) -> int:  # fmt: skip
     """Make a surrogate and say how it does.
 
@@ -33,6 +33,7 @@ def surrogate_command(
         wish: What is said beside an FMU.
         minutes: Time for all.
         proof: New experiments.
+        rounds: Rounds of added experiments, in place of those of the pipeline.
         workers: Processes.
         seed: Of everything random.
         out: Folder of the results.
@@ -61,7 +62,7 @@ def surrogate_command(
 
     try:
         made = make_surrogate(
-            pipeline, folder, perform=perform, minutes=minutes, proof=proof, seed=seed,
+            pipeline, folder, perform=perform, minutes=minutes, proof=proof, rounds=rounds, seed=seed,
             say=lambda text: target.print(text, markup=False, soft_wrap=True),
         )  # fmt: skip
     finally:

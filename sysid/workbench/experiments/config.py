@@ -4,11 +4,46 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
 from sysid.workbench.old_words import STRICT
+from sysid.yaml_files import FieldError
+
+
+class GrowConfig(BaseModel):
+    """How the experiments of a surrogate grow where it needs them: rounds of run, look, add, train on.
+
+    Args:
+        rounds: At most so many.
+        candidates: New random experiments that a round looks at.
+        keep: How many of them it adds to what is fitted.
+        pick: ``worst``: the reference runs all candidates, and those at which the surrogate is worst are added;
+            ``uncertain``: only those are run at which models of other starts differ most.
+        until: Share of an output's range that the error is to stay under.
+        quantile: Share of the selection runs that it has to stay under it for the growth to end.
+        control: Whether as many experiments as they come are added to another model beside it.
+    """
+
+    model_config = STRICT
+
+    rounds: int = Field(default=3, ge=1, le=100)
+    candidates: int = Field(default=24, ge=1, le=100_000)
+    keep: int = Field(default=6, ge=1)
+    pick: Literal["worst", "uncertain"] = "worst"
+    until: float = Field(default=0.01, gt=0.0, allow_inf_nan=False)
+    quantile: float = Field(default=0.95, gt=0.0, le=1.0)
+    control: bool = True
+
+    @model_validator(mode="after")
+    def _some_of_many(self) -> GrowConfig:
+        if self.keep > self.candidates:
+            raise FieldError(
+                "more are kept than there are", expected=f"keep of at most {self.candidates}, the candidates",
+                got=str(self.keep), remedy="keep fewer, or look at more candidates",
+            )  # fmt: skip
+        return self
 
 
 class ExperimentConfig(BaseModel):
@@ -21,6 +56,7 @@ class ExperimentConfig(BaseModel):
         reference: The slow model. **It is code, and is run**: an FMU holds a compiled library, a program is a program.
         experiment: What is run.
         workers: Processes that run it.
+        grow: How ``sysid surrogate`` adds experiments where its model is worst; ``null`` adds none.
     """
 
     model_config = STRICT
@@ -31,3 +67,4 @@ class ExperimentConfig(BaseModel):
     reference: ReferenceConfig
     experiment: Design
     workers: int = Field(default=2, ge=1, le=256)
+    grow: GrowConfig | None = None

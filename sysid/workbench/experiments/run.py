@@ -148,7 +148,7 @@ class _Experiments:
         """Write the data set and load its traces, which shows that it can be used."""
 
         def make(_: Work) -> Experimented:
-            file = self._written(run, outcomes)
+            file = write_dataset(self.config, self.reference, outcomes, run.store.path, run.command)
             traces, (before, spread) = load_dataset(file), _before(self.reference, outcomes)
             found = Experimented(traces=traces, outcomes=outcomes, before=before, spread=spread)
             for one in found.failed[:SHOWN]:
@@ -160,37 +160,58 @@ class _Experiments:
             outcome=lambda found: f"{len(found.traces)} cases of {found.traces.name}",
         )  # fmt: skip
 
-    def _written(self, run: Run, outcomes: Mapping[str, Sequence[Outcome]]) -> Path:
-        there = {role: [one for one in some if one.trace is not None] for role, some in outcomes.items()}
-        if not there.get("estimation"):
-            reasons = sorted({str(one.reason) for some in outcomes.values() for one in some if one.reason})
-            raise ConfigError(
-                "no run of the reference gave a record to fit", where=self.config.name,
-                expected="one record at least", got="; ".join(reasons[:SHOWN]),
-                remedy="run the reference in its own tool with these inputs first, or raise time_limit",
-            )  # fmt: skip
-        for some in there.values():
-            for one in some:
-                assert one.trace is not None  # noqa: S101 - those without are left out above
-                write_csv(one.trace, run.store.path / TRACES / f"{one.case.name}.csv")
-        cases = {
-            one.case.name: {"role": role, "file": f"{TRACES}/{one.case.name}.csv"}
-            for role, some in there.items()
-            for one in some
-        }
-        fields = {
-            "name": self.config.name,
-            "description": self.config.description or f"Designed experiments on a reference ({self.reference.kind})",
-            "sample_time": self.reference.sample_time,
-            "channels": [_channel(one) for one in channels_of(self.reference)],
-            "source": {"files": {}, "repairs": {"constant": "accept"}},
-            "cases": cases,
-            "provenance": f"Made by {run.command}; each input is held from sample to sample, outputs are at its end.",
-        }
-        write_json(run.store.path / RECORD, _record(outcomes))
-        file = run.store.path / DATASET
-        write_bytes(file, f"# Made by: {run.command}\n\n{yaml_text(fields)}".encode())
-        return file
+
+def write_dataset(
+    config: ExperimentConfig,
+    reference: ReferenceConfig,
+    outcomes: Mapping[str, Sequence[Outcome]],
+    folder: Path,
+    command: str,
+) -> Path:
+    """Write what came of experiments as a data set.
+
+    Args:
+        config: The pipeline.
+        reference: With whole paths.
+        outcomes: By role.
+        folder: Where.
+        command: That makes it again.
+
+    Returns:
+        Its ``dataset.yaml``.
+
+    Raises:
+        ConfigError: If there is no record to fit.
+    """
+    there = {role: [one for one in some if one.trace is not None] for role, some in outcomes.items()}
+    if not there.get("estimation"):
+        reasons = sorted({str(one.reason) for some in outcomes.values() for one in some if one.reason})
+        raise ConfigError(
+            "no run of the reference gave a record to fit", where=config.name,
+            expected="one record at least", got="; ".join(reasons[:SHOWN]),
+            remedy="run the reference in its own tool with these inputs first, or raise time_limit",
+        )  # fmt: skip
+    for some in there.values():
+        for one in some:
+            assert one.trace is not None  # noqa: S101 - those without are left out above
+            write_csv(one.trace, folder / TRACES / f"{one.case.name}.csv")
+    cases = {
+        one.case.name: {"role": role, "file": f"{TRACES}/{one.case.name}.csv"}
+        for role, some in there.items()
+        for one in some
+    }
+    fields = {
+        "name": config.name,
+        "description": config.description or f"Designed experiments on a reference ({reference.kind})",
+        "sample_time": reference.sample_time,
+        "channels": [_channel(one) for one in channels_of(reference)],
+        "source": {"files": {}, "repairs": {"constant": "accept"}},
+        "cases": cases,
+        "provenance": f"Made by {command}; each input is held from sample to sample, outputs are at its end.",
+    }
+    write_json(folder / RECORD, _record(outcomes))
+    write_bytes(folder / DATASET, f"# Made by: {command}\n\n{yaml_text(fields)}".encode())
+    return folder / DATASET
 
 
 def _channel(channel: Channel) -> dict[str, str]:

@@ -3,6 +3,9 @@
 =========  =====================================================================================================
 ``plan``   what is run for how long, as a pipeline of kind ``experiment`` that a person can change
 ``proof``  the surrogate against its reference on new experiments, and in its place
-``make``   the whole: experiment, search, proof; what is done is not done again
+``grow``   rounds of experiments that are added where the surrogate is worst, and their control
+``grown``  the model of the chosen round as a pipeline of fits
+``begun``  a workspace that begins with an FMU
+``make``   the whole: experiment, search, growth, proof; what is done is not done again
 =========  =====================================================================================================
 """

@@ -14,19 +14,22 @@ from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.models import Mapping, Start
 from sysid.references.runs import ReferenceRuns
+from sysid.reporting.growth import FILE
 from sysid.reporting.judging.results import FOLDER
 from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.traces import Role, Trace
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.look import MOVED, in_motion, span_of
-from sysid.workbench.auto.run import auto_of
+from sysid.workbench.auto.run import Searched, auto_of
 from sysid.workbench.auto.run import program_of as search_program
-from sysid.workbench.experiments.config import ExperimentConfig
+from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
 from sysid.workbench.experiments.run import DATASET, Experimented
 from sysid.workbench.experiments.run import program_of as experiment_program
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.runner.program import Program
+from sysid.workbench.surrogates.grown import GROWN, Ground, grow
+from sysid.workbench.surrogates.grown import program_of as grown_program
 from sysid.workbench.surrogates.plan import RUNNING
 from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
 from sysid.yaml_files import check, read_yaml
@@ -34,8 +37,9 @@ from sysid.yaml_files import check, read_yaml
 T = TypeVar("T")
 Perform = Callable[[Program[Any], Path], Any]
 """Carries a program out in a folder, and gives its results."""
-SEARCHING = 0.5
-"""Share of the time in which a model is looked for."""
+SEARCHING, GROWING = 0.5, 0.25
+"""Share of the time in which a model is looked for, and the part of it in which its data grow, where they do."""
+FORMATS = ("c", "fmi2", "fmi3")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,6 +69,7 @@ def make_surrogate(
     minutes: float,
     proof: int | None = None,
     iterations: int | None = None,
+    rounds: int | None = None,
     seed: int = 0,
     say: Callable[[str], None] = lambda _: None,
 ) -> Made:
@@ -77,6 +82,7 @@ def make_surrogate(
         minutes: Time for all.
         proof: New experiments; 1,000 by default, or as many as there is time for.
         iterations: In place of the search's time: the same result on every machine.
+        rounds: Rounds of added experiments, in place of those of the pipeline.
         seed: Of the search.
         say: Told what makes a surrogate wrong, and how the proof goes.
 
@@ -88,35 +94,64 @@ def make_surrogate(
     """
     config = check(ExperimentConfig, read_yaml(pipeline), where=pipeline)
     text = pipeline.read_text(encoding="utf-8-sig")
-    place, reference = folder / "experiment", config.reference.at(pipeline.resolve().parent)
-    found: Experimented = perform(experiment_program(config, text=text, folder=pipeline.resolve().parent), place)
+    growth = config.grow if rounds is None else (config.grow or GrowConfig()).model_copy(update={"rounds": rounds})
+    run_in, reference = folder / "experiment", config.reference.at(pipeline.resolve().parent)
+    found: Experimented = perform(experiment_program(config, text=text, folder=pipeline.resolve().parent), run_in)
     mapping = Mapping(inputs=(*reference.inputs, *reference.parameters), outputs=tuple(reference.outputs))
-    notes = restless(found, mapping)
-    for note in notes:  # before an hour is spent
+    begins = restless(found, mapping)
+    for note in begins:  # before an hour is spent
         say(f"note: {note}")
+    share = SEARCHING if growth is None else SEARCHING - GROWING
     fields: dict[str, Any] = {
-        **{"kind": "auto", "name": "model", "data": str((place / DATASET).resolve()), "mapping": mapping},
+        **{"kind": "auto", "name": "model", "data": str((run_in / DATASET).resolve()), "mapping": mapping},
         **{"start": Start(), "rest": dict(found.before), "seed": seed, "workers": config.workers},
-        **({"iterations": iterations} if iterations else {"minutes": SEARCHING * minutes}),
-        "export": {"formats": ["c", "fmi2", "fmi3"]},
+        **({"iterations": iterations} if iterations else {"minutes": share * minutes}),
+        "export": {"formats": FORMATS},
     }
     search = check(AutoConfig, fields, where=pipeline)
-    perform(search_program(auto_of(search, load=lambda: data_of(found.traces, mapping))), folder / "model")
-    bundle = read_bundle(folder / "model" / "bundle")
-    notes += beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if notes else []
+    searched: Searched = perform(
+        search_program(auto_of(search, load=lambda: data_of(found.traces, mapping))), folder / "model"
+    )
+    place, notes = folder / "model", list(begins)
+    if growth is not None:
+        ground = Ground(config=config, reference=reference, found=found, folder=folder)
+        seconds = None if iterations else GROWING * 60.0 * minutes
+        place, said = _grown(ground, growth, searched, seconds=seconds, perform=perform, say=say)
+        notes.append(said)
+    bundle = read_bundle(place / "bundle")
+    notes += beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if begins else []
     count = proof or _affordable(config, reference_runs=ReferenceRuns(config=reference), minutes=minutes)
     shown, section = prove(
         bundle, reference, config.experiment, found.traces, count=count, workers=config.workers,
         progress=lambda name, n, of: say(f"proof: {name} ({n} of {of})") if n % max(1, of // 20) == 0 else None,
     )  # fmt: skip
-    (folder / "model" / FOLDER).mkdir(exist_ok=True)
-    write_record(folder / "model" / FOLDER / "proof.json", section)
-    page, fmu = write_report(folder / "model"), fmu_of(bundle)
+    (place / FOLDER).mkdir(exist_ok=True)
+    write_record(place / FOLDER / "proof.json", section)
+    page, fmu = write_report(place), fmu_of(bundle)
     if fmu is not None:
         fmu = Path(shutil.copyfile(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu"))
     if len(shown.errors) < 1000:
         notes.append(f"the proof is of {len(shown.errors)} experiments; --proof 1000 makes it of 1,000")
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes)
+
+
+def _grown(
+    ground: Ground,
+    how: GrowConfig,
+    searched: Searched,
+    *,
+    seconds: float | None,
+    perform: Perform,
+    say: Callable[[str], None],
+) -> tuple[Path, str]:
+    """The folder of the surrogate once its data have grown, and what that brought."""
+    grower, grown = grow(ground, how, searched, seconds=seconds, say=say)
+    place = ground.folder / (GROWN if grown.best.added else "model")
+    if grown.best.added:
+        perform(grown_program(ground, grower, grown, FORMATS), place)
+    else:
+        write_record(place / FILE, grown.record)
+    return place, grown.record.sentence
 
 
 def _affordable(config: ExperimentConfig, *, reference_runs: ReferenceRuns, minutes: float) -> int:

@@ -46,14 +46,39 @@ def written(fmu: Path, wish: Wish, folder: Path, *, minutes: float, workers: int
     reference = check(ReferenceConfig, fields, where=fmu)
     runs = affordable(reference, Design(duration=duration, seed=seed), minutes=minutes, workers=workers)
     experiment = {"duration": duration, "runs": runs.model_dump(), "seed": seed}
+    text = _text(fmu, f"{fmu.stem}-runs", fields, experiment, workers=workers, notes=notes)
+    write_bytes(file, text.encode())
+    return file, notes
+
+
+def text_of(fmu: Path, wish: Wish, *, written_as: str, name: str) -> tuple[str, list[str]]:
+    """The pipeline of an FMU as text, with as many experiments as usual; nothing is run.
+
+    Args:
+        fmu: The reference.
+        wish: What is said beside its description.
+        written_as: Its path in the pipeline.
+        name: Of the pipeline.
+
+    Returns:
+        The text, and what was taken from where.
+
+    Raises:
+        ConfigError: If the description does not say enough.
+    """
+    fields, duration, notes = proposed(fmu, wish)
+    return _text(fmu, name, {**fields, "fmu": written_as}, {"duration": duration}, workers=2, notes=notes), notes
+
+
+def _text(
+    fmu: Path, name: str, reference: dict[str, Any], experiment: dict[str, Any], *, workers: int, notes: Sequence[str]
+) -> str:
     content: dict[str, Any] = {
-        **{"kind": "experiment", "name": f"{fmu.stem}-runs", "reference": fields, "experiment": experiment},
-        "workers": workers,
-    }
+        **{"kind": "experiment", "name": name, "reference": reference, "experiment": experiment}, "workers": workers,
+    }  # fmt: skip
     check(ExperimentConfig, content, where=fmu)
     told = "".join(f"# {one}\n" for one in notes)
-    write_bytes(file, f"# Proposed for {fmu.name}. An FMU is code, and is run.\n{told}{yaml_text(content)}".encode())
-    return file, notes
+    return f"# Proposed for {fmu.name}. An FMU is code, and is run.\n{told}{yaml_text(content)}"
 
 
 def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, workers: int) -> Counts:

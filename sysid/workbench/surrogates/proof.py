@@ -184,10 +184,9 @@ def prove(
     errors, largest = [], []
     for one, found in zip(there, runs_of, strict=True):
         assert one.trace is not None  # noqa: S101 - checked above
-        off = np.abs(found - one.trace.columns(outputs)) / spans
-        off = np.where(np.isfinite(off), np.minimum(off, 1e100), np.inf)
-        errors.append(np.sqrt(np.mean(off**2, axis=0)))
-        largest.append(off.max(axis=0))
+        measured = one.trace.columns(outputs)
+        errors.append(rms_shares(found, measured, spans))
+        largest.append(_shares(found, measured, spans).max(axis=0))
     dropped = _drop_in(bundle, config, there[0], runs_of[0], spans)
     proof = Proof(
         errors=np.array(errors), largest=np.array(largest), outcomes=there, failed=len(done) - len(there),
@@ -197,15 +196,46 @@ def prove(
     return proof, proof.record([runs_of[k] for k in proof.worst])
 
 
-def _inputs(config: ReferenceConfig, case: Case) -> NDArray[np.float64]:
-    """Inputs of the surrogate: those of the reference, and its parameters as constants."""
+def _shares(
+    found: NDArray[np.float64], measured: NDArray[np.float64], spans: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    off = np.abs(found - measured) / spans
+    return np.where(np.isfinite(off), np.minimum(off, 1e100), np.inf)
+
+
+def rms_shares(
+    found: NDArray[np.float64], measured: NDArray[np.float64], spans: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Root mean square errors of a free run as shares of the ranges.
+
+    Args:
+        found: Shape ``(n_samples, n_outputs)``.
+        measured: Likewise.
+        spans: Range of each output, shape ``(n_outputs,)``.
+
+    Returns:
+        Shape ``(n_outputs,)``; infinite where the run left all numbers.
+    """
+    return np.asarray(np.sqrt(np.mean(_shares(found, measured, spans) ** 2, axis=0)))
+
+
+def surrogate_inputs(config: ReferenceConfig, case: Case) -> NDArray[np.float64]:
+    """Inputs of a surrogate over an experiment: those of the reference, and its parameters as constants.
+
+    Args:
+        config: The reference.
+        case: The experiment.
+
+    Returns:
+        Shape ``(n_samples, n_inputs + n_parameters)``.
+    """
     return np.hstack([case.inputs, *(np.full((len(case.inputs), 1), case.parameters[n]) for n in config.parameters)])
 
 
 def _run(bundle: Bundle, config: ReferenceConfig, one: Outcome) -> NDArray[np.float64]:
     """The surrogate's free run, from its declared levels, a column an output of the reference."""
     names = [*config.inputs, *config.parameters]
-    columns = dict(zip(names, _inputs(config, one.case).T, strict=True))
+    columns = dict(zip(names, surrogate_inputs(config, one.case).T, strict=True))
     with np.errstate(all="ignore"):
         found = np.asarray(bundle.simulate(columns)).reshape(len(one.case.inputs), -1)
     order = [str(entry["name"]) for entry in bundle.outputs]
@@ -227,7 +257,7 @@ def _drop_in(
         outputs=config.outputs,
     )
     with ReferenceRuns(config=own, workers=1, fresh=True) as runs:
-        (found,) = runs.run([Case(name="drop-in", inputs=_inputs(config, one.case))])
+        (found,) = runs.run([Case(name="drop-in", inputs=surrogate_inputs(config, one.case))])
     if found.trace is None:
         raise ConfigError(
             "the surrogate's FMU does not run in the reference's place", where=file, expected="the same ports",

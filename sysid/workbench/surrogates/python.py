@@ -17,6 +17,7 @@ def surrogate(
     minutes: float = 60.0,
     proof: int | None = None,
     iterations: int | None = None,
+    rounds: int | None = None,
     seed: int = 0,
 ) -> Made:
     """Make a surrogate of a slow model: experiments, a model, its export as a drop-in FMU, and the proof.
@@ -27,6 +28,7 @@ def surrogate(
         minutes: Time for all.
         proof: New random experiments that teach nothing; 1,000, or as many as there is time for.
         iterations: In place of the search's time: the same result on every machine.
+        rounds: Rounds of experiments that are added where the surrogate is worst, in place of those of the pipeline.
         seed: Of the search.
 
     Returns:
@@ -36,6 +38,7 @@ def surrogate(
         UserError: If the pipeline or its reference cannot be used.
     """
     return make_surrogate(
-        Path(pipeline), Path(folder), minutes=minutes, proof=proof, iterations=iterations, seed=seed,
+        Path(pipeline), Path(folder), minutes=minutes, proof=proof, iterations=iterations, rounds=rounds,
+        seed=seed,
         perform=lambda program, place: carry_out(program, place, command=COMMAND),
     )  # fmt: skip

@@ -333,3 +333,17 @@ def test_outputs_that_never_move_have_a_fit(still):
     run = fit.model.simulate(trace.columns(["u", "w"]), History.at_rest(inputs=[0.0, 0.0], output=values[0, 2:]))
     for column in still:
         np.testing.assert_allclose(run[:, column - 3], 2.0, atol=1e-3)
+
+
+def test_a_fit_goes_on_from_an_initial_one_of_its_structure_in_that_ones_scaled_numbers() -> None:
+    network, few = NeuralStateSpace(states=2, neurons=2), Training(max_iterations=1, starts=1)
+    near = [hidden_saturation(0, 200)]
+    far = [*near, replace(near[0], name="far", values=2.0 * near[0].values)]
+    first = fit_neural_state_space(near, MAPPING, network, Training(max_iterations=60, starts=1), rest_output=0.0)
+    again = fit_neural_state_space(near, MAPPING, network, few, rest_output=0.0, initial=first)
+    afresh = fit_neural_state_space(near, MAPPING, network, few, rest_output=0.0)
+    rest = Start()
+    assert rmse(again, near[0], rest) <= rmse(first, near[0], rest) * (1.0 + 1e-6)
+    assert rmse(again, near[0], rest) < 0.95 * rmse(afresh, near[0], rest)
+    wider = fit_neural_state_space(far, MAPPING, network, few, rest_output=0.0, initial=first)
+    assert wider.model.recursion.scaling == first.model.recursion.scaling

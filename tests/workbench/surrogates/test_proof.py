@@ -15,6 +15,7 @@ from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish, proposed
 from sysid.references.design import Design, designed
 from sysid.reporting.judging.results import JudgementRecord
+from sysid.workbench.cli import run_cli
 from sysid.workbench.experiments.run import Experimented
 from sysid.workbench.surrogates.make import beginning_of, restless
 from sysid.workbench.surrogates.plan import pairs
@@ -73,6 +74,27 @@ def test_what_an_fmu_does_not_say_is_asked_for_by_its_option(proven: tuple[Bundl
     with pytest.raises(ConfigError, match="does not say all") as caught:
         proposed(file, Wish(ranges={}, parameters={}, outputs=("y",)))
     assert "--range u=LOW:HIGH" in str(caught.value.remedy)
+
+
+def test_a_workspace_that_begins_with_an_fmu_runs(
+    proven: tuple[Bundle, Proof, JudgementRecord], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    file = fmu_of(proven[0])
+    assert file is not None
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
+    begun = ["init", str(tmp_path / "ws"), "--reference", str(file), "--range", "u=0:2"]
+    assert run_cli(begun) != 0
+    assert "--duration SECONDS" in capsys.readouterr().err
+    assert not (tmp_path / "ws").exists()
+    begun += ["--duration", "40"]
+    assert run_cli(begun) == 0
+    (pipeline,) = (tmp_path / "ws" / "pipelines").glob("*.yaml")
+    monkeypatch.chdir(tmp_path / "ws")
+    assert f"sysid surrogate {pipeline.stem}" in Path("README.md").read_text(encoding="utf-8")
+    assert run_cli(["run", pipeline.stem, "--dry-run"]) == 0
+    assert "20 of 20 runs to make" in capsys.readouterr().out.replace("\n", " ")
+    assert run_cli(begun) != 0
 
 
 @pytest.mark.parametrize("text", ["u", "u=3:1", "=1:2", "u=a:b"])
