@@ -205,7 +205,7 @@ def export_bundle(
         (draft / SCHEMA).write_text(schema_text(), encoding="utf-8", newline="\n")
         purposes[SCHEMA] = f"JSON schema of {MANIFEST}"
         manifest = describe(surrogate, known, traces, start=start, metrics=metrics, provenance=provenance or {})
-        manifest["amplification"] = amplification(cases, sequences)
+        manifest["amplification"] = amplification(cases, sequences, surrogate.sample_time)
         manifest["stability"] = None
         if stability is not None:
             state_stability(manifest, stability)

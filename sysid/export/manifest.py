@@ -274,20 +274,30 @@ def _example(traces: TraceSet) -> Trace:
     return estimation[0] if estimation else traces.traces[0]
 
 
-def amplification(cases: Sequence[ParityCase], sequences: Sequence[ParityCase]) -> dict[str, Any]:
+AMPLIFIES = 1e3
+"""From here on rounding is told to matter: 13 digits that two compilers have in common are 10 at the end of a run."""
+
+
+def amplification(cases: Sequence[ParityCase], sequences: Sequence[ParityCase], sample_time: float) -> dict[str, Any]:
     """How much the model's free run makes of a small change of its output before the first sample.
 
     Args:
         cases: The cases.
         sequences: The random sequences.
+        sample_time: Seconds.
 
     Returns:
-        JSON values.
+        JSON values; ``rate_per_s`` is the mean rate at which the logarithm grew until the largest change was reached
+        (a finite-time Lyapunov exponent), 0 where nothing grows.
     """
     worst = max((*cases, *sequences), key=lambda case: case.amplification)
+    finite, after = math.isfinite(worst.amplification), (worst.reached + 1) * sample_time
     return {
-        "largest": worst.amplification if math.isfinite(worst.amplification) else None,
+        "largest": worst.amplification if finite else None,
         "case": worst.name,
+        "after_s": after,
+        "rate_per_s": math.log(max(worst.amplification, 1.0)) / after if finite else None,
+        "amplifies": not worst.amplification < AMPLIFIES,
         "meaning": "largest change of an output over the change of the output before the first sample that caused it; "
         "a difference in the last digit of a number grows by as much",
     }

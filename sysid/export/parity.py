@@ -38,6 +38,7 @@ class ParityCase:
         state: Before the first sample, shape ``(n_state,)``.
         output: The model's outputs, shape ``(n_samples, n_outputs)``.
         amplification: Largest change of an output in the run over the change before its first sample that caused it.
+        reached: The sample at which it is reached.
     """
 
     name: str
@@ -45,6 +46,7 @@ class ParityCase:
     state: NDArray[np.float64]
     output: NDArray[np.float64]
     amplification: float
+    reached: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,12 +112,14 @@ def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, star
     output, change = model.simulate(inputs, history).reshape(len(inputs), -1), _disturbances(surrogate)
     moved = history.output + (change if model.structure.several_outputs else change[0])
     disturbed = model.simulate(inputs, History(inputs=history.inputs, output=moved)).reshape(len(inputs), -1)
+    grown, reached = _growth(disturbed / change, output / change)
     return ParityCase(
         name=trace.name,
         inputs=surrogate.inputs_of(trace)[begun.first :],
         state=surrogate.stages[0].state.from_history(history),
         output=output,
-        amplification=largest_difference(disturbed / change, output / change),
+        amplification=grown,
+        reached=reached,
     )
 
 
@@ -125,13 +129,21 @@ def _from_rest(
     change, rest = _disturbances(surrogate), surrogate.rest(inputs[0]) if begun is None else begun
     computed = surrogate.compute(inputs, rest)
     disturbed = surrogate.compute(inputs, rest + change)
+    grown, reached = _growth(surrogate.chosen(disturbed / change), surrogate.chosen(computed / change))
     return ParityCase(
         name=name,
         inputs=inputs,
         state=surrogate.at_rest(inputs[0], rest),
         output=surrogate.chosen(computed),
-        amplification=largest_difference(surrogate.chosen(disturbed / change), surrogate.chosen(computed / change)),
+        amplification=grown,
+        reached=reached,
     )
+
+
+def _growth(disturbed: NDArray[np.float64], output: NDArray[np.float64]) -> tuple[float, int]:
+    """The largest difference of two runs, and the sample at which it is reached."""
+    each = _differences(disturbed, output).max(axis=1, initial=0.0)
+    return (float(each.max()), int(each.argmax())) if len(each) else (0.0, 0)
 
 
 def _somewhere(rng: np.random.Generator, surrogate: Surrogate) -> NDArray[np.float64]:
@@ -274,7 +286,11 @@ def largest_difference(output: NDArray[Any], expected: NDArray[np.float64]) -> f
         >>> largest_difference(np.array([1.0, np.nan]), np.array([1.5, np.nan]))
         0.5
     """
+    return float(np.max(_differences(output, expected), initial=0.0))
+
+
+def _differences(output: NDArray[Any], expected: NDArray[np.float64]) -> NDArray[np.float64]:
     same = (output == expected) | (np.isnan(output) & np.isnan(expected))
     with np.errstate(invalid="ignore"):
         difference = np.where(same, 0.0, np.abs(output - expected))
-    return float(np.max(np.nan_to_num(difference, nan=np.inf, posinf=np.inf), initial=0.0))
+    return np.asarray(np.nan_to_num(difference, nan=np.inf, posinf=np.inf), dtype=np.float64)

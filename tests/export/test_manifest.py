@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import copy
 import json
+import math
+from dataclasses import replace
 
 import jsonschema
 import pytest
 
-from sysid.export import export_bundle, read_bundle
-from sysid.export.manifest import SCHEMA, SCHEMA_VERSION, schema_text
+from sysid.export import Surrogate, export_bundle, read_bundle
+from sysid.export.card import model_card
+from sysid.export.manifest import SCHEMA, SCHEMA_VERSION, amplification, schema_text
+from sysid.export.parity import random_cases
+from sysid.models import NARX
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +71,16 @@ def test_amplification_is_told(bundle):
     told = bundle.metadata["amplification"]
     assert 0.0 < told["largest"] < 10.0
     assert told["meaning"]
+    assert not told["amplifies"]
+    assert "amplifies rounding" not in model_card(bundle.metadata)
+
+
+def test_a_surrogate_that_amplifies_rounding_says_how_fast(bundle, narx):
+    surrogate = Surrogate.of(narx(NARX(input_delays=1, output_delays=1, neurons=1)))
+    (case,) = random_cases(surrogate, sequences=1)
+    told = amplification((replace(case, amplification=math.exp(8.0), reached=399),), (case,), 0.1)
+    assert (told["after_s"], told["rate_per_s"], told["amplifies"]) == (40.0, pytest.approx(0.2), True)
+    card = model_card(bundle.metadata | {"amplification": told})
+    assert "after 40 s" in card
+    assert "it grew by 20 % a second" in card
+    assert "**This surrogate amplifies rounding.**" in card

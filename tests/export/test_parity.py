@@ -122,3 +122,4 @@ def test_amplification_is_what_becomes_of_a_small_change(pole, expected):
     )
     case = random_cases(Surrogate.of(model), sequences=1)[0]
     assert case.amplification == pytest.approx(expected, rel=1e-6)
+    assert case.reached == (399 if pole > 1.0 else 0)
