@@ -165,7 +165,7 @@ class Findings:
             for j in range(i):
                 pair, found = f"{self.parameters[j].name} and {one.name}", correlation[i, j]
                 told += [
-                    f"The parameters {pair} can hardly be told apart (correlation {found:.4f}). Fix one of them, or "
-                    "give it a prior."
+                    f"The parameters {pair} can hardly be told apart (correlation {found:.4f}): the run hardly changes "
+                    "where both move, and the interval of each may be too short. Fix one of them, or give it a prior."
                 ] * bool(abs(found) > TOGETHER)
         return tuple(told)
