@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +84,7 @@ class AbstractRecord(ABC):
         """
 
 
+@lru_cache(maxsize=32)
 def full(bases: Bases, domain: Domain) -> Bases:
     """The same sections with all numerators below the number of poles: the space of free responses.
 
@@ -99,7 +101,8 @@ def full(bases: Bases, domain: Domain) -> Bases:
     )
 
 
-def tap_slices(bases: Bases) -> list[slice]:
+@lru_cache(maxsize=64)
+def tap_slices(bases: Bases) -> tuple[slice, ...]:
     """Where each input's taps stand among all columns.
 
     Args:
@@ -109,7 +112,7 @@ def tap_slices(bases: Bases) -> list[slice]:
         One slice per input.
     """
     ends = np.cumsum([sum(len(section.taps) for section in basis) for basis in bases])
-    return [slice(int(end - n), int(end)) for end, n in zip(ends, np.diff([0, *ends]), strict=True)]
+    return tuple(slice(int(end - n), int(end)) for end, n in zip(ends, np.diff([0, *ends]), strict=True))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,26 +136,12 @@ class TimeRecord(AbstractRecord):
     domain: Domain
     sample_time: float
     free_start: bool
-    _last: list[tuple[Bases, MirroredPredictor | None]] = field(init=False, repr=False, default_factory=list)
 
     def predictor(self, bases: Bases) -> MirroredPredictor | None:
         """From a fitted initial state alone; see the base class."""
         if not self.free_start:
             return None
-        if not self._last or self._last[0][0] is not bases:  # columns ask for it, and the problem does
-            self._last[:] = [(bases, self._predictor(bases))]
-        return self._last[0][1]
-
-    def _predictor(self, bases: Bases) -> MirroredPredictor | None:
-        systems = [realise(basis, self.domain) for basis in bases]
-        if self.domain is Domain.CONTINUOUS:
-            rates = max((float(np.abs(system.A).max(initial=0.0)) for system in systems), default=0.0)
-            if not rates * self.sample_time <= _FASTEST:
-                return None
-            systems = [system.sampled(self.sample_time) for system in systems]
-        if not all(np.isfinite(system.A).all() for system in systems):
-            return None
-        return MirroredPredictor.of(systems, len(self.target))
+        return _predictor(bases, self.domain, self.sample_time, len(self.target))
 
     def private(self, bases: Bases) -> int:
         """The initial state, if it is fitted; see the base class."""
@@ -164,22 +153,22 @@ class TimeRecord(AbstractRecord):
         if through is not None:
             found = [through.responses(j, self.inputs[:, j]) for j in range(len(bases))]
             return np.concatenate([*found, through.beginnings()], axis=1)
-        parts = [self._pass(basis, self.inputs[:, j], self.past[j]) for j, basis in enumerate(bases)]
+        how = self.domain, self.sample_time
+        parts = [_pass(basis, *how, self.inputs[:, j], self.past[j]) for j, basis in enumerate(bases)]
         if self.free_start:
-            pulse = self._pulse()
-            parts += [self._pass(basis, pulse, 0.0)[-len(self.target) :] for basis in full(bases, self.domain)]
+            parts.append(_beginnings(bases, *how, len(self.target)))
         return np.concatenate(parts, axis=1)
 
     def tangents(self, bases: Bases, columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """One more pass through each section; see the base class."""
         parts = []
         own = tap_slices(bases)
-        free = tap_slices(full(bases, self.domain)) if self.free_start else []
+        free = tap_slices(full(bases, self.domain)) if self.free_start else ()
         shared = own[-1].stop
         for j, basis in enumerate(bases):
             if self.domain is Domain.DISCRETE:
                 y = columns[:, own[j]] @ weights[own[j]]
-                past = float(_static_taps(basis, self.past[j]) @ weights[own[j]])
+                past = float(_static_taps(basis, self.past[j]) @ weights[own[j]]) if self.past[j] != 0.0 else 0.0
                 if free:
                     at = slice(shared + free[j].start, shared + free[j].stop)
                     y = y + columns[:, at] @ weights[at]
@@ -188,19 +177,11 @@ class TimeRecord(AbstractRecord):
                 part = self._continuous_tangents(basis, self.inputs[:, j], self.past[j], weights[own[j]])
                 if free:
                     at = slice(shared + free[j].start, shared + free[j].stop)
-                    begun = self._continuous_tangents(full((basis,), self.domain)[0], self._pulse(), 0.0, weights[at])
+                    pulse = _pulse(self.domain, len(self.target))
+                    begun = self._continuous_tangents(full(bases, self.domain)[j], pulse, 0.0, weights[at])
                     part = part + begun[-len(self.target) :]
                 parts.append(part)
         return np.concatenate(parts, axis=1)
-
-    def _pulse(self) -> NDArray[np.float64]:
-        """A pulse that leaves any state behind: in the first row, or before it where the output takes a sample."""
-        return np.eye(len(self.target) + (self.domain is Domain.CONTINUOUS), 1)[:, 0]
-
-    def _pass(self, basis: tuple[BasisSection, ...], x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
-        if self.domain is Domain.DISCRETE:
-            return _discrete_columns(basis, x, past)
-        return _run_sampled(realise(basis, self.domain), self.sample_time, x, past)
 
     def _continuous_tangents(
         self, basis: tuple[BasisSection, ...], x: NDArray[np.float64], past: float, weights: NDArray[np.float64]
@@ -220,6 +201,54 @@ class TimeRecord(AbstractRecord):
         C = np.concatenate([np.zeros((len(C), n)), C], axis=1)
         whole = Realisation(A=A, B=B, C=-C, D=np.zeros(len(C)))
         return _run_sampled(whole, self.sample_time, x, past)
+
+
+@lru_cache(maxsize=32)
+def _predictor(bases: Bases, domain: Domain, sample_time: float, n_rows: int) -> MirroredPredictor | None:
+    """The predictor over so many rows, made once for all records that are as long."""
+    systems = _sampled(bases, domain, sample_time)
+    return None if systems is None else MirroredPredictor.of(systems, n_rows)
+
+
+@lru_cache(maxsize=32)
+def _sampled(bases: Bases, domain: Domain, sample_time: float) -> tuple[Realisation, ...] | None:
+    """What each input passes from sample to sample; ``None`` where it cannot be computed with."""
+    systems = tuple(realise(basis, domain) for basis in bases)
+    if domain is Domain.CONTINUOUS:
+        fastest = max((float(np.abs(system.A).max(initial=0.0)) for system in systems), default=0.0)
+        if not fastest * sample_time <= _FASTEST:
+            return None
+        systems = tuple(system.sampled(sample_time) for system in systems)
+    return systems if all(np.isfinite(system.A).all() for system in systems) else None
+
+
+def _beginnings(bases: Bases, domain: Domain, sample_time: float, n_rows: int) -> NDArray[np.float64]:
+    """What a pulse before a record leaves in it, made once for all records that are as long and not too long."""
+    return (_kept_beginnings if n_rows <= _KEPT else _made_beginnings)(bases, domain, sample_time, n_rows)
+
+
+def _made_beginnings(bases: Bases, domain: Domain, sample_time: float, n_rows: int) -> NDArray[np.float64]:
+    pulse = _pulse(domain, n_rows)
+    each = [_pass(basis, domain, sample_time, pulse, 0.0)[-n_rows:] for basis in full(bases, domain)]
+    return np.concatenate(each, axis=1)
+
+
+_KEPT = 20_000
+"""Rows up to which responses are kept for the next record."""
+_kept_beginnings = lru_cache(maxsize=2)(_made_beginnings)
+
+
+def _pulse(domain: Domain, n_rows: int) -> NDArray[np.float64]:
+    """A pulse that leaves any state behind: in the first row, or before it where the output takes a sample."""
+    return np.eye(n_rows + (domain is Domain.CONTINUOUS), 1)[:, 0]
+
+
+def _pass(
+    basis: tuple[BasisSection, ...], domain: Domain, sample_time: float, x: NDArray[np.float64], past: float
+) -> NDArray[np.float64]:
+    if domain is Domain.DISCRETE:
+        return _discrete_columns(basis, x, past)
+    return _run_sampled(realise(basis, domain), sample_time, x, past)
 
 
 def _bare(section: BasisSection) -> BasisSection:
