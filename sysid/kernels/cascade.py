@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import copy_numbers, copy_rows
 from sysid.kernels.cascade_layout import (
     FREE,
     HIGH,
@@ -111,8 +112,8 @@ def _keep(kept, h, neurons, neuron_first):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _walk(p, layout, values, past, at_sample, kept, held):
-    """Run over the rows of ``values`` from ``past`` on, the first of which is sample ``at_sample``."""
+def _walk(p, layout, values, past, kept, held):
+    """Run over the rows of ``values`` from ``past`` on; ``kept`` and ``held`` begin with the first of these."""
     theta, bounds, weights = layout.theta, layout.bounds, layout.weights
     constant, linear_first, readout_first = _u(layout.constant), layout.linear_first, _u(layout.readout_first)
     networks, network_first, neurons_first = _u(layout.networks), _u(layout.network_first), _u(layout.neurons_first)
@@ -130,7 +131,7 @@ def _walk(p, layout, values, past, at_sample, kept, held):
     back = _u(p.regressor_lag * wide - p.regressor_channel)
     indices = _placed(layout.sums.indices, back)
     for row in range(past, len(values)):
-        here, t, at = np.uintp(row * wide), np.uintp(at_sample + row - past), np.uintp(0)
+        here, t, at = np.uintp(row * wide), np.uintp(row - past), np.uintp(0)
         for level in range(np.uintp(len(network_first) - 1)):
             for q in range(network_first[level], network_first[level + ONE]):
                 m = networks[q]
@@ -198,10 +199,12 @@ def run(p, depth, rest, values, kept, held):
     # Samples whose past reaches before the first run in an array of their own, which begins with that past.
     first = min(depth, len(values))
     room = np.empty((depth + first, values.shape[1]))
-    room[:depth], room[depth:] = rest, values[:first]
-    _walk(p, layout, room, depth, 0, kept, held)
-    values[:first] = room[depth:]
-    _walk(p, layout, values, first, first, kept, held)
+    for row in range(depth):
+        copy_numbers(rest, room[row])
+    copy_rows(values[:first], room[depth:])
+    _walk(p, layout, room, depth, kept, held)
+    copy_rows(room[depth:], values)
+    _walk(p, layout, values, first, kept[first:], held[first:])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -215,4 +218,4 @@ def go_on(p, past, values, kept, held):
         kept: As for :func:`run`.
         held: As for :func:`run`, from row ``past`` on.
     """
-    _walk(p, laid_out(p), values, past, 0, kept, held)
+    _walk(p, laid_out(p), values, past, kept, held)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import copy_numbers, copy_rows
 from sysid.kernels.cascade import _bounded, _limited
 from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, gates_at, in_units
 from sysid.kernels.neurons.table import activate
@@ -91,9 +92,11 @@ def _limits(p, o, now_values, low, high):
     low[:], high[:] = p.limits[o, 0], p.limits[o, 1]
     low_code, high_code = LOW, HIGH
     if p.limit_channel[o, 0] >= 0:
-        low[:], low_code = now_values[p.limit_channel[o, 0]], LOW_CHANNEL
+        low_code = LOW_CHANNEL
+        copy_numbers(now_values[p.limit_channel[o, 0]], low)
     if p.limit_channel[o, 1] >= 0:
-        high[:], high_code = now_values[p.limit_channel[o, 1]], HIGH_CHANNEL
+        high_code = HIGH_CHANNEL
+        copy_numbers(now_values[p.limit_channel[o, 1]], high)
     return low_code, high_code
 
 
@@ -128,12 +131,15 @@ def run(p, depth, rest, lanes, values, held):
     record = np.minimum(np.arange(lanes), records - 1)
     past = np.zeros((depth + CHUNK, channels, lanes))
     for lane in range(lanes):
-        past[:depth, :, lane] = rest[record[lane]]
+        for row in range(depth):
+            copy_numbers(rest[record[lane]], past[row, :, lane])
     is_output = np.zeros(channels, dtype=np.bool_)
     is_output[p.output_channel] = True
     for t in range(samples):
         if t > 0 and t % CHUNK == 0:
-            past[:depth] = past[CHUNK : CHUNK + depth].copy()
+            last = past[CHUNK : CHUNK + depth].copy()
+            for row in range(depth):
+                copy_rows(last[row], past[row])
         now = depth + t % CHUNK
         now_values = past[now]
         for channel in range(channels):
@@ -145,7 +151,7 @@ def run(p, depth, rest, lanes, values, held):
             first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
             first_y, n_y = p.output_first[m], p.output_first[m + 1] - p.output_first[m]
             for i in range(n_x):
-                x[i] = past[now - p.regressor_lag[first_x + i], p.regressor_channel[first_x + i]]
+                copy_numbers(past[now - p.regressor_lag[first_x + i], p.regressor_channel[first_x + i]], x[i])
             own, gates = p.theta_first[m], gates_at(p.theta_first, m, n, n_x, n_y)
             _affine(theta, own, own + n * n_x, n, n_x, x, h)
             activate(p.kinds[m], hidden, 0, n * lanes)

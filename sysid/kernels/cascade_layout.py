@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from sysid.kernels.arrays import copy_numbers
 from sysid.kernels.registers import LANES
 
 
@@ -155,6 +156,13 @@ def gates_at(theta_first, m, n, n_x, n_y):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _scaled(theta, first, n, scale):
+    """Multiply ``n`` parameters from ``first`` on."""
+    for i in range(first, first + n):
+        theta[i] *= scale
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def in_units(p):
     """All members' parameters as they act between channels in their units, laid out as ``theta``, and the bounds."""
     theta = p.theta.copy()
@@ -177,14 +185,18 @@ def in_units(p):
                 theta[constants + n_y + j * n_x + i] /= scale
                 theta[constants + j] -= theta[constants + n_y + j * n_x + i] * offset
         if gates >= 0:
-            theta[gates : gates + n * n_x] *= p.output_scale[p.output_first[m]]
+            _scaled(theta, gates, n * n_x, p.output_scale[p.output_first[m]])
         for j in range(n_y):
             offset, scale = p.output_offset[p.output_first[m] + j], p.output_scale[p.output_first[m] + j]
-            theta[readout + j * n : readout + (j + 1) * n] *= scale
+            _scaled(theta, readout + j * n, n, scale)
             theta[constants + j] = theta[constants + j] * scale + offset
             if linear:
-                theta[constants + n_y + j * n_x : constants + n_y + (j + 1) * n_x] *= scale
-    return theta, p.bounds * p.output_scale[:, np.newaxis] + p.output_offset[:, np.newaxis]
+                _scaled(theta, constants + n_y + j * n_x, n_x, scale)
+    bounds = np.empty_like(p.bounds)
+    for o in range(len(bounds)):
+        for side in range(2):
+            bounds[o, side] = p.bounds[o, side] * p.output_scale[o] + p.output_offset[o]
+    return theta, bounds
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -265,7 +277,7 @@ def _in_blocks(p, theta, order):
             at = _put(weights, at, theta, gates, v, n, n_x)
         for j in range(n_y):
             readout_first[p.output_first[m] + j] = at_readout
-            readout[at_readout : at_readout + n] = theta[v + j * n : v + (j + 1) * n]
+            copy_numbers(theta[v + j * n : v + (j + 1) * n], readout[at_readout:])
             at_readout += padded(n)
     return weights, weights_first, gate_blocks, neuron_first, readout, readout_first
 
@@ -350,7 +362,10 @@ def laid_out(p):
     theta, bounds = in_units(p)
     fixed, fixed_limits, fixed_codes = _fixed(p, bounds)
     blocks = padded(p.neurons) // LANES
-    is_sum = fixed & (np.repeat(blocks, np.diff(p.output_first)) == 0)
+    is_sum = fixed.copy()
+    for m in range(len(blocks)):
+        for o in range(p.output_first[m], p.output_first[m + 1]):
+            is_sum[o] &= blocks[m] == 0
     order, level_first = _levels(p, is_sum)
     networks, network_first, neurons_first = _networks(blocks, order, level_first)
     weights, weights_first, gate_blocks, neuron_first, readout, readout_first = _in_blocks(p, theta, order)

@@ -13,6 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import copy_numbers
+
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 
@@ -54,7 +56,7 @@ def predict(A, B, C, D, K, c, u, y, x, states, predicted):
             for j in range(p):
                 total += K[i, j] * e[j]
             following[i] = total
-        x[:] = following
+        copy_numbers(following, x)
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST)
@@ -81,4 +83,4 @@ def responses(At, C, sources, z, out):
                     for j in range(n):
                         total += At[i, j] * state[j]
                     following[i] = total
-                state[:] = following
+                copy_numbers(following, state)

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import copy_numbers
+
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 
@@ -64,4 +66,4 @@ def state_space(A, B, C, D, u, x, y):
             for j in range(m):
                 total += B[i, j] * u[t, j]
             following[i] = total
-        x[:] = following
+        copy_numbers(following, x)

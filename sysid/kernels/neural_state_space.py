@@ -35,6 +35,7 @@ import math
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import copy_numbers, copy_rows
 from sysid.kernels.neurons.neuron import FAST
 from sysid.kernels.neurons.table import activate_with_slopes
 
@@ -265,5 +266,5 @@ def sensitivities(u, x, S, theta, k, q, kind, rectified, bound, low, high, y, J)
             if new_x[i] != new:
                 continue
             _state_row(after, S, z, i, M, V, plain_W, h, slope)
-        S[:] = following
-        x[:] = new_x
+        copy_rows(following, S)
+        copy_numbers(new_x, x)

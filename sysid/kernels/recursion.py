@@ -45,6 +45,7 @@ import math
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import copy_numbers
 from sysid.kernels.neurons.neuron import FAST
 from sysid.kernels.neurons.table import activate, activate_with_slopes, slopes
 
@@ -338,6 +339,6 @@ def predict(
     for t in range(n_steps):
         run = min(steps, t + 1)
         first = t + 1 - run
-        window[:depth] = measured[first : first + depth]
+        copy_numbers(measured[first : first + depth], window)
         free_run(u[first:], window, depth, run, input_channel, input_lag, output_lag, theta, n_neurons, kind, low, high)
         y[depth + t] = window[depth + run - 1]

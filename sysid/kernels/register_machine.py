@@ -33,6 +33,8 @@ import math
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import copy_numbers, copy_rows
+
 ADD, SUB, MUL, DIV, NEG, POW, FMA, ABS, MIN, MAX = range(10)
 SQRT, EXP, LOG, TANH, SIN, COS, ATAN, SIGN, GREATER, NOT_LESS, SELECT, TABLE = range(10, 22)
 
@@ -230,8 +232,8 @@ def _row(code, d, result, first, bar):
 def registers(constants, theta, n, m, n_code):
     """Registers with constants and parameters in place."""
     v = np.zeros(len(constants) + len(theta) + n + m + n_code)
-    v[: len(constants)] = constants
-    v[len(constants) : len(constants) + len(theta)] = theta
+    copy_numbers(constants, v)
+    copy_numbers(theta, v[len(constants) :])
     return v
 
 
@@ -323,7 +325,7 @@ def free_run(programs, theta, x, u, method, substeps, step, widths, places, tabl
         if n_c > 0:
             _fill(vf, af, x, u[t])
             for _ in range(substeps):
-                stage[:] = x
+                copy_numbers(x, stage)
                 total[:] = 0.0
                 for s in range(len(method)):
                     for i in range(n_c):
@@ -409,10 +411,10 @@ def sensitivities(programs, theta, p, x, S, u, method, substeps, step, widths, p
                 _moves(updates, dg, bg, len(theta), ag + n + m, S, p, updates[1][i], S_later[i])
         if n_c > 0:
             _fill(vf, af, x, u[t])
-            S_stage[n_c:] = S[n_c:]
+            copy_rows(S[n_c:], S_stage[n_c:])
             for _ in range(substeps):
-                stage[:] = x
-                S_stage[:n_c] = S[:n_c]
+                copy_numbers(x, stage)
+                copy_rows(S[:n_c], S_stage)
                 total[:] = 0.0
                 S_total[:] = 0.0
                 for s in range(len(method)):

@@ -44,7 +44,9 @@ class CompiledStage:
             values: Every channel, shape ``(n_samples, n_channels)``; the stage's outputs are written.
             held: What held its outputs, shape ``(n_samples, n_outputs)``, written.
         """
-        kernel.run(self.program, self.depth, levels, values, _NOTHING, held)
+        own = np.ascontiguousarray(held)  # some columns of an array are another type, of which all is compiled again
+        kernel.run(self.program, self.depth, levels, values, _NOTHING, own)
+        held[:] = own
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

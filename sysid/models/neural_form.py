@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.kernels import neural_state_space as kernel
+from sysid.kernels.arrays import read_only
 from sysid.kernels.neurons import code_of
 from sysid.models.activations import PLAIN
 from sysid.models.form import AbstractForm, no_prediction
@@ -315,7 +316,7 @@ class NeuralForm(AbstractForm):
         """
         s = self.sizes
         kind = code_of(self.activation)
-        return (theta, s.neurons, s.output_neurons, kind, self.rectified, self.bound, self.low, self.high)
+        return (read_only(theta), s.neurons, s.output_neurons, kind, self.rectified, self.bound, self.low, self.high)
 
     def scaled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Inputs in the model's numbers.

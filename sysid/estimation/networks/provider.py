@@ -47,6 +47,7 @@ from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.kernels import recursion as kernel
+from sysid.kernels.arrays import read_only
 from sysid.kernels.neurons import code_of
 from sysid.models import (
     Recursion,
@@ -230,7 +231,7 @@ class RecursionProvider(AbstractProvider):
             if first:
                 J[:carry] = J[BLOCK : BLOCK + carry]
             kernel.sensitivities(
-                record.u, passed.y, record.measured, lags.depth, first, rows, *self._tables(), theta,
+                record.u, passed.y, record.measured, lags.depth, first, rows, *self._tables(), read_only(theta),
                 self.template.neurons, code_of(self.template.activation), self._steps(record), passed.h, passed.c,
                 carry, J,
             )  # fmt: skip
@@ -255,8 +256,8 @@ class RecursionProvider(AbstractProvider):
     def _arguments(self, record: _Record, theta: NDArray[np.float64]) -> tuple[object, ...]:
         template = self.template
         n = len(record.target)
-        kind = code_of(template.activation)
-        return (template.lags.depth, n, *self._tables(), theta, template.neurons, kind, template.low, template.high)
+        kind, bounds = code_of(template.activation), (template.low, template.high)
+        return (template.lags.depth, n, *self._tables(), read_only(theta), template.neurons, kind, *bounds)
 
     def at(self, theta: NDArray[np.float64]) -> Recursion:
         """The recursion with these parameters.
