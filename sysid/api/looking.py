@@ -20,7 +20,7 @@ from sysid.excitation import AbstractExcitation, excitation
 from sysid.ingest.writers import write_trace
 from sysid.models import Mapping
 from sysid.reporting.advice_record import AdviceRecord
-from sysid.reporting.advice_section import lines
+from sysid.reporting.advice_words import lines
 from sysid.traces import Role, TraceSet
 
 if TYPE_CHECKING:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sysid.advice import Topic, Verdict
+from sysid.advice import Verdict
 from sysid.reporting.advice_record import AdviceRecord
-from sysid.reporting.advice_words import said, suggested
+from sysid.reporting.advice_words import lines
 from sysid.reporting.figures.advice_figure import advice_figure
 from sysid.reporting.parts import Part, Section, picture
 from sysid.reporting.tables import Cell, Table
@@ -33,23 +33,6 @@ def advice_section(found: Sequence[AdviceRecord]) -> Section:
         if drawing is not None:
             parts.append(picture(drawing, f"First look at {advice.mapping}", CAPTION, f"advice-{number}"))
     return Section(anchor="advice", title="What is in this record?", parts=tuple(parts))
-
-
-def lines(advice: AdviceRecord) -> list[tuple[str, str, str, str]]:
-    """Every finding: the question, the verdict, what it says and what to do; then the structures.
-
-    Args:
-        advice: What was found.
-
-    Returns:
-        Rows of words.
-    """
-    rows = []
-    for one in advice.findings:
-        question = Topic[one.topic].value if one.topic in Topic.__members__ else one.topic
-        verdict = Verdict[one.verdict].value if one.verdict in Verdict.__members__ else one.verdict
-        rows.append((question, verdict, *said(one, advice.units)))
-    return rows + [("What to try?", "", *suggested(one)) for one in advice.suggestions]
 
 
 def _summary(advice: AdviceRecord) -> str:

@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from sysid.advice import Topic, Verdict
 from sysid.names import visible
+from sysid.reporting.advice_record import AdviceRecord
 
 
 @dataclass(frozen=True)
@@ -306,3 +308,20 @@ def suggested(one: Proposed) -> tuple[str, str]:
     words = SAID.get(one.code, Words("{label}"))
     edge = "Its orders are the largest that were tried: allow more." if one.at_edge else ""
     return words.says.format(label=one.label), " ".join([words.do, edge]).strip()
+
+
+def lines(advice: AdviceRecord) -> list[tuple[str, str, str, str]]:
+    """Every finding: the question, the verdict, what it says and what to do; then the structures.
+
+    Args:
+        advice: What was found.
+
+    Returns:
+        Rows of words.
+    """
+    rows = []
+    for one in advice.findings:
+        question = Topic[one.topic].value if one.topic in Topic.__members__ else one.topic
+        verdict = Verdict[one.verdict].value if one.verdict in Verdict.__members__ else one.verdict
+        rows.append((question, verdict, *said(one, advice.units)))
+    return rows + [("What to try?", "", *suggested(one)) for one in advice.suggestions]

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 Poles = NDArray[np.complex128]
@@ -58,7 +58,7 @@ class Block:
         y = np.zeros(len(w))
         for j, column in enumerate(w.T):
             numerator = np.convolve(denominator, basis @ self.gains[:, j])[: self.states + 1]
-            y += lfilter(numerator, denominator, column) + self.direct[j] * column
+            y += scipy.signal.lfilter(numerator, denominator, column) + self.direct[j] * column
         return y
 
 

@@ -12,7 +12,7 @@ from sysid.api.looking import Advice, SystemAdvice, advise
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind
-from sysid.reporting.advice_section import lines
+from sysid.reporting.advice_words import lines
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.parts import ends_held_out
 from sysid.workbench.fits.data import Data
