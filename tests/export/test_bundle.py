@@ -17,6 +17,7 @@ from sysid.export import EXPORTERS, export_bundle, read_bundle
 from sysid.models import NARX, History
 from sysid.traces import TraceSet
 from sysid.validation import evaluate
+from tests.export.conftest import FEW_MODELS
 
 FILES = ["sequence.onnx", "sequence.torchscript.pt", "step.onnx", "step.torchscript.pt"]
 
@@ -190,7 +191,8 @@ def test_without_estimation_traces_no_range_is_declared(fit, traces, start, tmp_
     assert "not declared" in (bundle.folder / "MODEL_CARD.md").read_text(encoding="utf-8")
 
 
-def test_every_model_makes_a_bundle(model, fit, traces, start, tmp_path):
+@pytest.mark.parametrize("model", [*FEW_MODELS, "ARX, finite impulse response"], indirect=True)
+def test_every_kind_of_model_makes_a_bundle(model, fit, traces, start, tmp_path):
     bundle = export_bundle(replace(fit, model=model), traces, tmp_path / "b", start=start, formats=["onnx"])
     assert read_bundle(bundle.folder).model.to_dict() == model.to_dict()
 

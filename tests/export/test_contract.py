@@ -28,20 +28,15 @@ def test_every_file_of_every_exporter_is_in_this_contract(rows, narx, declared, 
     assert sorted(named) == sorted(path.name for path in tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("n_samples", [1, 7, 500])
-def test_output_equals_the_models_free_run(exported, inputs, past, n_samples):
+def test_output_equals_the_models_free_run(exported, inputs, past):
     model, history = exported.model, past(exported.model)
-    u = inputs(n_samples, len(model.mapping.inputs))
-    run = exported.run(u[:, np.newaxis], exported.layout.from_history(history)[np.newaxis])
-    assert run.output.shape == (n_samples, 1, 1)
-    assert np.isfinite(run.output).all()
-    assert largest_difference(run.output[:, 0, 0], model.simulate(u, history)) <= exported.tolerance
-
-
-def test_number_type_is_what_the_file_says(exported, inputs, past):
-    u = inputs(3, len(exported.model.mapping.inputs))
-    run = exported.run(u[:, np.newaxis], exported.layout.from_history(past(exported.model))[np.newaxis])
-    assert (run.output.dtype, run.state.dtype) == (exported.file.dtype, exported.file.dtype)
+    for n_samples in (1, 7, 500):
+        u = inputs(n_samples, len(model.mapping.inputs))
+        run = exported.run(u[:, np.newaxis], exported.layout.from_history(history)[np.newaxis])
+        assert run.output.shape == (n_samples, 1, 1)
+        assert (run.output.dtype, run.state.dtype) == (exported.file.dtype, exported.file.dtype)
+        assert np.isfinite(run.output).all()
+        assert largest_difference(run.output[:, 0, 0], model.simulate(u, history)) <= exported.tolerance
 
 
 def test_a_run_in_pieces_equals_one_long_run_exactly(exported, inputs, past):
@@ -90,18 +85,19 @@ def test_an_input_that_is_not_a_number_gives_what_the_model_gives(exported, inpu
     np.testing.assert_array_equal(np.isnan(run.output[:, 0, 0]), np.isnan(expected))
 
 
-@pytest.mark.parametrize("value", [95.0, 95.001, -0.001], ids=["at the end of the range", "above", "below"])
-def test_flags_say_what_is_outside_held_or_lost(exported, inputs, past, value):
+def test_flags_say_what_is_outside_held_or_lost(exported, inputs, past):
+    """At the end of the range, above it and below."""
     model, surrogate = exported.model, exported.surrogate
-    u = inputs(40, len(model.mapping.inputs))
-    u[7, -1] = value
-    u[30, 0] = np.nan
-    run = exported.run(u[:, np.newaxis], exported.layout.from_history(past(model))[np.newaxis])
-    expected = expected_flags(surrogate, u, model.simulate(u, past(model))[:, np.newaxis])
-    assert run.flags.shape == (40, 1)
-    np.testing.assert_array_equal(run.flags[:, 0], expected)
-    assert expected[30] & Flag.NOT_A_NUMBER
-    assert bool(expected[7] & Flag.OUTSIDE_RANGE) is (value != 95.0)
+    for value in (95.0, 95.001, -0.001):
+        u = inputs(40, len(model.mapping.inputs))
+        u[7, -1] = value
+        u[30, 0] = np.nan
+        run = exported.run(u[:, np.newaxis], exported.layout.from_history(past(model))[np.newaxis])
+        expected = expected_flags(surrogate, u, model.simulate(u, past(model))[:, np.newaxis])
+        assert run.flags.shape == (40, 1)
+        np.testing.assert_array_equal(run.flags[:, 0], expected)
+        assert expected[30] & Flag.NOT_A_NUMBER
+        assert bool(expected[7] & Flag.OUTSIDE_RANGE) is (value != 95.0)
 
 
 def test_a_state_set_anew_forgets_what_was_not_a_number(exported, inputs, past):
@@ -114,25 +110,24 @@ def test_a_state_set_anew_forgets_what_was_not_a_number(exported, inputs, past):
     np.testing.assert_array_equal(again.flags, before.flags)
 
 
-@pytest.mark.parametrize("value", [np.inf, -1e300, 5e-324])
-def test_no_input_brings_it_down_and_a_bounded_output_stays_bounded(exported, inputs, value):
-    model = exported.model
-    u = inputs(20, len(model.mapping.inputs))
-    u[5:8] = value
-    state = exported.surrogate.at_rest(u[0])[np.newaxis]
-    with np.errstate(over="ignore"):
-        run = exported.run(u[:, np.newaxis], state)
-    recursion = model.recursion
+def test_no_input_brings_it_down_and_a_bounded_output_stays_bounded(exported, inputs):
+    model, recursion = exported.model, exported.model.recursion
     bounds = [
         b * recursion.scaling.output_scale + recursion.scaling.output_offset for b in (recursion.low, recursion.high)
     ]
     slack = 1e-4 if exported.file.dtype == "float32" else 1e-12
-    finite = run.output[~np.isnan(run.output)]
-    assert (finite >= bounds[0] - slack).all()
-    assert (finite <= bounds[1] + slack).all()
-    assert ((run.flags[np.isnan(run.output[..., 0])] & Flag.NOT_A_NUMBER) > 0).all()
-    if abs(value) > 1.0:
-        assert (run.flags[5:8] & Flag.OUTSIDE_RANGE).all()
+    for value in (np.inf, -1e300, 5e-324):
+        u = inputs(20, len(model.mapping.inputs))
+        u[5:8] = value
+        state = exported.surrogate.at_rest(u[0])[np.newaxis]
+        with np.errstate(over="ignore"):
+            run = exported.run(u[:, np.newaxis], state)
+        finite = run.output[~np.isnan(run.output)]
+        assert (finite >= bounds[0] - slack).all()
+        assert (finite <= bounds[1] + slack).all()
+        assert ((run.flags[np.isnan(run.output[..., 0])] & Flag.NOT_A_NUMBER) > 0).all()
+        if abs(value) > 1.0:
+            assert (run.flags[5:8] & Flag.OUTSIDE_RANGE).all()
 
 
 def test_models_wired_run_as_one(wired, opened, inputs, tmp_path):

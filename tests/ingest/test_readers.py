@@ -120,7 +120,8 @@ def test_a_file_that_breaks_off_is_refused_or_read_as_far_as_it_goes(
         assert name.endswith(".tdms")
         np.testing.assert_array_equal(table.find("BP").values, PIPE[: len(table)])
         assert any("breaks off" in note for note in table.notes)
-    gc.collect()  # asammdf leaves a half-made object behind whose end prints a complaint: let it end here
+    if name.endswith(".mf4"):
+        gc.collect()  # asammdf leaves a half-made object behind whose end prints a complaint: let it end here
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ def test_a_case_of_the_literature_is_the_trace_of_its_data_set(tmp_path):
     (tmp_path / "c.yaml").write_text(
         "time_unit: ds\nunit: psi\ncommand: [[0, 90], [100, 84.2], [600, 90], [2050, 90]]\n"
     )
-    trace = load_dataset("abdx-service")["VAL04"]
+    trace = load_dataset("abdx-service", cases=["VAL04"])["VAL04"]
     found = read_command(tmp_path / "c.yaml", [trace.channel("STP")]).trace(trace.sample_time)
     np.testing.assert_array_equal(found["STP"], trace["STP"])
 

@@ -5,7 +5,7 @@ import pytest
 
 from sysid.airbrake.consist import Consist
 from sysid.errors import ConfigError
-from sysid.ingest import load_dataset
+from sysid.ingest import find_dataset, load_dataset, read_description
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.drive import Run
 from sysid.rail.dynamics.train import heavy_haul
@@ -77,7 +77,8 @@ def test_impossible_habits_are_refused(wrong: dict[str, float]) -> None:
 
 def test_the_data_set_holds_such_a_cycle() -> None:
     """The first command vector in the data set is the one that the driver makes today."""
-    traces = load_dataset("abdx-drive-cycles")
-    assert {traces.roles[name] for name in traces.names} == {Role.ESTIMATION, Role.SELECTION}
+    described = read_description(find_dataset("abdx-drive-cycles"))
+    assert {case.role for case in described.cases.values()} == {Role.ESTIMATION, Role.SELECTION}
+    traces = load_dataset("abdx-drive-cycles", cases=["CYC01"])
     run = drive_cycle(heavy_haul(pairs=50), Consist(pairs=50), seed=1, duration=250.0)
     np.testing.assert_array_equal(traces["CYC01"]["STP"][:2500], run.handle)
