@@ -83,8 +83,11 @@ for _kind, (_pattern, _first) in _RESOLVERS.items():
     # The empty first character stands for an empty scalar, which is null.
     _letters = [letter if letter != "\0" else "" for letter in _first]
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(_pattern), _letters)
-_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_core_int)
-_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.construct_core_float)
+_Loader.yaml_constructors = {
+    **_Loader.yaml_constructors,
+    "tag:yaml.org,2002:int": _Loader.construct_core_int,
+    "tag:yaml.org,2002:float": _Loader.construct_core_float,
+}
 
 
 if yaml.__with_libyaml__:

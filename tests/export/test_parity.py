@@ -9,7 +9,7 @@ from sysid.errors import ParityError
 from sysid.export import EXPORTERS, Surrogate, check_parity, parity_cases, random_cases
 from sysid.export.parity import largest_difference
 from sysid.models import ARX, NARX, ARXModel, Mapping, Start, StartKind
-from tests.export.conftest import usable
+from tests.export.conftest import ROWS, usable
 
 
 def written(row, surrogate, folder):
@@ -43,6 +43,13 @@ def passes(row, model, surrogate, traces, begin, folder):  # noqa: PLR0917 - cal
         assert parity.samples == sum(len(trace) for trace in traces) - 3 * begin.n_measured + 3 * 50
 
 
+SOME = pytest.mark.parametrize(
+    "row", [ROWS[name] for name in ("ONNX, step", "ONNX float32, sequence", "C", "C, float", "FMI 3.0")]
+)
+"""Of each number type, and through a runner of each sort; what each file computes is the contract's matter."""
+
+
+@SOME
 def test_files_of_the_model_pass(row, fit, declared, traces, tmp_path):
     passes(row, fit.model, declared(fit.model), traces, Start(), tmp_path)
 
@@ -56,6 +63,7 @@ def test_files_of_the_model_pass_for_every_start(*, rows, fit, declared, traces,
     passes(rows["ONNX, step"], fit.model, declared(fit.model), traces, begin, tmp_path)
 
 
+@SOME
 def test_files_of_another_model_are_refused_with_the_worst_case(*, row, fit, declared, traces, narx, tmp_path):
     other = narx(NARX(input_delays=4, output_delays=4, neurons=20), seed=99)
     cases = parity_cases(declared(fit.model), traces, Start())
