@@ -93,11 +93,6 @@ def format_name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-@pytest.fixture(params=ROWS, scope="session")
-def row(request: pytest.FixtureRequest) -> Row:
-    return ROWS[request.param]
-
-
 @dataclass(frozen=True, kw_only=True)
 class Exported:
     """A surrogate and a file of it, ready to run."""
