@@ -204,4 +204,5 @@ def test_what_begins_in_motion_has_first_what_remembers_one_sample_or_learns_whe
     for in_motion in (False, True):
         _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, in_motion=in_motion))
         tried = [point.structure.label for points in rounds[:3] for point in points]
+        assert linear(rounds[0][0]) is not in_motion
         assert all((label in tried) is in_motion for label in ("ARX [1; 1; 1]", "NSS 2/0", "NSS 1/4", "NARX 1/1/10"))
