@@ -509,7 +509,9 @@ def export(
 
 @app.command(epilog="Example: sysid promote bp-ar-to-bc")
 def promote(
-    model: Annotated[str, typer.Argument(help="Name of a registered model, or its mapping.")],
+    model: Annotated[
+        str, typer.Argument(help="Name of a registered model, its mapping, or the pipeline that exported it.")
+    ],
     version: Annotated[str | None, typer.Option(help="The version; the candidate by default.")] = None,
 ) -> None:
     """Make the newest export of a model, or an earlier one, the champion that others load from MLflow."""

@@ -13,8 +13,8 @@ def promote_command(name: str, *, version: str | None) -> None:
     """Promote a version and say how to load it.
 
     Args:
-        name: Name of the registered model, or its mapping.
-        version: The version; the candidate by default.
+        name: Name of the registered model, its mapping, or the pipeline or run that exported it.
+        version: The version; by default the candidate, of a pipeline or run the newest that it exported.
 
     Raises:
         ConfigError: If there is no such model or version.

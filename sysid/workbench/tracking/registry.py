@@ -113,8 +113,8 @@ def promote(client: Any, name: str, version: str | None = None) -> Promotion:
 
     Args:
         client: An ``MlflowClient``.
-        name: Name of the registered model, or its mapping.
-        version: The version; the candidate by default.
+        name: Name of the registered model, its mapping, or the pipeline or run that exported it.
+        version: The version; by default the candidate, of a pipeline or run the newest that it exported.
 
     Returns:
         What changed.
@@ -124,10 +124,12 @@ def promote(client: Any, name: str, version: str | None = None) -> Promotion:
     """
     known = {model.name: model for model in client.search_registered_models()}
     model = known.get(name) or known.get(registered_name(name))
+    if model is None and (of_run := _of_run(client, name)) is not None:
+        model, version = known[of_run.name], version or str(of_run.version)
     if model is None:
         raise ConfigError(
             "there is no such model in the registry",
-            expected=f"one of {', '.join(sorted(known))}"
+            expected=f"one of {', '.join(sorted(known))}, or a pipeline or run that exported one of them"
             if known
             else "a model registered by sysid run with an export",
             got=name,
@@ -147,6 +149,35 @@ def promote(client: Any, name: str, version: str | None = None) -> Promotion:
     found = versions[chosen]
     fit = found.tags.get("fit", "")
     return Promotion(name=model.name, version=chosen, before=aliases.get(CHAMPION), fit=fit, run_id=str(found.run_id))
+
+
+def _of_run(client: Any, name: str) -> Any:
+    """The newest version that a pipeline exported, or a run of one; ``None`` where there is none.
+
+    Args:
+        client: An ``MlflowClient``.
+        name: The pipeline's name, the run's, or MLflow's identifier of the run.
+
+    Returns:
+        The version of a registered model.
+
+    Raises:
+        ConfigError: If it exported several models.
+    """
+    found = []
+    for one in client.search_model_versions():
+        tags = client.get_run(one.run_id).data.tags if one.run_id else {}
+        if name in {one.run_id, tags.get("pipeline"), tags.get("pipeline_run")} - {None}:
+            found.append(one)
+    names = sorted({one.name for one in found})
+    if len(names) > 1:
+        raise ConfigError(
+            f"{name} exported several models",
+            expected=f"one of {', '.join(names)}",
+            got=name,
+            remedy="name the model in place of what exported it",
+        )
+    return max(found, key=lambda one: int(one.version), default=None)
 
 
 def _found(client: Any, name: str) -> bool:

@@ -279,6 +279,11 @@ def test_a_promoted_model_is_loaded_as_the_champion(tracked_once, capsys: pytest
     assert run_cli(["promote", name]) == 0
     assert f"version {second} (again) is the champion, in place of version {first.version}" in capsys.readouterr().out
     assert str(client.get_model_version_by_alias(name, "champion").version) == second
+    run = client.get_run(first.run_id)
+    for who in ("first", run.data.tags["pipeline_run"], first.run_id):
+        assert run_cli(["promote", who, "--version", first.version]) == 0
+        assert run_cli(["promote", who]) == 0
+        assert str(client.get_model_version_by_alias(name, "champion").version) == second
     assert load_onnx(workspace, f"models:/{name}@champion").graph.node
 
 
