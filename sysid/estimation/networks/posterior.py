@@ -24,8 +24,10 @@ Jacobian in free run or one step ahead, and a measured output has the residuals'
 
 :math:`\sigma^2` is a figure of its own for each of the two: the mean squared residual on the estimation records, times
 :math:`N / (N - c\,\tau\gamma)` for the parameters that were fitted (of free-run residuals, :math:`\tau` at a time
-count as one). :math:`\tau` here, and in :math:`\beta`, is that of an autoregression of the residuals
-(:func:`~sysid.estimation.nonparametric.noise.persistence`) where that is longer than what training counted.
+count as one; one step ahead each counts). Where errors of several outputs hang together, :math:`\tau` is as many times
+as long as they repeat each other (:func:`repeated`). :math:`\tau` here, and in :math:`\beta`, is that of an
+autoregression of the residuals (:func:`~sysid.estimation.nonparametric.noise.persistence`) where that is longer than
+what training counted.
 What a free run leaves is not noise but an error of the model, which depends on what the inputs do; the records that
 it was fitted to show the least of it. Where there are traces that trained nothing (``selection``),
 :func:`calibrate` therefore compares the standardised errors there with what the Gaussian promises, and ``spread``
@@ -197,23 +199,53 @@ def laplace(
     M = (state.prior.beta / (copies * slower)) * state.at.gauss_newton * root[:, None] * root[None, :]
     M[np.diag_indices_from(M)] += 1.0
     paid = slower * copies * stride * evidence.correlation_time * evidence.total_effective_parameters
-    left = max(1.0 - paid / counted, LEAST_NOISE_SHARE)
+    left, white = (
+        max(1.0 - each / counted, LEAST_NOISE_SHARE) for each in (paid, copies * evidence.total_effective_parameters)
+    )
     errors = remaining(model, experiments)
-    noise = Noise(free_run=errors.free_run / left, one_step=errors.one_step / left)
+    noise = Noise(free_run=errors.free_run / left, one_step=errors.one_step / white)
     return Posterior(factor=to_plain @ (root[:, None] * _inverse_root(M)), noise=noise)
 
 
 def _slower(
     model: AbstractModel, experiments: Sequence[Experiment], evidence: Evidence, counted: int, stride: int
 ) -> float:
-    """By how much the free run's errors persist longer than training took them to.
+    """By how much the free run's errors persist longer than training took them to, and repeat each other.
 
     The evidence sums the autocorrelations of what a fit leaves, which has lost its slowest part to the fit; that is
-    steady enough to train by, and too short to say how well the parameters are known.
+    steady enough to train by, and too short to say how well the parameters are known. Errors of several outputs that
+    hang together are counted there once an output.
     """
     longest = counted / (SAMPLES_PER_PARAMETER * max(evidence.total_effective_parameters, 1.0))
-    found = min(persistence(free_run_errors(model, experiments)), longest)
-    return max(found / (stride * evidence.correlation_time), 1.0)
+    errors = free_run_errors(model, experiments)
+    found = min(persistence(errors), longest)
+    return max(found / (stride * evidence.correlation_time), 1.0) * repeated(errors, len(model.mapping.outputs))
+
+
+def repeated(errors: Sequence[NDArray[np.float64]], n_outputs: int) -> float:
+    """How often the errors of several outputs say the same: the largest eigenvalue of their correlations.
+
+    A sum over outputs takes their errors for independent. Where they are not, the variance of what is estimated from
+    them is larger, by this at most (a sandwich, White 1982, "Maximum likelihood estimation of misspecified models").
+
+    Args:
+        errors: Of each record and output in turn, shape ``(n_samples,)``.
+        n_outputs: Outputs.
+
+    Returns:
+        From 1 to the number of outputs.
+
+    Example:
+        >>> e = np.array([1.0, -1.0, 1.0, -1.0])
+        >>> repeated([e, 3.0 * e], 2), repeated([e, np.array([1.0, 1.0, -1.0, -1.0])], 2)
+        (2.0, 1.0)
+    """
+    table = np.array([np.concatenate(list(errors[at::n_outputs])) for at in range(n_outputs)])
+    size = np.sqrt(np.mean(table**2, axis=1))
+    if n_outputs == 1 or not np.isfinite(table).all() or not (size > 0.0).all():
+        return 1.0
+    together = (table / size[:, np.newaxis]) @ (table / size[:, np.newaxis]).T / table.shape[1]
+    return float(np.clip(np.linalg.eigvalsh(together)[-1], 1.0, n_outputs))
 
 
 def free_run_errors(model: AbstractModel, experiments: Sequence[Experiment]) -> list[NDArray[np.float64]]:

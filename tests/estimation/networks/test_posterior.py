@@ -112,8 +112,9 @@ def test_the_noise_is_the_residual_with_the_parameters_paid_for():
 def test_errors_that_persist_say_less_than_training_counted_them_for():
     white, slow = (laplace(state(1.0, 1.0, np.eye(23)), model(), np.eye(23), (noisy(m),), copies=1) for m in (0.0, 0.9))
     assert np.trace(slow.covariance) > 1.2 * np.trace(white.covariance)
-    left = remaining(model(), (noisy(0.9),)).free_run
-    assert slow.noise.free_run > 1.2 * left  # the parameters are paid for with more samples each
+    left = remaining(model(), (noisy(0.9),))
+    assert slow.noise.free_run > 1.2 * left.free_run  # the parameters are paid for with more samples each
+    assert slow.noise.one_step == pytest.approx(left.one_step * 60 / 55)  # where errors are white, with one
 
 
 def test_without_evidence_there_is_no_posterior():
