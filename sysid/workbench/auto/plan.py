@@ -144,11 +144,11 @@ class Plan:
     def _search(self) -> Iterator[list[Try]]:
         # In motion, linear models that begin at rest are far off: what learns where it begins comes before them.
         if not self.looked.in_motion:
-            yield from self._linear()
+            yield from self._unasked(linear=True)
         self.budget.unlimited = 1  # on a slow machine linear models alone would have taken all
-        yield from self._rounds_of(self._first(linear=False))
+        yield from self._unasked(linear=False)
         if self.looked.in_motion:
-            yield from self._linear()
+            yield from self._unasked(linear=True)
         stale = 0
         while stale < PATIENCE:
             before = self.least()
@@ -160,14 +160,18 @@ class Plan:
             stale = 0 if math.sqrt(self.least()) < (1.0 - GAIN) * math.sqrt(before) else stale + 1
         self.ended = self.ended or f"the last {PATIENCE * ROUND} trials gained less than {GAIN:.0%}"
 
-    def _linear(self) -> Iterator[list[Try]]:
-        """The first of each kind, which tells what others cost; then those that leave time for nonlinear ones."""
-        wanted = self._first(linear=True)
+    def _unasked(self, *, linear: bool) -> Iterator[list[Try]]:
+        """The least of each kind, which tells what others cost; then those for which there is time.
+
+        Args:
+            linear: Linear structures, which leave time for the others; or those.
+        """
+        wanted = self._first(linear=linear)
         least: dict[str, Try] = {}
         for one in sorted(wanted, key=lambda one: size_of(one.structure)):
             least.setdefault(one.structure.kind, one)
-        yield from self._rounds_of(list(least.values()))
-        self.budget.most = LINEAR
+        yield from self._rounds_of([one for one in wanted if least[one.structure.kind] is one])
+        self.budget.most = LINEAR if linear else 1.0
         yield from self._rounds_of(wanted)
         self.budget.most = 1.0
 
