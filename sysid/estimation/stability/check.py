@@ -9,12 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.result import FitResult, Loop, Status
-from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Stability, check_stability
-from sysid.estimation.stability.sequences import AbstractSequences, Excursions, TraceSequences
+from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability
+from sysid.estimation.stability.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
 from sysid.models import ARX, AbstractModel, Mapping, Start, StartKind, beginning
 from sysid.traces import Trace
 
@@ -231,14 +232,28 @@ class FreeRunCheck(AbstractStabilityCheck):
         return replace(fit, status=status, stability=found.to_dict(), attempts=attempts, notes=notes)
 
     @cached_property
-    def reference(self) -> AbstractModel | None:
-        """A stable linear model that follows the estimation traces; ``None`` where there is none, or none is asked."""
-        if self.mapping is None or len(self.mapping.outputs) > 1:
+    def reference(self) -> Run | None:
+        """Stable linear models that follow the estimation traces, one an output, as one run over a sequence.
+
+        ``None`` where an output has none, or none is asked.
+        """
+        found = [self._linear(mapping) for mapping in self.mapping.each] if self.mapping else []
+        models = [one for one in found if one is not None]
+        if not models or len(models) < len(found):
             return None
-        m = len(self.mapping.inputs)
+
+        def run(sequence: InputSequence) -> NDArray[np.float64]:
+            past = (sequence.history(several=False, output=j) for j in range(len(models)))
+            return np.column_stack([m.simulate(sequence.inputs, h) for m, h in zip(models, past, strict=True)])
+
+        return run
+
+    def _linear(self, mapping: Mapping) -> AbstractModel | None:
+        """A stable linear model of one output that follows the estimation traces; ``None`` where there is none."""
+        m = len(mapping.inputs)
         start = Start(kind=StartKind.ESTIMATED)
         try:
-            found = fit_arx(self.estimation, self.mapping, ARX(na=2, nb=(2,) * m, nk=(0,) * m), start=start).model
+            found = fit_arx(self.estimation, mapping, ARX(na=2, nb=(2,) * m, nk=(0,) * m), start=start).model
         except TraceError:
             return None
         if found.pole_radius is None or found.pole_radius > 1.0 + GROWTH:

@@ -53,8 +53,8 @@ class Stability:
         worst_outputs: The run over it, shape ``(n_samples, n_outputs)``.
         columns: Names of the sequences' inputs and outputs.
         sample_time: Seconds between samples.
-        beyond: How many took a linear model that follows the records out of the bounds too: they ask for more than was
-            recorded, and are neither counted as unbounded nor judged.
+        beyond: On how many a linear model that follows the records left the bounds, or did not settle, either: they
+            say nothing, and are neither counted as unbounded nor judged.
     """
 
     source: str
@@ -80,7 +80,8 @@ class Stability:
     def sentence(self) -> str:
         """What was found, for people."""
         runs = f"{self.sequences - self.beyond} random sequences"
-        return f"{self._found(runs)}{f' {self.beyond} more ask for more than was recorded.' if self.beyond else ''}"
+        nothing = " more say nothing: a linear model of the records leaves its bounds or its plateau there, too."
+        return f"{self._found(runs)}{f' {self.beyond}{nothing}' if self.beyond else ''}"
 
     def _found(self, runs: str) -> str:
         if self.unbounded:
@@ -129,7 +130,7 @@ def check_stability(
     count: int = SEQUENCES,
     seed: int = SEED,
     tolerance: float = TOLERANCE,
-    reference: Callable[[], AbstractModel | None] = lambda: None,
+    reference: Callable[[], Run | None] = lambda: None,
 ) -> Stability:
     """Run a model over random sequences and see whether it stays bounded and settles where it should.
 
@@ -139,8 +140,9 @@ def check_stability(
         count: How many.
         seed: Of the random numbers; the same seed gives the same sequences.
         tolerance: How far from its plateau a run may settle, as a share of the output's range in the records.
-        reference: A linear model that follows the records, asked for where the free run leaves the bounds: a sequence
-            that takes it out of them as well says nothing.
+        reference: Gives the run of linear models that follow the records, asked for where the free run leaves the
+            bounds or does not settle: a sequence on which these do the same says nothing. A sequence asks for more than
+            was recorded, or a slow system is not back at its plateau by then.
 
     Returns:
         What was found.
@@ -169,16 +171,14 @@ def check_stability(
     for sequence, output in _runs(model, sequences.draw(count, seed)):
         drawn += 1
         outputs = output.reshape(len(sequence.inputs), -1)
-        lost = _lost(outputs, low, high)
-        error = 0.0
-        if lost and _asks_too_much(sequence, reference(), low, high):
+        lost, error = _lost(outputs, low, high), _away(outputs, sequence, width)
+        if (lost or error > tolerance) and _says_nothing(sequence, reference(), (low, high), tolerance, lost=lost):
             further += 1
             worst = worst or ((False, -1.0), sequence, outputs)
             continue
         if lost:
-            unbounded += 1
+            unbounded, error = unbounded + 1, 0.0
         elif sequence.judged.any():
-            error = float(np.max(np.abs(outputs - sequence.targets)[sequence.judged] / width))
             unsettled += error > tolerance
             largest = float(np.fmax(largest, error))
         judged += bool(sequence.judged.any())
@@ -209,13 +209,28 @@ def _lost(outputs: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[
     return not bool(np.all(beyond < REACH * (1.0 - 1e-9)))  # NaN counts as lost
 
 
-def _asks_too_much(
-    sequence: InputSequence, reference: AbstractModel | None, low: NDArray[np.float64], high: NDArray[np.float64]
+def _away(outputs: NDArray[np.float64], sequence: InputSequence, width: NDArray[np.float64]) -> float:
+    """How far a run is from its plateau at most, as a share of the output's range; 0 where nothing is judged."""
+    away: float = np.max(np.abs(outputs - sequence.targets)[sequence.judged] / width, initial=0.0)
+    return away
+
+
+def _says_nothing(
+    sequence: InputSequence,
+    reference: Run | None,
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
+    tolerance: float,
+    *,
+    lost: bool,
 ) -> bool:
-    """Whether a linear model of the records leaves the bounds too."""
+    """Whether linear models of the records do the same: leave the bounds, or have not settled by then."""
     if reference is None:
         return False
-    return _lost(reference.simulate(sequence.inputs, sequence.history(several=False)).reshape(-1, 1), low, high)
+    low, high = bounds
+    outputs = reference(sequence)
+    if lost:
+        return _lost(outputs, low, high)
+    return not _away(outputs, sequence, np.where(high > low, high - low, 1.0)) <= tolerance
 
 
 def _runs(

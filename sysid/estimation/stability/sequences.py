@@ -61,17 +61,18 @@ class InputSequence:
     targets: NDArray[np.float64]
     judged: NDArray[np.bool_]
 
-    def history(self, *, several: bool) -> History:
+    def history(self, *, several: bool, output: int = 0) -> History:
         """Before the first sample everything stands where it begins.
 
         Args:
-            several: For a model of all outputs; of the first one otherwise.
+            several: For a model of all outputs; of one otherwise.
+            output: The place of that one.
 
         Returns:
             The history.
         """
-        output = self.targets[0] if several else float(self.targets[0, 0])
-        return History.at_rest(inputs=self.inputs[0], output=output)
+        stands = self.targets[0] if several else float(self.targets[0, output])
+        return History.at_rest(inputs=self.inputs[0], output=stands)
 
 
 class AbstractSequences(ABC):

@@ -7,7 +7,8 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
-from sysid.estimation.stability import FreeRunCheck, PoleCheck, StabilityOptions
+from sysid.estimation.stability import FreeRunCheck, PoleCheck, StabilityOptions, check_stability
+from sysid.estimation.stability.sequences import InputSequence
 from sysid.models import ARX, ARXModel, Mapping
 from sysid.traces import Channel, Trace
 
@@ -115,3 +116,43 @@ def test_a_linear_model_is_judged_by_its_largest_pole(pole: float, status: Statu
 def test_numbers_that_cannot_be_used_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         StabilityOptions(**wrong)  # type: ignore[arg-type]
+
+
+def slow_trace(seed: int, *, outputs: tuple[float, ...] = (0.9995,)) -> Trace:
+    """Steps of 30 samples into plants that take thousands: the record stands at rest once, and settles nowhere."""
+    u = np.concatenate([np.zeros(20), np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, 8), 30)])
+    names = ("u", "y", "z")[: 1 + len(outputs)]
+    values = np.column_stack([u, *(model(pole).simulate(u[:, None]) for pole in outputs)])
+    return Trace(
+        name=f"slow {seed}", sample_time=0.5, channels=tuple(Channel(name=n, unit="V") for n in names), values=values
+    )
+
+
+def test_the_true_model_of_a_slow_plant_is_stable_though_it_is_nowhere_back_at_rest():
+    records = [slow_trace(seed) for seed in range(3)]
+    asked = FreeRunCheck.of(StabilityOptions(count=100), MAPPING, records)
+    found = asked.finding(model(0.9995))
+    assert found is not None
+    assert found.stable
+    assert 0 < found.beyond < 100
+    assert f"{found.beyond} more say nothing" in found.sentence
+    wrong = asked.finding(replace(model(0.9995), coefficients=np.array([5e-4, 1.01])))
+    assert wrong is not None
+    assert not wrong.stable
+
+
+def test_several_outputs_have_a_linear_yardstick_each():
+    poles = (0.9995, 0.999)
+    records = [slow_trace(seed, outputs=poles) for seed in range(3)]
+    asked = FreeRunCheck.of(StabilityOptions(count=100), Mapping.parse("u -> y+z"), records)
+    assert asked.reference is not None
+
+    def plant(sequence: InputSequence) -> np.ndarray:
+        past = [sequence.history(several=False, output=j) for j in range(2)]
+        return np.column_stack([model(pole).simulate(sequence.inputs, h) for pole, h in zip(poles, past, strict=True)])
+
+    sequence = next(iter(asked.source.draw(1, 0)))
+    np.testing.assert_allclose(asked.reference(sequence), plant(sequence), atol=1e-6)
+    found = check_stability(plant, asked.source, count=100, reference=lambda: asked.reference)
+    assert found.stable
+    assert not check_stability(plant, asked.source, count=100).stable

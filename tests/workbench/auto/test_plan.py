@@ -19,7 +19,7 @@ from sysid.workbench.sweep.search_space import Point
 
 LOOKED = Looked(n_inputs=1, n_outputs=1, orders=(ARX(na=2, nb=(2,), nk=(1,)),))
 UNASKED = 4
-"""Rounds that are tried whatever comes of them: linear structures, then others; the least of each kind, then the rest."""
+"""Rounds that are tried whatever comes of them: linear structures, then others; the least of each kind first."""
 Worth = Callable[[Point], float]
 
 
