@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError, TraceError
 from sysid.units import Reference
 
-SMALLEST, LARGEST = 1e-100, 1e100
-"""Magnitudes between which a channel's largest value may lie: the square of its squares is a number in float64."""
+SMALLEST, LARGEST = 1e-150, 1e150
+"""Magnitudes between which a channel's largest value may lie: beyond them a sum of squares is none in float64."""
 
 
 def check_text(text: str, what: str) -> None:
@@ -201,7 +201,6 @@ class Trace:
                 got=self.values[row, column],
                 remedy="ask for a repair at ingest, or mark the samples as not usable",
             )
-        self._check_sizes()
         if self.usable is not None and np.shape(self.usable) != (len(self.values),):
             raise TraceError(
                 "the usable mask does not match the samples",
@@ -211,10 +210,18 @@ class Trace:
                 remedy="give one truth value per sample",
             )
 
-    def _check_sizes(self) -> None:
-        """Refuse channels whose squares are no numbers any more: no sum of squares, and so no fit, would be right."""
-        size = np.maximum(self.values.max(axis=0), -self.values.min(axis=0))
-        for name, largest in zip(self.channel_names, size, strict=True):
+    def check_sizes(self, names: Sequence[str]) -> None:
+        """Refuse channels whose squares are no numbers any more: no sum of squares, and so no fit, would be right.
+
+        Args:
+            names: The channels that are squared.
+
+        Raises:
+            ChannelError: If a channel is missing.
+            TraceError: If the largest magnitude of one is neither 0 nor between 1e-150 and 1e150.
+        """
+        for name, column in zip(names, self.columns(names).T, strict=True):
+            largest = float(np.max(np.abs(column), initial=0.0))
             if not (largest == 0.0 or SMALLEST <= largest <= LARGEST):
                 raise TraceError(
                     f"the values are too {'large' if largest > LARGEST else 'small'} to be squared",

@@ -47,7 +47,10 @@ def test_an_array_is_copied_unless_it_is_given_away_read_only() -> None:
 
 @pytest.mark.parametrize("size", [1e300, 1e-200])
 def test_values_whose_squares_are_no_numbers_are_refused(size: float) -> None:
+    name = TRACE.channel_names[0]
+    sized = Trace(name="a", sample_time=0.1, channels=TRACE.channels, values=np.full((3, 1), size))
     with pytest.raises(TraceError, match="to be squared") as refused:
-        Trace(name="a", sample_time=0.1, channels=TRACE.channels, values=np.full((3, 1), size))
+        sized.check_sizes([name])
     assert "power of ten" in refused.value.remedy
-    Trace(name="a", sample_time=0.1, channels=TRACE.channels, values=np.array([[0.0], [1e-300], [1e99]]))
+    some = np.array([[0.0], [1e-300], [1e99]])
+    Trace(name="a", sample_time=0.1, channels=TRACE.channels, values=some).check_sizes([name])

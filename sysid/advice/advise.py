@@ -42,8 +42,11 @@ def advise(traces: TraceSet, mapping: Mapping) -> Advice:
 
     Raises:
         ChannelError: If a channel of the mapping is missing.
+        TraceError: If a channel has values that cannot be squared.
     """
     chosen = traces.with_role(Role.ESTIMATION, Role.SELECTION) or traces.traces
+    for trace in chosen:
+        trace.check_sizes([*mapping.inputs, *mapping.outputs])
     record = Record(traces=chosen, mapping=mapping)
     findings = tuple(finding for check in CHECKS for finding in check(record))
     impulse = record.slowed[0].impulse

@@ -232,8 +232,10 @@ def experiments_of(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
-        TraceError: If a trace is not longer than a measured start.
+        TraceError: If a trace is not longer than a measured start, or has values that cannot be squared.
     """
+    for trace in traces:
+        trace.check_sizes([*mapping.inputs, *mapping.outputs])
     return tuple(Experiment.from_trace(trace, mapping, start, rest_output) for trace in traces)
 
 

@@ -157,7 +157,7 @@ FEW_MODELS = (
     "ARX, no input used",
     "NARX 4/4/20",
     "NARX, linear part alone",
-    "NARX, gates",
+    "NARX, gates of tanh",
     "NARX against its bounds",
 )
 WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino", "wasm", "jax")

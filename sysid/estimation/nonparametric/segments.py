@@ -45,9 +45,11 @@ def segments_of(traces: Sequence[Trace], mapping: Mapping, *, shortest: int = 1)
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
+        TraceError: If a channel has values that cannot be squared.
     """
     found = []
     for trace in traces:
+        trace.check_sizes([*mapping.inputs, mapping.output])
         inputs, output = trace.columns(mapping.inputs), trace.columns([mapping.output])[:, 0]
         usable = trace.usable_samples
         if trace.weights is not None:
