@@ -211,8 +211,7 @@ def _lost(outputs: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[
 
 def _away(outputs: NDArray[np.float64], sequence: InputSequence, width: NDArray[np.float64]) -> float:
     """How far a run is from its plateau at most, as a share of the output's range; 0 where nothing is judged."""
-    away: float = np.max(np.abs(outputs - sequence.targets)[sequence.judged] / width, initial=0.0)
-    return away
+    return float(np.max(np.abs(outputs - sequence.targets)[sequence.judged] / width, initial=0.0))
 
 
 def _says_nothing(

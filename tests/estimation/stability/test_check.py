@@ -1,5 +1,6 @@
 """The check of a free run: who is asked, what is said, where the sequences come from."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -136,9 +137,11 @@ def test_the_true_model_of_a_slow_plant_is_stable_though_it_is_nowhere_back_at_r
     assert found.stable
     assert 0 < found.beyond < 100
     assert f"{found.beyond} more say nothing" in found.sentence
+    json.dumps(found.to_dict())  # it is stored with the fit
     wrong = asked.finding(replace(model(0.9995), coefficients=np.array([5e-4, 1.01])))
     assert wrong is not None
-    assert not wrong.stable
+    assert wrong.stable is False
+    assert json.loads(json.dumps(wrong.to_dict()))["stable"] is False
 
 
 def test_several_outputs_have_a_linear_yardstick_each():
