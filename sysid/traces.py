@@ -112,8 +112,7 @@ class Trace:
             not know them. ``None`` means that all count alike.
 
     Raises:
-        TraceError: If shapes disagree, a value is not finite or too large to be squared, or the sample time is not
-            positive.
+        TraceError: If shapes disagree, a value is not finite, or the sample time is not positive.
 
     Example:
         >>> trace = Trace(name="a", sample_time=0.1, channels=(Channel(name="u", unit="V"),), values=np.zeros((3, 1)))
@@ -220,8 +219,11 @@ class Trace:
             ChannelError: If a channel is missing.
             TraceError: If the largest magnitude of one is neither 0 nor between 1e-150 and 1e150.
         """
-        for name, column in zip(names, self.columns(names).T, strict=True):
-            largest = float(np.max(np.abs(column), initial=0.0))
+        missing = [name for name in names if name not in self]
+        if missing:
+            raise ChannelError(missing, self.channel_names, where=f"trace {self.name}")
+        for name, column in ((name, self[name]) for name in names):
+            largest = float(max(column.max(), -column.min()))  # without a copy: records are long
             if not (largest == 0.0 or SMALLEST <= largest <= LARGEST):
                 raise TraceError(
                     f"the values are too {'large' if largest > LARGEST else 'small'} to be squared",

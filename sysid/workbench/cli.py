@@ -300,7 +300,7 @@ def auto(  # noqa: PLR0917 - one parameter an option, by name on the command lin
     out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/auto-<data> by default.")] = None,
     no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
 ) -> None:
-    """Find a model without being told which: linear ones first, then networks, as long as they gain.
+    """Find a model without being told which: linear ones first, then others, as long as they gain.
 
     Exports the best and reports what accuracy costs. A search that was killed goes on where it was.
     """
@@ -313,24 +313,31 @@ def auto(  # noqa: PLR0917 - one parameter an option, by name on the command lin
     raise typer.Exit(auto_command(source, given=given, fresh=fresh, out=out, tracking=not no_tracking))
 
 
+# What is said of an FMU beside its description
+
+Ranges = Annotated[
+    list[str] | None, typer.Option("--range", metavar="NAME=LOW:HIGH", help="Of an input of the FMU; repeated.")
+]
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME=LOW:HIGH", help="A parameter that varies, an input of the surrogate; repeated."),
+]
+Outputs = Annotated[list[str] | None, typer.Option(metavar="NAME", help="An output; all by default; repeated.")]
+SampleTime = Annotated[float | None, typer.Option(help="Seconds; as the FMU says by default.")]
+Duration = Annotated[float | None, typer.Option(help="Seconds an experiment; as the FMU says by default.")]
+
+
 @app.command(epilog="Example: sysid surrogate cylinder.fmu --minutes 60 --range valve=-10:10 --parameter mass=100:300")
 def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the command line
     source: Annotated[
         str, typer.Argument(help="An FMU, or a pipeline of kind experiment. It is code, and is run with your rights.")
     ],
     minutes: Annotated[float, typer.Option(min=0.1, help="Time for experiments, search and proof together.")] = 60.0,
-    span: Annotated[
-        list[str] | None, typer.Option("--range", metavar="NAME=LOW:HIGH", help="Of an input of the FMU; repeated.")
-    ] = None,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=LOW:HIGH", help="A parameter that varies, an input of the surrogate; repeated."),
-    ] = None,
-    output: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="An output; all by default; repeated.")
-    ] = None,
-    sample_time: Annotated[float | None, typer.Option(help="Seconds; as the FMU says by default.")] = None,
-    duration: Annotated[float | None, typer.Option(help="Seconds an experiment; as the FMU says by default.")] = None,
+    span: Ranges = None,
+    parameter: Parameters = None,
+    output: Outputs = None,
+    sample_time: SampleTime = None,
+    duration: Duration = None,
     proof: Annotated[
         int | None, typer.Option(min=1, help="New experiments of the proof; 1000, or as many as there is time for.")
     ] = None,
@@ -580,17 +587,11 @@ def init(  # noqa: PLR0917 - one parameter an option, by name on the command lin
     reference: Annotated[
         Path | None, typer.Option(help="An FMU: the workspace has a pipeline of experiments on it. Nothing is run.")
     ] = None,
-    span: Annotated[
-        list[str] | None, typer.Option("--range", metavar="NAME=LOW:HIGH", help="Of an input of the FMU; repeated.")
-    ] = None,
-    parameter: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=LOW:HIGH", help="A parameter that varies; repeated.")
-    ] = None,
-    output: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="An output; all by default; repeated.")
-    ] = None,
-    sample_time: Annotated[float | None, typer.Option(help="Seconds; as the FMU says by default.")] = None,
-    duration: Annotated[float | None, typer.Option(help="Seconds an experiment; as the FMU says by default.")] = None,
+    span: Ranges = None,
+    parameter: Parameters = None,
+    output: Outputs = None,
+    sample_time: SampleTime = None,
+    duration: Duration = None,
 ) -> None:
     """Make a workspace: folders for data sets, pipelines and reports, with a first pipeline that runs in seconds."""
     from sysid.workbench.commands.init import init_command

@@ -6,8 +6,9 @@ asker = getppid();
 waited = 0;
 while waited < 600 && getppid() == asker
     if ~exist('ask', 'file')
-        pause(0.002);
-        waited = waited + 0.002;
+        nap = min(0.002 + waited / 20, 0.1);  % asked again and again at first, seldom once nobody asks
+        pause(nap);
+        waited = waited + nap;
         continue
     end
     words = strsplit(strtrim(fileread('ask')), ' ');

@@ -123,7 +123,7 @@ def _around_narx(one: Try, _: Looked) -> list[Try]:
     moves: list[dict[str, Any]] = [
         {"neurons": round(1.6 * network.neurons) + 1},
         {"gated": not network.gated},
-        *([_lags(network, n) for n in (lags + 1, lags - 1) if 1 <= n <= LINEAR_ORDERS[-1]]),
+        *([_lags(network, n) for n in (lags + 1, lags - 1) if n >= 1]),
         {"neurons": max(1, round(0.6 * network.neurons))},
     ]
     return _moved(one, moves)
