@@ -27,7 +27,7 @@ ONLY_IN = {"mlflow": "workbench/tracking/mlflow_store.py", "optuna": "workbench/
 
 BRAKE_WORDS = re.compile(r"brak|abdx|railway|wagon|locomotive|dissertation", re.IGNORECASE)
 
-NAMED_IN_HELP = {"workbench/cli.py": "service-brake"}
+NAMED_IN_HELP = {f"workbench/command_line/{room}.py": "service-brake" for room in ("models", "pipelines")}
 """A built-in pipeline is named in the examples of the help."""
 
 MAX_LINES, MANY_LINES = 600, 400

@@ -1,0 +1,87 @@
+"""Commands that go from somebody's slow model to a surrogate, and make a workspace of one's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+commands = typer.Typer()
+
+Ranges = Annotated[
+    list[str] | None, typer.Option("--range", metavar="NAME=LOW:HIGH", help="Of an input of the FMU; repeated.")
+]
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME=LOW:HIGH", help="A parameter that varies, an input of the surrogate; repeated."),
+]
+Outputs = Annotated[list[str] | None, typer.Option(metavar="NAME", help="An output; all by default; repeated.")]
+SampleTime = Annotated[float | None, typer.Option(help="Seconds; as the FMU says by default.")]
+Duration = Annotated[float | None, typer.Option(help="Seconds an experiment; as the FMU says by default.")]
+
+
+@commands.command(
+    epilog="Example: sysid surrogate cylinder.fmu --minutes 60 --range valve=-10:10 --parameter mass=100:300"
+)
+def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the command line
+    source: Annotated[
+        str, typer.Argument(help="An FMU, or a pipeline of kind experiment. It is code, and is run with your rights.")
+    ],
+    minutes: Annotated[float, typer.Option(min=0.1, help="Time for experiments, search and proof together.")] = 60.0,
+    span: Ranges = None,
+    parameter: Parameters = None,
+    output: Outputs = None,
+    sample_time: SampleTime = None,
+    duration: Duration = None,
+    proof: Annotated[
+        int | None, typer.Option(min=1, help="New experiments of the proof; 1000, or as many as there is time for.")
+    ] = None,
+    rounds: Annotated[
+        int | None, typer.Option(min=1, help="Rounds of experiments that are added where the surrogate is worst.")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/surrogate-<name> by default.")] = None,
+    no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
+) -> None:
+    """From a slow model to a small one in its place: experiments, a model of them, an FMU with the same ports, a proof.
+
+    What was killed goes on where it was.
+    """
+    from sysid.workbench.commands.surrogate import surrogate_command, wish_of
+
+    wish = wish_of(span or [], parameter or [], output or [], sample_time=sample_time, duration=duration)
+    raise typer.Exit(
+        surrogate_command(
+            source,
+            wish,
+            minutes=minutes,
+            proof=proof,
+            rounds=rounds,
+            workers=workers,
+            seed=seed,
+            out=out,
+            tracking=not no_tracking,
+        )
+    )
+
+
+@commands.command(epilog="Example: sysid init mine  sysid init mine --reference cylinder.fmu --range valve=-10:10")
+def init(  # noqa: PLR0917 - one parameter an option, by name on the command line
+    folder: Annotated[Path, typer.Argument(help="Folder to make.")],
+    reference: Annotated[
+        Path | None, typer.Option(help="An FMU: the workspace has a pipeline of experiments on it. Nothing is run.")
+    ] = None,
+    span: Ranges = None,
+    parameter: Parameters = None,
+    output: Outputs = None,
+    sample_time: SampleTime = None,
+    duration: Duration = None,
+) -> None:
+    """Make a workspace: folders for data sets, pipelines and reports, with a first pipeline that runs in seconds."""
+    from sysid.workbench.commands.init import init_command
+    from sysid.workbench.commands.surrogate import wish_of
+
+    wish = wish_of(span or [], parameter or [], output or [], sample_time=sample_time, duration=duration)
+    init_command(folder, reference=reference, wish=wish)
