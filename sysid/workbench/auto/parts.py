@@ -31,6 +31,8 @@ SEARCH = {"max_iterations": 200}
 """How a network is trained while structures are tried."""
 LAST = {"starts": 6}
 """How the chosen one is trained in the end, where that is another fit, beside what it was tried with."""
+FURTHER = {"starts": 1, "max_iterations": 2000}
+"""How the chosen one is trained on from where its trial had ended, where selection traces chose."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

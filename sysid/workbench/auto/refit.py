@@ -1,4 +1,4 @@
-"""The chosen structure on all of the record: what was held out is fitted too, once nothing is left to be chosen."""
+"""The chosen structure once more: on all of the record once nothing is left to be chosen, or as long as it gains."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.estimation import FitResult
+from sysid.estimation import FitResult, Training
+from sysid.estimation.estimators import estimator_of
+from sysid.models import AbstractStructure
 from sysid.traces import Role, Trace
 from sysid.validation import case_results
 from sysid.workbench.fits import steps
@@ -16,31 +18,55 @@ from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.steps import Work
 
-KEPT = (
-    "Of the chosen structure, the fit that was chosen is kept: fitted once more, to all of the record, it is no better."
+BETTER, KEPT = (
+    "Fitted once more, to all of the record, after it was chosen on a part of it.",
+    "The fit that was chosen is kept: its structure fitted once more, to all of the record, is no better.",
 )
-ALL = "Fitted once more, to all of the record, after it was chosen on a part of it."
+FURTHER, ENOUGH = (
+    "Trained on from where its trial had ended: the selection traces bear it out.",
+    "The fit that was chosen is kept: trained on from where its trial had ended, it is no better on the selection "
+    "traces.",
+)
+"""What is said where the last fit is taken, and where it is not."""
 
 
-def refitted(work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult) -> FitResult:
-    """Fit the chosen structure to all estimation traces.
+def trains_on(structure: AbstractStructure) -> bool:
+    """Whether a trial of a structure, which ends early, can be trained on from where it is.
+
+    Args:
+        structure: What was chosen.
+
+    Returns:
+        True for networks.
+    """
+    row = estimator_of(structure)
+    return row.training is Training and row.initial is not None
+
+
+def refitted(
+    work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult, partial: bool
+) -> FitResult:
+    """Fit the chosen structure once more: to all estimation traces, or on from where its trial had ended.
 
     Args:
         work: Told how it goes.
         fit: The structure and its training.
         config: The pipeline, as of the model's outputs.
         data: All traces.
-        chosen: The fit that was chosen, of a part of them.
+        chosen: The fit that was chosen.
+        partial: Whether it saw a part of the estimation traces, the others choosing; else it is trained on from where
+            it is, and the selection traces say whether that was for the better.
 
     Returns:
-        The new fit, or the chosen one where that does better on all of them.
+        The new fit, or the chosen one where that does better.
     """
     watch = work.watch(getattr(fit.training_options(config.seed), "max_time_s", math.inf))
-    again = steps.fit_traces(fit, config, data, None, watch)
-    ours, theirs = (_error(one, data.estimation, config) for one in (again, chosen))
+    again = steps.fit_traces(fit, config, data, None if partial else chosen, watch)
+    judging, taken, left = (data.estimation, BETTER, KEPT) if partial else (data.selection, FURTHER, ENOUGH)
+    ours, theirs = (_error(one, judging, config) for one in (again, chosen))
     better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs))
     found = again if better else chosen
-    return replace(found, notes=(*found.notes, ALL if better else KEPT))
+    return replace(found, notes=(*found.notes, taken if better else left))
 
 
 def _error(fit: FitResult, traces: Sequence[Trace], config: PipelineConfig) -> float:

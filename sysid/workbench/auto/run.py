@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from sysid.estimation import FitResult
+from sysid.models.store import structure_from_dict
 from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord, write_sweep
 from sysid.workbench.auto.budget import REFIT
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.parts import LAST
-from sysid.workbench.auto.refit import refitted
+from sysid.workbench.auto.parts import FURTHER, LAST
+from sysid.workbench.auto.refit import refitted, trains_on
 from sysid.workbench.auto.search import FOUND, TITLE, Found, Hire, Search, stand_in
 from sysid.workbench.auto.table import table_of_front
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
+from sysid.workbench.fits.config import FitConfig, Pipeline
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
 from sysid.workbench.fits.outputs import FitModel, models_of
@@ -227,10 +228,11 @@ class _AutoSteps:
         loaded = run.do(self._loading())
         found = run.do(self._searching(run, loaded)).value
         fits = [self._fit(name, found) for name in found.shown]
-        pipeline, given = self._pipeline(fits), dict[str, GivenFit]()
+        pipeline, given, partly = self._pipeline(fits), dict[str, GivenFit](), found.parts.partial
         for fit in fits:
             for model, made in zip(models_of(fit, pipeline.config), found.fits[fit.name], strict=True):
-                given[model.fit.name] = _again(model, made, loaded.value) if found.parts.partial else made
+                last = partly or trains_on(model.fit.structure)
+                given[model.fit.name] = _again(model, made, loaded.value, partly=partly) if last else made
         choice = steps.Choice(name=FOUND, chosen_by=found.record.chosen_by)
         results = FitSteps(pipeline=pipeline, given=given, chosen=choice, page=self.auto.page).run(run, loaded)
         ready = events.SweepReady(
@@ -291,19 +293,22 @@ class _AutoSteps:
     def _fit(self, name: str, found: Found) -> FitConfig:
         """A trial as a fit of a pipeline; one that is fitted once more has more starts, and a share of the time."""
         options = dict[str, Any](found.training[name])
+        structure: Mapping[str, Any] = found.shown[name].structure
         if found.parts.partial and "starts" in options:
             options |= LAST
+        elif trains_on(structure_from_dict(structure)):
+            options |= FURTHER
         if "max_time_s" in options and self.config.wall_s is not None:
             options["max_time_s"] = round(REFIT * self.config.wall_s, 3)
-        structure: Mapping[str, Any] = found.shown[name].structure
         return FitConfig.model_validate({"name": name, "structure": dict(structure), "training": options or None})
 
 
-def _again(model: FitModel, made: GivenFit, data: Data) -> GivenFit:
-    """A model that was chosen on parts of the record, fitted once more to all of it."""
-    key = digest(strict({"chosen": made.key, "again": steps.fit_key(model.fit, model.config, data, None)}))
-    return GivenFit(key=key, make=partial(_make_again, model.fit, model.config, data, made))
+def _again(model: FitModel, made: GivenFit, data: Data, *, partly: bool) -> GivenFit:
+    """A model that was chosen on parts of the record, or after few iterations, fitted once more."""
+    how = "again" if partly else "further"
+    key = digest(strict({"chosen": made.key, how: steps.fit_key(model.fit, model.config, data, None)}))
+    return GivenFit(key=key, make=partial(_make_again, model, data, made, partly))
 
 
-def _make_again(fit: FitConfig, config: PipelineConfig, data: Data, made: GivenFit, work: Work) -> FitResult:
-    return refitted(work, fit, config, data, chosen=made.make(work))
+def _make_again(model: FitModel, data: Data, made: GivenFit, partly: bool, work: Work) -> FitResult:
+    return refitted(work, model.fit, model.config, data, chosen=made.make(work), partial=partly)

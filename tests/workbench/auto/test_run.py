@@ -16,6 +16,7 @@ from sysid.ingest import write_csv
 from sysid.reporting.results import read_results
 from sysid.traces import Role
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.refit import ENOUGH, FURTHER
 from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto
 from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.cli import run_cli
@@ -81,6 +82,15 @@ def test_a_network_is_found_and_stands_beside_the_best_linear_model(first: tuple
 def test_the_chosen_one_is_fitted_once_more_to_all_of_the_record(first: tuple[Path, Searched]) -> None:
     best = first[1].results.fits[0]
     assert any("once more" in note for note in best.notes)
+
+
+def test_where_selection_traces_chose_it_is_trained_on_and_they_say_whether_for_the_better(tmp_path: Path) -> None:
+    known = data(record("a", 150), others={Role.SELECTION: record("b", 100, seed=2)})
+    found = searched(tmp_path, known, iterations=200)
+    best, tried_with = found.results.fits[0], found.record.winning
+    assert tried_with is not None
+    assert any(note in {FURTHER, ENOUGH} for note in best.notes)
+    assert best.cases["b"].free_run.mse <= tried_with.selection_free_run_mse
 
 
 def test_the_screen_hears_how_much_is_left(first: tuple[Path, Searched]) -> None:
