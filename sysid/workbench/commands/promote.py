@@ -23,4 +23,4 @@ def promote_command(name: str, *, version: str | None) -> None:
     target = console()
     before = "" if done.before in {None, done.version} else f", in place of version {done.before}"
     target.print(f"{done.name}: version {done.version} ({done.fit}) is the champion{before}.", soft_wrap=True)
-    target.print(f'Load it with mlflow.onnx.load_model("{done.uri}").', soft_wrap=True)
+    target.print(f'Load it with mlflow.pyfunc.load_model("{done.uri}").', soft_wrap=True)

@@ -34,14 +34,12 @@ from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_store as tracking
 from sysid.workbench.tracking import mlflow_views as views
 from sysid.workbench.tracking.judgement_run import log_judgement
+from sysid.workbench.tracking.served_table import SEQUENCE_FILE
 from sysid.workbench.tracking.sqlite_store import SQLITE
 from sysid.workbench.tracking.sweep_run import experiment_name, log_sweep
 
 KEY_TAG = "sysid.key"
 """Tag that holds the digest of everything a fit and its figures depend on."""
-
-SEQUENCE_FILE = "sequence.onnx"
-"""The exported file that runs a whole record, which is what a caller of a tracked model wants."""
 
 
 def _in_words(error: Exception) -> str:
@@ -165,9 +163,8 @@ class Tracker:
             self.client.log_artifact(run_id, str(packed))
         sequence = next((entry for entry in ready.exports if Path(entry["file"]).name == SEQUENCE_FILE), None)
         if sequence is not None and self.data is not None and not ready.told:
-            file = ready.folder.parent / sequence["file"]
             tracking.log_model(
-                self.client, file, ready.of, ready.mapping, uri=self.uri, run_id=run_id, traces=self.data.traces
+                self.client, ready.folder, ready.of, ready.mapping, uri=self.uri, run_id=run_id, traces=self.data.traces
             )
         self._describe(self.client.get_run(run_id).info.experiment_id, run_id, ready.of, exported=True)
         self.client.set_tag(run_id, "exported", "yes")

@@ -5,18 +5,24 @@ No other room knows that it exists. What is tracked, and when, :mod:`sysid.workb
 
 from __future__ import annotations
 
+import hashlib
+import json
 import logging
 import os
+import shutil
+import tempfile
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.export.flags import MEANING
+from sysid.export.manifest import MANIFEST
 from sysid.extras import need
 from sysid.names import read_sides, slug, told_apart, tracking_text
 from sysid.traces import TraceSet
@@ -26,6 +32,7 @@ from sysid.workbench.tracking import mlflow_views as views
 from sysid.workbench.tracking.fit_run import Entities
 from sysid.workbench.tracking.landing import VARIABLE, App, leading_to
 from sysid.workbench.tracking.registry import parsed, register
+from sysid.workbench.tracking.served_table import SEQUENCE_FILE, STATE, flags_column, label, rests
 from sysid.workbench.tracking.sqlite_store import SQLITE, held
 from sysid.workbench.tracking.sweep_run import TRIALS_TAG
 
@@ -208,37 +215,28 @@ def log_data(client: Any, run_id: str, traces: TraceSet) -> None:
 
 
 def log_model(
-    client: Any, file: Path, ready: FitReady, mapping: str = "", *, uri: str, run_id: str, traces: TraceSet
+    client: Any, bundle: Path, ready: FitReady, mapping: str = "", *, uri: str, run_id: str, traces: TraceSet
 ) -> None:
-    """Log the exported network as a model that MLflow can load and serve, and as the newest in the registry.
+    """Log the exported surrogate as a model that MLflow can load and serve, and as the newest in the registry.
 
     Args:
         client: An ``MlflowClient``.
-        file: The network, in ONNX.
+        bundle: The folder that holds its ``sequence.onnx``.
         ready: The fit that was exported.
-        mapping: What the file maps, where that is more than the fit's own output.
+        mapping: What the bundle maps, where that is more than the fit's own output.
         uri: The tracking URI.
         run_id: The fit's run.
         traces: The data; an example of inputs is taken from it.
     """
     import mlflow
-    import onnx
+    from mlflow.models import Model
 
-    network = onnx.load(str(file))
     before, variable = mlflow.get_tracking_uri(), os.environ.get(TRACKING_VARIABLE)
     mlflow.set_tracking_uri(uri)
     try:
         with mlflow.start_run(run_id=run_id):
-            logged = mlflow.onnx.log_model(
-                network,
-                name=slug(tracked.run_name(ready)),
-                signature=_signature(network),
-                input_example=_example(network, ready, traces),
-                # Without these MLflow asks for CUDA at load and for whatever it finds installed.
-                onnx_execution_providers=["CPUExecutionProvider"],
-                pip_requirements=["onnx", "onnxruntime", "numpy"],
-                save_as_external_data=False,
-            )
+            name = slug(tracked.run_name(ready))
+            logged = Model.log(None, name=name, flavor=_Flavor, bundle=bundle, traces=traces)
         register(
             client,
             mapping or str(ready.pipeline.mapping),
@@ -255,35 +253,85 @@ def log_model(
             os.environ[TRACKING_VARIABLE] = variable
 
 
-def _example(network: Any, ready: FitReady, traces: TraceSet) -> dict[str, NDArray[np.float64]]:
-    """A few samples of the first trace for one car, from the middle of every channel's range."""
-    trace = traces.traces[0]
-    columns = trace.columns(ready.fit.model.mapping.inputs)[:8]
-    columns = columns if columns.shape[1] else np.zeros((len(columns), 1))  # without input, how long to run
-    _, state = network.graph.input
-    return {"u": columns[:, None, :], "state": np.zeros((1, state.type.tensor_type.shape.dim[1].dim_value))}
+class _Flavor:
+    """How MLflow is to save a surrogate: tables in and out for ``mlflow.pyfunc``, the graph for ``mlflow.onnx``."""
 
+    @staticmethod
+    def save_model(path: str, mlflow_model: Any, *, bundle: Path, traces: TraceSet) -> None:
+        """What :meth:`Model.log` calls.
 
-def _signature(network: Any) -> Any:
-    """Names, types and shapes of a graph's inputs and outputs; -1 stands for any length."""
-    from mlflow.models import ModelSignature
-    from mlflow.types import Schema, TensorSpec
-    from onnx.helper import tensor_dtype_to_np_dtype
+        Args:
+            path: The folder to make.
+            mlflow_model: What describes it.
+            bundle: The surrogate.
+            traces: What it was fitted to.
+        """
+        import mlflow
+        import onnx
 
-    def schema(values: Any) -> Any:
-        tensors = [(value.name, value.type.tensor_type) for value in values]
-        return Schema(
-            [
-                TensorSpec(
-                    np.dtype(tensor_dtype_to_np_dtype(tensor.elem_type)),
-                    tuple(dim.dim_value or -1 for dim in tensor.shape.dim),
-                    name,
-                )
-                for name, tensor in tensors
-            ]
+        source = resources.files("sysid.workbench.tracking") / "served_table.py"
+        about = json.loads((bundle / MANIFEST).read_text(encoding="utf-8"))
+        with tempfile.TemporaryDirectory() as scratch:
+            data = Path(scratch) / "surrogate"
+            data.mkdir()
+            for name in (SEQUENCE_FILE, MANIFEST):
+                shutil.copyfile(bundle / name, data / name)
+            # Two models in one process may have been logged by two versions of the workbench: each finds its own code.
+            text = source.read_text(encoding="utf-8")
+            module = f"sysid_table_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+            code = Path(scratch) / f"{module}.py"
+            code.write_text(text, encoding="utf-8")
+            mlflow.pyfunc.save_model(
+                path,
+                loader_module=module,
+                data_path=str(data),
+                code_paths=[str(code)],
+                mlflow_model=mlflow_model,
+                signature=_signature(about),
+                input_example=_example(about, traces),
+                pip_requirements=["numpy", "onnx", "onnxruntime", "pandas"],
+                metadata={
+                    "mapping": about["mapping"],
+                    "sample_time_s": about["sample_time_s"],
+                    "flags": {str(flag.value): text for flag, text in MEANING.items()},
+                },
+            )
+        mlflow_model.add_flavor(
+            "onnx",
+            onnx_version=onnx.__version__,
+            data=f"data/surrogate/{SEQUENCE_FILE}",
+            # Without it MLflow asks for CUDA at load.
+            providers=["CPUExecutionProvider"],
+            onnx_session_options=None,
+            code=None,
         )
+        mlflow_model.save(str(Path(path) / "MLmodel"))
 
-    return ModelSignature(inputs=schema(network.graph.input), outputs=schema(network.graph.output))
+
+def _example(about: dict[str, Any], traces: TraceSet) -> Any:
+    """A few samples of the first trace; where it lacks an input, that stands still."""
+    import pandas as pd
+
+    trace, values = traces.traces[0], about["initialisation"]["values"]
+    columns = {}
+    for channel in about["inputs"]:
+        name = channel["name"]
+        columns[label(channel)] = trace[name][:8] if name in trace.channel_names else np.full(8, float(values[name]))
+    return pd.DataFrame(columns)
+
+
+def _signature(about: dict[str, Any]) -> Any:
+    """Columns with their units, and where a run may begin."""
+    from mlflow.models import ModelSignature
+    from mlflow.types import ColSpec, ParamSchema, ParamSpec, Schema
+
+    outputs = [label(channel) for channel in about["outputs"]]
+    begin = [ParamSpec(name, "double", level) for name, (_, level) in rests(about).items()]
+    return ModelSignature(
+        inputs=Schema([ColSpec("double", label(channel)) for channel in about["inputs"]]),
+        outputs=Schema([*(ColSpec("double", name) for name in outputs), ColSpec("integer", flags_column(outputs))]),
+        params=ParamSchema([ParamSpec(STATE, "double", [], shape=(-1,)), *begin]),
+    )
 
 
 def fetch_bundle(uri: str, address: str, folder: Path) -> tuple[Path, str]:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from sysid.export import read_bundle
+from sysid.models import History
 from sysid.names import tracking_key
 from sysid.reporting.results import Results
 from sysid.workbench.cli import run_cli
@@ -164,8 +169,8 @@ def test_a_view_of_many_cases_fits_into_a_tag() -> None:
     assert 10 < len(shown) < 400
 
 
-def test_the_best_fit_has_bundle_report_and_a_model_that_runs(tracked_once) -> None:
-    workspace, client, results = tracked_once
+def test_the_best_fit_has_bundle_report_and_a_model(tracked_once) -> None:
+    _, client, results = tracked_once
     run = runs_of(client)[results.best.name]
     bundled = {Path(entry.path).name for entry in client.list_artifacts(run.info.run_id, "bundle")}
     assert {"model.json", "step.onnx", "sequence.onnx"} <= bundled
@@ -173,18 +178,56 @@ def test_the_best_fit_has_bundle_report_and_a_model_that_runs(tracked_once) -> N
         "index.html",
         "results.json",
     }
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # MLflow's own deprecations
-        import mlflow
+    (output,) = run.outputs.model_outputs
+    assert client.get_logged_model(output.model_id).name
 
-        mlflow.set_tracking_uri(store_uri(workspace))
-        (model_id,) = [output.model_id for output in run.outputs.model_outputs]
-        loaded = mlflow.pyfunc.load_model(f"models:/{model_id}")
-        inputs = {name: np.zeros((5, 1, 2)) if name == "u" else np.zeros((1, 3)) for name in ("u", "state")}
-        output = loaded.predict(inputs)
-    assert loaded.metadata.signature.inputs.input_names() == ["u", "state"]
-    assert output["y"].shape == (5, 1, 1)
-    assert np.isfinite(output["y"]).all()
+
+SERVE = """
+import io, json, pickle, sys, warnings
+warnings.simplefilter("ignore")
+import mlflow
+import pandas as pd
+
+def refused(*_, **__):
+    raise AssertionError("something is unpickled")
+
+pickle.load = pickle.loads = pickle.Unpickler = refused
+mlflow.set_tracking_uri(sys.argv[1])
+loaded = mlflow.pyfunc.load_model("models:/inlet-valve-to-outlet@candidate")
+table = pd.read_csv(sys.argv[2], index_col="t [s]").drop(columns="outlet [kPa]")
+table.columns = ["inlet [kPa gauge]", "valve [V]"]
+whole = loaded.predict(table, params={"outlet_at_rest": 120.0})
+half = loaded.predict(table[:150], params={"outlet_at_rest": 120.0})
+rest = loaded.predict(table[150:], params={"state": half.attrs["state"]})
+assert pd.concat([half, rest]).equals(whole)
+assert whole.index.equals(table.index)
+ours = [name for name in sys.modules if name.split(".")[0] == "sysid"]
+signature = loaded.metadata.signature
+print(json.dumps({
+    "columns": list(whole.columns), "outlet": whole["outlet [kPa gauge]"].tolist(), "ours": ours,
+    "inputs": signature.inputs.input_names(), "outputs": signature.outputs.input_names(),
+    "params": [one.name for one in signature.params.params], "metadata": loaded.metadata.metadata,
+}))
+"""
+
+
+def test_the_registered_model_takes_and_gives_tables_where_the_workbench_is_not(tracked_once) -> None:
+    workspace, _, _ = tracked_once
+    record = workspace / "datasets" / "rig" / "run-3.csv"
+    command = [sys.executable, "-c", SERVE, store_uri(workspace), str(record)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert told["ours"] == []
+    assert told["inputs"] == ["inlet [kPa gauge]", "valve [V]"]
+    assert told["outputs"] == told["columns"] == ["outlet [kPa gauge]", "flags"]
+    assert told["params"] == ["state", "outlet_at_rest"]
+    assert told["metadata"]["sample_time_s"] == 0.05
+    assert told["metadata"]["mapping"] == "inlet+valve -> outlet"
+    u = np.loadtxt(record, delimiter=",", skiprows=1)[:, 1:3]
+    model = read_bundle(workspace / "run" / "bundle").model.single
+    expected = model.simulate(u, History.at_rest(inputs=u[0], output=120.0))
+    np.testing.assert_allclose(told["outlet"], expected, rtol=0.0, atol=1e-9)
 
 
 def test_what_is_tracked_already_is_not_tracked_twice(tracked_once) -> None:
