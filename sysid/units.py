@@ -257,6 +257,33 @@ def convert(
     return converted + atmosphere if to_reference is Reference.ABSOLUTE else converted - atmosphere
 
 
+@cache
+def is_same_unit(unit: str, other: str) -> bool:
+    """Whether numbers in two units mean the same, whatever they are called.
+
+    Args:
+        unit: One.
+        other: The other; a number without a unit, ``1``, stands for any.
+
+    Returns:
+        Whether they do.
+
+    Raises:
+        UnitError: If one is not known.
+
+    Example:
+        >>> is_same_unit("V", "volt"), is_same_unit("V", "mV"), is_same_unit("V", "1")
+        (True, False, True)
+    """
+    if unit == other or "1" in {unit, other}:
+        return True
+    one, two = _parsed(check_unit(unit)), _parsed(check_unit(other))
+    if not one.is_compatible_with(two):
+        return False
+    points = np.array([0.0, 1.0])
+    return bool(np.allclose(_registry().Quantity(points, one).to(two).magnitude, points, rtol=1e-12, atol=1e-12))
+
+
 def _parsed(unit: str) -> pint.Unit:
     plain = plain_unit(unit) or unit
     return _registry().parse_units("dimensionless" if plain == "1" else plain)

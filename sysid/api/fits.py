@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from sysid.api.comparison import compare
 from sysid.api.saving import save
-from sysid.errors import ChannelError, TraceError
+from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.estimation import FitResult
 from sysid.ingest.arrays import inputs_of
+from sysid.ingest.frames import as_array
 from sysid.models import Cascade, History, Start
 from sysid.models.form import unheeded
 from sysid.traces import Role, TraceSet
@@ -71,7 +72,7 @@ class Fit(FitResult):
                 inputs hold it.
             TraceError: If the inputs are not as many as the model has.
         """
-        inputs = inputs_of(u, self.model.mapping.inputs)
+        inputs = self._inputs(u)
         history = self._history(inputs, initial)
         run = self.model.simulate(inputs, history)
         if history is not None and not isinstance(initial, History | tuple):
@@ -92,7 +93,7 @@ class Fit(FitResult):
         Returns:
             What each sample was predicted to be ``steps`` before it, of the shape of ``y``, in the output's unit.
         """
-        inputs = inputs_of(u, self.model.mapping.inputs)
+        inputs = self._inputs(u)
         output = self._outputs(y)
         if len(output) != len(inputs):
             raise TraceError(
@@ -159,8 +160,11 @@ class Fit(FitResult):
     def _compared(self) -> Any:
         return compare(self.traces, self, start=self.start)
 
+    def _inputs(self, u: Any) -> NDArray[np.float64]:
+        return inputs_of(u, self.model.mapping.inputs, sample_time=self.model.sample_time)
+
     def _outputs(self, y: Any) -> NDArray[np.float64]:
-        output = np.asarray(y, dtype=np.float64)
+        output = np.asarray(as_array(y), dtype=np.float64)
         return output.reshape(len(output), -1) if self.model.structure.several_outputs else output.reshape(-1)
 
     def _history(self, inputs: NDArray[np.float64], initial: Initial) -> History | None:
@@ -170,12 +174,26 @@ class Fit(FitResult):
         if isinstance(initial, tuple):
             return History(inputs=inputs_of(initial[0], model.mapping.inputs), output=self._outputs(initial[1]))
         if not model.structure.several_outputs and not isinstance(initial, Dict):
-            return History.at_rest(inputs=inputs[0], output=float(initial))
+            return History.at_rest(inputs=inputs[0], output=level_of(initial))
         names = model.mapping.outputs
         given = dict(initial) if isinstance(initial, Dict) else dict.fromkeys(names, initial)
         check_outputs(given, names)
-        rest = np.array([given.get(n, r) for n, r in zip(names, model.ends.rest_outputs, strict=True)], dtype=float)
+        pairs = zip(names, model.ends.rest_outputs, strict=True)
+        rest = np.array([level_of(given.get(name, level)) for name, level in pairs])
         return History.at_rest(inputs=inputs[0], output=rest if model.structure.several_outputs else float(rest[0]))
+
+
+def level_of(initial: Any) -> float:
+    """A level that an output has stood at: one finite number."""
+    if np.ndim(initial) == 0 and isinstance(initial, int | float | np.number) and np.isfinite(initial):
+        return float(initial)
+    raise ConfigError(
+        "the output before the first sample is one finite number",
+        where="initial",
+        expected="a number, in the output's unit",
+        got=repr(initial)[:60],
+        remedy="samples before the first are a pair: initial=(u_before, y_before); several outputs are a dict by name",
+    )
 
 
 def check_outputs(given: Iterable[str], names: tuple[str, ...]) -> None:

@@ -115,14 +115,17 @@ class Bundle:
 
         Raises:
             ChannelError: If an input is missing, or ``initial`` names no output.
-            ConfigError: If an array has another number of columns, or ``initial`` says nothing to the model.
+            ConfigError: If an array has another number of columns, its samples are at another distance, or ``initial``
+                says nothing to the model.
         """
         names = tuple(str(entry["name"]) for entry in self.outputs)
         surrogate = Surrogate.of(self.model, {}, outputs=names)
         if surrogate.ticks:
             inputs = np.zeros((len(inputs_of(u, ())), 1))
         else:
-            inputs = inputs_of(u, tuple(str(entry["name"]) for entry in self.inputs))
+            inputs = inputs_of(
+                u, tuple(str(entry["name"]) for entry in self.inputs), sample_time=self.model.sample_time
+            )
         given = dict(initial) if isinstance(initial, Dict) else {} if initial is None else dict.fromkeys(names, initial)
         strangers = [name for name in given if name not in names]
         if strangers:

@@ -17,6 +17,7 @@ from sysid.export.inputs import channel_of, check_constants, with_constants
 from sysid.export.reading import read_bundle
 from sysid.export.surrogate import Surrogate
 from sysid.models import Start, StartKind, beginning
+from sysid.models.ends import check_record
 from sysid.traces import Channel, Trace
 from sysid.validation.metrics import Figures, figures
 
@@ -117,24 +118,13 @@ def simulate_bundle(
         inputs = read_command(inputs, others or channels, time_unit=time_unit, unit=unit)
     sample_time = read.model.sample_time
     given = inputs.trace(sample_time) if isinstance(inputs, CommandTable) else inputs
-    _check_sample_time(given, sample_time)
+    check_record({channel.name: channel.unit for channel in channels}, sample_time, given)
     return _run(read, with_constants(given, channels, numbers), channels, initial, start)
 
 
 def declared_start(bundle: Bundle) -> Start:
     """How the free runs of a bundle's cases began."""
     return Start(**bundle.metadata.get("cases_start", {"kind": StartKind.ESTIMATED.value}))
-
-
-def _check_sample_time(trace: Trace, sample_time: float) -> None:
-    if not np.isclose(trace.sample_time, sample_time, rtol=1e-9, atol=0.0):
-        raise ConfigError(
-            "the inputs have another sample time than the bundle",
-            where=trace.name,
-            expected=f"{sample_time:g} s",
-            got=f"{trace.sample_time:g} s",
-            remedy="resample them at ingest",
-        )
 
 
 def _run(

@@ -1,8 +1,4 @@
-"""Data that is in memory already: frames, arrays, dicts and lists of them become a TraceSet, by the way that files go.
-
-A table is known by what it can do and not by its type, so that no library has to be there: pandas and polars frames,
-xarray data sets, NumPy arrays (structured ones too), torch tensors, plain lists.
-"""
+"""Data that is in memory already: frames, arrays, dicts and lists of them become a TraceSet as files do."""
 
 from __future__ import annotations
 
@@ -15,18 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError
+from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.ingest.assemble import Wanted, assemble, stamps_in_seconds
+from sysid.ingest.frames import INDEX, as_array, check_distinct, check_labels, check_rows, columns_by_name, not_numbers
 from sysid.ingest.headers import parse_header
+from sysid.ingest.meaning import with_clock
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.split import Split, split_traces
-from sysid.ingest.table import RawColumn, RawTable, array_column, by_length, recognise_time
+from sysid.ingest.table import RawTable, array_column, by_length, recognise_time
 from sysid.ingest.timing import survey
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference, check_unit
-
-INDEX = "(index)"
-"""Name of the column that a frame's index becomes where it is time; no file can have it by chance."""
+from sysid.yaml_files import check
 
 Names = str | Sequence[str] | None
 
@@ -82,6 +78,10 @@ def data(
         [('estimation', 15, 'estimation'), ('validation', 15, 'validation')]
     """
     wanted_inputs, wanted_outputs = _names(inputs), _names(outputs)
+    check_distinct([*(wanted_inputs or ()), *(wanted_outputs or ())], where="inputs and outputs")
+    repaired = check(RepairOptions, {"constant": "accept", **_options(repairs, "repairs")}, where="repairs")
+    gridded = check(GridOptions, {"fewest_samples": 2, **_options(grid, "grid")}, where="grid")
+    step = None if sample_time is None else check(TimeOptions, {"step": sample_time}, where="sample_time").step
     experiments = _experiments(values)
     whole: list[Trace] = []
     marks: list[NDArray[Any] | None] = []
@@ -91,14 +91,16 @@ def data(
         marks.append(_taken_out(columns, split, channels, where=label))
         table = _table(columns, name=label)
         _check_lengths(table, channels)
+        if table.time is None:
+            check_rows(one[0] if isinstance(one, tuple) else one, where=label)
         trace = _trace(
             table,
             channels or [column for column in table.names if column != table.time],
             label=label,
-            sample_time=sample_time if number == 0 or sample_time is not None else whole[0].sample_time,
+            sample_time=step if number == 0 or step is not None else whole[0].sample_time,
             units=units,
-            repairs=RepairOptions.model_validate({"constant": "accept", **(repairs or {})}),
-            grid=GridOptions.model_validate({"fewest_samples": 2, **(grid or {})}),
+            repairs=repaired,
+            grid=gridded,
         )
         whole.append(trace)
     return split_traces(tuple(whole), split, marks, name=name)
@@ -109,8 +111,14 @@ def _names(given: Names) -> tuple[str, ...] | None:
 
 
 def _experiments(values: Any) -> dict[str, Any]:
-    """Experiments by name; a single one is called ``record``."""
-    if isinstance(values, Mapping) and values and all(_is_record(one) for one in values.values()):
+    """Experiments by name; a single one is called ``record``.
+
+    Arrays of a single column are columns, whether they lie flat or stand, as those of ``scipy.io.loadmat`` do.
+    """
+    standing = isinstance(values, Mapping) and any(
+        np.shape(one)[1:] == (1,) and not _is_frame(one) for one in values.values()
+    )
+    if isinstance(values, Mapping) and values and not standing and all(_is_record(one) for one in values.values()):
         return {str(label): one for label, one in values.items()}
     if isinstance(values, list) and values and not np.isscalar(values[0]):
         return {f"record-{number}": one for number, one in enumerate(values, start=1)}
@@ -119,7 +127,9 @@ def _experiments(values: Any) -> dict[str, Any]:
 
 def _is_record(value: Any) -> bool:
     """Whether a value of a dict is a record of its own and not a column."""
-    return isinstance(value, tuple | Mapping) or _is_frame(value) or getattr(value, "ndim", 1) == 2
+    if isinstance(value, tuple):
+        return not all(np.isscalar(entry) for entry in value)
+    return isinstance(value, Mapping) or _is_frame(value) or getattr(value, "ndim", 1) == 2
 
 
 def _is_frame(value: Any) -> bool:
@@ -132,74 +142,92 @@ def _columns(
     one: Any, inputs: tuple[str, ...] | None, outputs: tuple[str, ...] | None, *, where: str
 ) -> dict[str, NDArray[Any]]:
     """The columns of one record by name; those of an array are the inputs and then the outputs."""
-    named = columns_by_name(one)
+    named = columns_by_name(one, where=where)
     if named is not None:
         return named
+    if isinstance(one, tuple) and len(one) != 2 and not all(np.isscalar(part) for part in one):
+        raise ConfigError(
+            "a tuple is a pair",
+            where=where,
+            expected="(u, y)",
+            got=f"{len(one)} parts",
+            remedy='name the columns: {"t": t, "u": u, "y": y}; several experiments are a list of pairs',
+        )
     if isinstance(one, tuple) and len(one) == 2:
-        _check_indexes(one, where=where)
+        check_labels(one, ("u", "y"), where=where)
         u, y = (_two_dimensional(part, where=where) for part in one)
         return dict(zip([*_given(inputs, u, "u"), *_given(outputs, y, "y")], [*u.T, *y.T], strict=True))
     return _of_matrix(_two_dimensional(one, where=where), inputs, outputs, where=where)
 
 
-def columns_by_name(values: Any) -> dict[str, NDArray[Any]] | None:
-    """The columns of a table that has names for them.
-
-    Args:
-        values: A frame, a dict of columns, a structured array, or anything else.
-
-    Returns:
-        The columns by name; a frame's index is among them where it is time. ``None`` for what has no names.
-    """
-    if isinstance(values, Mapping):
-        return {str(key): _array(value) for key, value in values.items()}
-    if hasattr(values, "get_columns"):  # polars
-        return {str(column.name): _array(column.to_numpy()) for column in values.get_columns()}
-    if hasattr(values, "data_vars"):  # xarray.Dataset
-        keys = [key for key in (*values.coords, *values.data_vars) if values[key].ndim == 1]
-        return {str(key): _array(values[key].values) for key in keys}
-    if hasattr(values, "columns") and hasattr(values, "index"):  # pandas.DataFrame
-        return {**_index(values.index), **{_label(key): _numpy(values[key]) for key in values.columns}}
-    if hasattr(values, "to_frame") and hasattr(values, "index"):  # pandas.Series
-        return {**_index(values.index), str(values.name if values.name is not None else "y"): _numpy(values)}
-    fields = getattr(getattr(values, "dtype", None), "names", None)
-    return {name: values[name] for name in fields} if fields else None
-
-
-def inputs_of(values: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
+def inputs_of(values: Any, names: tuple[str, ...], *, sample_time: float | None = None) -> NDArray[np.float64]:
     """Inputs as a matrix in a mapping's order.
 
     Args:
         values: An array, a frame, a dict of columns, or a trace; for a model without input the number of samples.
         names: The inputs.
+        sample_time: Of the model, in seconds: a trace, and a frame whose index or column is time, must have it.
 
     Returns:
         Shape ``(n_samples, n_inputs)``, float64.
 
     Raises:
         ChannelError: If one is missing.
-        ConfigError: If an array has another number of columns.
+        ConfigError: If an array has another number of columns, or the samples are at another distance.
+        TraceError: If a value is missing or not finite.
     """
-    if isinstance(values, Trace):
-        return values.columns(names)
+    where = "the inputs of a simulation"
     if not names and isinstance(values, int):
         return np.zeros((values, 0))
-    named = columns_by_name(values)
-    if named is not None:
-        missing = [name for name in names if name not in named]
-        if missing:
-            raise ChannelError(missing, list(named), where="the inputs of a simulation")
-        return np.column_stack([np.asarray(named[name], dtype=np.float64) for name in names])
-    array = np.asarray(_array(values), dtype=np.float64)
-    array = array[:, None] if array.ndim == 1 else array
-    if array.ndim != 2 or array.shape[1] != len(names):
-        raise ConfigError(
-            "the inputs do not match the model",
-            expected=f"shape (n_samples, {len(names)}), for {', '.join(names)}",
-            got=f"shape {np.shape(values)}",
-            remedy="give one column an input, in this order, or columns by name",
+    if isinstance(values, Trace):
+        _check_step(values.sample_time, sample_time, where=where)
+        return values.columns(names)
+    named = columns_by_name(values, where=where)
+    if named is None:
+        array = as_array(values)
+        array = array[:, None] if array.ndim == 1 else array
+        if array.ndim != 2 or array.shape[1] != len(names) or array.dtype.kind not in "buif":
+            raise ConfigError(
+                "the inputs do not match the model",
+                where=where,
+                expected=f"numbers of shape (n_samples, {len(names)}), for {', '.join(names)}",
+                got=f"shape {np.shape(array)} of type {array.dtype}",
+                remedy="give one column an input, in this order, or columns by name",
+            )
+        found = array.astype(np.float64)
+    else:
+        if len(names) == 1 and hasattr(values, "to_frame"):  # a series is one column, whatever it is called
+            named = {names[0] if key != INDEX else key: column for key, column in named.items()}
+        table = _table(named, name=where)
+        _check_lengths(table, names)
+        if table.time is not None and table.time not in names and sample_time is not None and len(table) > 1:
+            stamps = stamps_in_seconds(table, FileOptions())
+            _check_step(float(np.median(np.diff(stamps))), sample_time, where=where)
+        found = np.column_stack([table.find(name).values for name in names]) if names else np.zeros((len(table), 0))
+    if not len(found):
+        raise _no_samples(where)
+    bad = ~np.isfinite(found)
+    if bad.any():
+        row, column = (int(index) for index in np.argwhere(bad)[0])
+        raise TraceError(
+            f"{int(bad.sum())} values are missing",
+            where=f"{where}, channel {names[column]}, sample {row}",
+            expected="a finite number in each sample: a free run has nothing else to go by",
+            got=f"{found[row, column]}",
+            remedy="fill them before, for example frame.interpolate() or frame.ffill()",
         )
-    return array
+    return found
+
+
+def _check_step(step: float, sample_time: float | None, *, where: str) -> None:
+    if sample_time is not None and abs(step - sample_time) > 1e-3 * sample_time:
+        raise ConfigError(
+            "the samples are at another distance than the model's",
+            where=where,
+            expected=f"{sample_time:g} s",
+            got=f"{step:g} s",
+            remedy="resample them: sysid.data(frame, sample_time=..., grid={'method': 'linear'}) gives a trace",
+        )
 
 
 def _of_matrix(
@@ -243,7 +271,7 @@ def _given(names: tuple[str, ...] | None, matrix: NDArray[Any], letter: str) -> 
 
 
 def _two_dimensional(values: Any, *, where: str) -> NDArray[Any]:
-    array = _array(values)
+    array = as_array(values)
     array = array[:, None] if array.ndim == 1 else array
     if array.ndim != 2 or array.dtype.kind not in "buif":
         raise ConfigError(
@@ -253,6 +281,8 @@ def _two_dimensional(values: Any, *, where: str) -> NDArray[Any]:
             got=f"{type(values).__name__} of shape {np.shape(array)} and type {array.dtype}",
             remedy="give numbers; several experiments are a list of records",
         )
+    if not len(array):
+        raise _no_samples(where)
     if array.shape[0] < array.shape[1]:
         raise ConfigError(
             "the array has more columns than rows",
@@ -264,65 +294,40 @@ def _two_dimensional(values: Any, *, where: str) -> NDArray[Any]:
     return array
 
 
-def _check_indexes(pair: tuple[Any, Any], *, where: str) -> None:
-    """Two tables of a pair go side by side row by row: their labels must not say otherwise."""
-    indexes = [getattr(part, "index", None) for part in pair]
-    first, second = indexes
-    if first is not None and second is not None and hasattr(first, "equals") and not first.equals(second):
-        raise ConfigError(
-            "u and y have different indexes",
-            where=where,
-            expected="the same label in each row: samples of a pair are taken in the order in which they stand",
-            got=f"{[str(label) for label in first[:3]]} ... and {[str(label) for label in second[:3]]} ...",
-            remedy="put them into one frame, which joins them by their labels, or give u.to_numpy(), y.to_numpy()",
-        )
+def _no_samples(where: str) -> ConfigError:
+    return ConfigError(
+        "the record holds no samples",
+        where=where,
+        expected="at least one column of numbers",
+        got="no rows",
+        remedy="look at what was selected before: a filter that nothing passes leaves no rows",
+    )
 
 
 def _check_lengths(table: RawTable, channels: Sequence[str]) -> None:
     """Columns of another length are no channels: said here, not that they are missing."""
-    wanted = [one for one in table.others if (not channels or one.name in channels) and len(one.values) > 1]
+    wanted = [one for one in table.others if not channels or one.name in channels]
     if wanted:
         raise ConfigError(
             "the channels of a record differ in length",
             where=str(table.source),
             expected=f"{len(table)} samples in each, as in {', '.join(table.names)}",
             got=", ".join(f"{len(one.values)} in {one.name}" for one in wanted),
-            remedy="cut them to the same span of time; experiments of different lengths are a list of records",
+            remedy="cut them to the same span of time, or name the inputs and outputs that are meant; a constant is "
+            "np.full(n, value); experiments of different lengths are a list of records",
         )
 
 
-def _array(values: Any) -> NDArray[Any]:
-    """Any array-like as NumPy: a tensor lets go of its gradients, what a masked array masks is missing."""
-    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "buif":
-        return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))
-    return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
-
-
-def _numpy(column: Any) -> NDArray[Any]:
-    """A pandas column or index; calendar time of a zone counts from the same origin as any other."""
-    if getattr(column.dtype, "tz", None) is not None:
-        column = getattr(column, "dt", column).tz_convert(None)
-    return _array(column.to_numpy())
-
-
-def _label(key: object) -> str:
-    """A frame's column by name; of several levels, joined by dots."""
-    return ".".join(str(part) for part in key) if isinstance(key, tuple) else str(key)
-
-
-def _index(index: Any) -> dict[str, NDArray[Any]]:
-    """A frame's index where it is time: calendar time, spans of time, or numbers that are not just counted."""
-    array = _numpy(index)
-    if array.dtype.kind in "mM" or array.dtype.kind == "f":
-        return {INDEX: array}
-    if array.dtype.kind in "iu" and index.name is not None and recognise_time([_nameless(str(index.name))]):
-        return {INDEX: array}
-    return {}
-
-
-def _nameless(name: str) -> RawColumn:
-    header = parse_header(name)
-    return RawColumn(name=header.name, values=np.zeros(1), unit=header.unit)
+def _options(given: Mapping[str, Any] | None, what: str) -> dict[str, Any]:
+    if given is not None and not isinstance(given, Mapping):
+        raise ConfigError(
+            f"{what} are names with values",
+            where=what,
+            expected="a dict",
+            got=repr(given),
+            remedy='write for example repairs={"nan": "mask"} or grid={"method": "linear"}',
+        )
+    return dict(given or {})
 
 
 def _taken_out(
@@ -341,22 +346,36 @@ def _table(columns: Mapping[str, NDArray[Any]], *, name: str) -> RawTable:
     raw = []
     for key, array in columns.items():
         header = parse_header(key)
+        if array.ndim > 1:
+            raise ConfigError(
+                "a column of several columns",
+                where=f"{name}, column {key}",
+                expected="shape (n_samples,) for each name",
+                got=f"shape {array.shape}",
+                remedy=f'name each: {{"{key}1": {key}[:, 0], "{key}2": {key}[:, 1]}}, or give the pair (u, y)',
+            )
         # Spans of time in seconds; a number of any other kind is as it stands.
         numbers = array.astype("timedelta64[ns]").astype(np.int64) / 1e9 if array.dtype.kind == "m" else array
-        unit = "s" if key == INDEX or array.dtype.kind == "m" else header.unit
-        raw.append(array_column(header.name, numbers, where=name, unit=unit, reference=header.reference))
+        unit = "s" if array.dtype.kind == "m" else header.unit
+        column = array_column(header.name, np.atleast_1d(numbers), where=name, unit=unit, reference=header.reference)
+        problem = column.problem and (not_numbers(key, np.atleast_1d(array), where=name) or column.problem)
+        raw.append(replace(column, problem=problem))
+    if not any(len(column.values) for column in raw):
+        raise _no_samples(name)
+    check_distinct([column.name for column in raw], where=name)
     equal, others = by_length(raw)
-    time = INDEX if INDEX in columns else recognise_time(equal)
-    # Time is in seconds in every function of ours, unless the column's name says otherwise.
-    timed = [replace(one, unit="s") if one.name == time and one.unit is None else one for one in equal]
-    return RawTable(
+    table = RawTable(
         source=Path(name),
         reader="memory",
-        columns=tuple(timed),
+        columns=equal,
         others=others,
-        time=time,
+        time=INDEX if INDEX in columns else recognise_time(equal),
         origin=f"given from memory (SHA-256 {_digest(columns)})",
     )
+    # Time is in seconds in every function of ours, unless its name or the size of its numbers says otherwise.
+    table = with_clock(table)
+    timed = [replace(one, unit="s") if one.name == table.time and not one.unit else one for one in table.columns]
+    return replace(table, columns=tuple(timed))
 
 
 def _digest(columns: Mapping[str, NDArray[Any]]) -> str:

@@ -35,7 +35,8 @@ def with_meaning(table: RawTable, files: FileOptions) -> RawTable:
     table = replace(table, columns=columns, others=others, records=records)
     if files.long is not None:
         table = _wide(table, files.long)
-    return _with_clock(table, files)
+    asked = files.time
+    return table if asked.column or asked.unit or asked.step is not None else with_clock(table)
 
 
 def _check_states(table: RawTable, files: FileOptions) -> None:
@@ -51,13 +52,16 @@ def _as_states(column: RawColumn, files: FileOptions) -> RawColumn:
     return column if values is None else replace(column, values=values, problem=None)
 
 
-def _with_clock(table: RawTable, files: FileOptions) -> RawTable:
-    if (
-        table.time is None
-        or files.time.column is not None
-        or files.time.unit is not None
-        or files.time.step is not None
-    ):
+def with_clock(table: RawTable) -> RawTable:
+    """A table whose time without a unit has that of the clock that it is by the size of its numbers.
+
+    Args:
+        table: From any reader, or from memory.
+
+    Returns:
+        The table; what was told by size is among its notes. As it is where nothing is told, or a unit is known.
+    """
+    if table.time is None:
         return table
     column = next(column for column in table.columns if column.name == table.time)
     if column.unit is not None or column.problem is not None:

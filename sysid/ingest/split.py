@@ -60,7 +60,7 @@ def split_traces(
     elif all(isinstance(entry, str) for entry in split):
         parts = _by_experiment(traces, [str(entry) for entry in split])
     else:
-        parts = _by_share(traces, _shares([float(entry) for entry in split]))
+        parts = _by_share(traces, _shares([_share(entry) for entry in split]))
     named: list[Trace] = []
     roles: dict[str, Role] = {}
     for role, part in parts:
@@ -70,6 +70,11 @@ def split_traces(
         named.append(dataclasses.replace(part, name=label))
         roles[label] = role
     return TraceSet(name=name, traces=tuple(named), roles=roles)
+
+
+def _share(entry: Any) -> float:
+    """A number, or NaN, which is no share."""
+    return float(entry) if isinstance(entry, int | float | np.number) else float("nan")
 
 
 def _shares(shares: list[float]) -> list[tuple[Role, float]]:
@@ -117,7 +122,9 @@ def _by_experiment(traces: tuple[Trace, ...], words: list[str]) -> list[tuple[Ro
 def _by_time(trace: Trace, spans: Mapping[str, tuple[float, float]]) -> list[tuple[Role, Trace]]:
     parts = []
     fuzz = 1e-6 * trace.sample_time
-    for word, (start, stop) in spans.items():
+    taken = np.zeros(len(trace), dtype=bool)
+    for word, span in spans.items():
+        start, stop = _span(word, span)
         inside = np.flatnonzero((trace.time >= start - fuzz) & (trace.time < stop - fuzz))
         if not len(inside):
             raise ConfigError(
@@ -127,8 +134,31 @@ def _by_time(trace: Trace, spans: Mapping[str, tuple[float, float]]) -> list[tup
                 got=f"{start:g} to {stop:g}",
                 remedy="correct the span; its end is not part of it",
             )
+        if taken[inside].any():
+            raise ConfigError(
+                "two spans of the split hold the same samples",
+                where=f"split, {word}",
+                expected="spans that do not overlap: what is fitted cannot test the fit",
+                got=f"{start:g} to {stop:g}, of which {int(taken[inside].sum())} samples are in an earlier span",
+                remedy="let each span begin where the one before it ends; its end is not part of it",
+            )
+        taken[inside] = True
         parts.append((_role(word), _cut(trace, int(inside[0]), int(inside[-1]) + 1, word)))
     return parts
+
+
+def _span(word: str, span: Any) -> tuple[float, float]:
+    try:
+        start, stop = (float(end) for end in span)
+    except (TypeError, ValueError):
+        raise ConfigError(
+            "a span of the split is a pair of times",
+            where=f"split, {word}",
+            expected="(start, stop) in seconds",
+            got=repr(span)[:60],
+            remedy="write for example split={'estimation': (0, 60), 'validation': (60, 90)}",
+        ) from None
+    return start, stop
 
 
 def _by_column(trace: Trace, marks: NDArray[Any] | None) -> list[tuple[Role, Trace]]:

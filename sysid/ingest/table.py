@@ -322,7 +322,8 @@ def array_column(
 
     Args:
         name: Name without the unit.
-        array: One-dimensional; calendar time becomes seconds since its first value.
+        array: One-dimensional; calendar time becomes seconds since its first value, whole numbers beyond float64 are
+            counted from the least of them.
         where: The file, for errors.
         unit: As found in the file; psig, barg and the like are taken apart.
         reference: As found in the file.
@@ -332,9 +333,12 @@ def array_column(
         The column; one that is not numeric carries its ``problem``.
     """
     unit, found = split_reference(unit) if unit else (None, None)
+    origin = 0
     try:
         if array.dtype.kind == "M":
             array, unit = _seconds(array), "s"
+        if array.dtype.kind in "ui" and array.size and (span := _beyond_float64(array)) is not None:
+            origin, array = span
         values, problem = _as_float64(array, where=f"{where}, column {name}"), None
     except ReaderError as error:
         values, problem = np.full(len(array), np.nan), error
@@ -345,6 +349,7 @@ def array_column(
         reference=reference or found,
         description=description,
         problem=problem,
+        counted_from=origin,
     )
 
 
@@ -409,6 +414,14 @@ def _seconds(stamps: NDArray[np.datetime64]) -> NDArray[np.float64]:
     seconds: NDArray[np.float64] = nanoseconds.astype(np.int64) / 1e9
     seconds[np.isnat(nanoseconds)] = np.nan
     return seconds
+
+
+def _beyond_float64(array: NDArray[Any]) -> tuple[int, NDArray[Any]] | None:
+    """A clock that counts further than float64 can (ns since 1970): its least value, and the counts from there."""
+    low, high = int(array.min()), int(array.max())
+    if max(-low, high) <= _EXACT_INTEGERS or high - low > _EXACT_INTEGERS:
+        return None
+    return low, array - array.dtype.type(low)
 
 
 def _as_float64(array: NDArray[Any], *, where: str) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.models.ends import Ends
+from sysid.models.ends import Ends, check_record
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lagged
@@ -280,7 +280,9 @@ class AbstractModel(ABC):
 
         Raises:
             ChannelError: If it lacks one.
+            ConfigError: If it has another sample time than the model, or a channel in another unit.
         """
+        check_record(self.ends.units, self.sample_time, trace)
         return trace.columns([self.mapping.output])[:, 0]
 
     @property
@@ -396,6 +398,14 @@ class AbstractModel(ABC):
             ConfigError: If the model has no prediction from measured output: its noise is added to the output.
             TraceError: If the number of inputs is not the mapping's.
         """
+        if not isinstance(steps, int | np.integer) or steps < 1:
+            raise ConfigError(
+                "a prediction looks whole samples ahead",
+                where="steps",
+                expected="a whole number of at least 1",
+                got=repr(steps),
+                remedy="1 is the next sample; simulate() is the free run, which starts from no measured output",
+            )
         return self.recursion.predict(inputs, output, history or self._rest(inputs), steps)
 
     def _rest(self, inputs: NDArray[np.float64]) -> History:
@@ -445,4 +455,5 @@ class SeveralOutputs(AbstractModel):
 
     def measured(self, trace: Trace) -> NDArray[np.float64]:
         """What a trace has of its outputs, shape ``(n_samples, n_outputs)``."""
+        check_record(self.ends.units, self.sample_time, trace)
         return trace.columns(self.mapping.outputs)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
+
+from sysid.errors import ConfigError
+from sysid.traces import Trace
+from sysid.units import is_same_unit
 
 
 class HasEnds(Protocol):
@@ -35,10 +39,48 @@ class Ends:
     rest_outputs: tuple[float, ...]
     direct: frozenset[str]
 
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each channel."""
+        pairs = zip((*self.inputs, *self.outputs), (*self.input_units, *self.output_units), strict=True)
+        return dict(pairs)
+
     @staticmethod
     def of(model: HasEnds) -> Ends:
         """The ends of a model of one output, or of several."""
         return model.ends
+
+
+def check_record(units: Mapping[str, str], sample_time: float, trace: Trace) -> None:
+    """Refuse a record that a model cannot be run over: its numbers would mean something else.
+
+    Args:
+        units: The unit of each of the model's channels, of which the record may lack some.
+        sample_time: Of the model, in seconds.
+        trace: The record.
+
+    Raises:
+        ConfigError: If the record has another sample time than the model, or a channel in another unit.
+    """
+    if abs(trace.sample_time - sample_time) > 1e-6 * sample_time:
+        raise ConfigError(
+            "the record has another sample time than the model",
+            where=f"trace {trace.name}",
+            expected=f"{sample_time:g} s",
+            got=f"{trace.sample_time:g} s",
+            remedy="a model holds at its own sample time: resample the record at ingest (grid), or fit it anew",
+        )
+    there = {channel.name: channel.unit for channel in trace.channels}
+    for name, unit in units.items():
+        if name in there and not is_same_unit(there[name], unit):
+            raise ConfigError(
+                "the record has a channel in another unit than the model",
+                where=f"trace {trace.name}, channel {name}",
+                expected=unit,
+                got=there[name],
+                remedy=f"read it in {unit}: units={{{name!r}: {unit!r}}} of sysid.data takes the numbers as they are, "
+                "the channel's unit in a dataset.yaml converts them",
+            )
 
 
 def read_now(inputs: Sequence[str], lags: Sequence[Sequence[int]]) -> frozenset[str]:

@@ -74,6 +74,32 @@ def test_a_prediction_starts_each_sample_from_the_measurement(fit: sysid.Fit) ->
     assert_allclose(fit.predict(shifted, U, initial=1.0), expected, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("traces", "words"),
+    [
+        (sysid.data((U, Y), sample_time=0.2), "another sample time"),
+        (sysid.data((U, Y), sample_time=0.1, units={"u": "mV", "y": "m"}), "another unit"),
+    ],
+)
+def test_a_record_of_another_rate_or_unit_is_no_record_of_the_model(traces: Any, words: str) -> None:
+    made = sysid.fit(sysid.data((U, Y), sample_time=0.1, units={"u": "V", "y": "m"}), "u -> y", ORDERS)
+    for use in (lambda: sysid.compare(traces, made), lambda: made.residuals(traces), lambda: made.plot(traces)):
+        with pytest.raises(ConfigError, match=words):
+            use()
+
+
+@pytest.mark.parametrize("steps", [0, -1, 1.5])
+def test_a_prediction_looks_whole_samples_ahead(fit: sysid.Fit, steps: Any) -> None:
+    with pytest.raises(ConfigError, match="whole samples ahead"):
+        fit.predict(Y, U, steps=steps)
+
+
+@pytest.mark.parametrize("initial", [float("nan"), [1.0, 2.0], "a"])
+def test_a_level_to_begin_at_is_one_finite_number(fit: sysid.Fit, initial: Any) -> None:
+    with pytest.raises(ConfigError, match="one finite number"):
+        fit.simulate(U, initial=initial)
+
+
 def test_what_does_not_match_the_model_is_refused(fit: sysid.Fit) -> None:
     with pytest.raises(ConfigError, match="do not match the model"):
         fit.simulate(np.zeros((10, 2)))

@@ -56,7 +56,12 @@ def test_of_several_experiments_whole_ones_go_to_each_role() -> None:
 
 
 @pytest.mark.parametrize(
-    "split", [0.0, 1.0, -0.5, (0.5, 0.6), (0.5, 0.2), (0.25,) * 4, 0.001, {"val": (5.0, 6.0)}, ["x"]]
+    "split",
+    [
+        *(0.0, 1.0, -0.5, (0.5, 0.6), (0.5, 0.2), (0.25,) * 4, 0.001, {"val": (5.0, 6.0)}, ["x"]),
+        *({"train": 1.0}, {"train": (0.0, 1.0, 2.0)}, {"train": ("a", "b")}, [("train", 0, 1)]),
+        {"train": (0.0, 1.5), "test": (1.0, 2.0)},  # what is fitted cannot test the fit
+    ],
 )
 def test_a_split_that_cannot_be_meant_is_refused(split: Any) -> None:
     with pytest.raises(ConfigError):
