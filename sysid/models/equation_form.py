@@ -19,7 +19,10 @@ from sysid.models.state_search import LARGEST, StateSearch, at_rest
 
 Array = NDArray[np.float64]
 
-INTEGRATES = 1e-9
+FARTHEST = 10.0
+"""How far from its level a state may be expected, in its scales."""
+
+INTEGRATES = 1e-7
 """Singular value of what changes from sample to sample, in states' scales, up to which there is no equilibrium."""
 
 
@@ -344,7 +347,8 @@ class EquationForm(AbstractForm):
             return away[known].ravel(), scaled.reshape(-1, len(free))
 
         low, high = ((bound[free] - terms.level[free]) / terms.scale[free] for bound in (terms.low, terms.high))
-        expected = (rest[free] - terms.level[free]) / terms.scale[free]
+        # An equilibrium far from where states ordinarily are, as of a plant that nearly integrates, is no expectation.
+        expected = np.clip((rest[free] - terms.level[free]) / terms.scale[free], -FARTHEST, FARTHEST)
         found = StateSearch(misfit=misfit, low=low, high=high, expected=expected).found()
         x = rest.copy()
         x[free] = terms.level[free] + terms.scale[free] * found

@@ -29,9 +29,10 @@ def hammerstein_wiener(
     text = Text(taken=frozenset((*mapping.inputs, *mapping.outputs)))
     scaling = begun.scaling
     inputs = _inputs(text, structure.curves(len(mapping.inputs)), mapping, begun, structure.lags(len(mapping.inputs)))
-    linear = write_block(text, block, inputs, "g")
-    level = text.estimated("level", begun.level)
-    inside = text.define("inside", f"{linear} + {level}")
+    integrates = begun.integrates
+    linear = write_block(text, block, inputs, "g", drifts=integrates)
+    level = "" if integrates else f" + {text.estimated('level', begun.level)}"
+    inside = text.define("inside", f"{linear}{level}")
     in_units = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}"
     curve, tag = structure.output, "h"
     if curve.given:
@@ -53,7 +54,8 @@ def wiener_hammerstein(
     n = len(mapping.inputs)
     inputs = _inputs(text, (Curve(kind=NONE),) * n, mapping, begun, structure.lags(n))
     before, behind = blocks
-    between = text.define("between", write_block(text, before, inputs, "g1", known=True))
+    drifts = begun.integrates
+    between = text.define("between", write_block(text, before, inputs, "g1", known=True, drifts=drifts))
     bent = text.define("bent", text.curve(structure.curve, between, "f"))
     level = text.estimated("level", begun.level)
     linear = write_block(text, behind, [(bent, True)], "g2")
@@ -86,7 +88,9 @@ def _inputs(
     return found
 
 
-def write_block(text: Text, block: Block, inputs: Sequence[Input], tag: str, *, known: bool = False) -> str:
+def write_block(
+    text: Text, block: Block, inputs: Sequence[Input], tag: str, *, known: bool = False, drifts: bool = False
+) -> str:
     """Write a block; what its output is.
 
     Args:
@@ -95,6 +99,7 @@ def write_block(text: Text, block: Block, inputs: Sequence[Input], tag: str, *, 
         inputs: What it reads.
         tag: Part of the names of its states and parameters.
         known: Whether its largest gain has a prior, as wide as it is large.
+        drifts: Whether it is fed a constant beside its inputs, which an integrator makes a slope of.
 
     Returns:
         The expression.
@@ -113,6 +118,8 @@ def write_block(text: Text, block: Block, inputs: Sequence[Input], tag: str, *, 
                 wanted = f"{tag}_b{at + i + 1}" + (f"_{j + 1}" if len(inputs) > 1 else "")
                 prior = largest if abs(gain) == largest > 0.0 else None
                 terms.append(f"{text.estimated(wanted, gain, prior=prior)}*{read}")
+            if drifts and at + i == block.states - 1:
+                terms.append(text.estimated(f"{tag}_drift", 0.0))
             text.lines.append(f"{states[at + i]}[k+1] = {' + '.join(term for term in terms if term)}")
         at += len(section)
     direct = [

@@ -35,12 +35,23 @@ class LinearStart:
         poles: Shape ``(n_states,)``.
         response: Impulse response to each input, lag 0 first, shape ``(n_samples, n_inputs)``.
         level: What the output has where the inputs are 0.
+        samples: Of the longest record.
     """
 
     scaling: Scaling
     poles: Poles
     response: Array
     level: float
+    samples: int
+
+    @property
+    def integrates(self) -> bool:
+        """Whether a pole is as slow as the records: where they cannot tell it from an integrator.
+
+        Such a block has no level of its own: a constant that it is fed is a slope of its output, and the level is
+        where it began.
+        """
+        return bool(np.abs(self.poles).max(initial=0.0) >= np.exp(-1.0 / self.samples))
 
 
 def shifted(traces: Sequence[Trace], mapping: Mapping, lags: Sequence[int]) -> list[Trace]:
@@ -88,7 +99,9 @@ def linear_start(
         response[k] = row @ B
         row = row @ A
     level = L[0, -1] + C @ np.linalg.lstsq(np.eye(states) - A, drift, rcond=None)[0]
-    return LinearStart(scaling=model.scaling, poles=poles, response=response, level=float(level))
+    return LinearStart(
+        scaling=model.scaling, poles=poles, response=response, level=float(level), samples=max(map(len, traces))
+    )
 
 
 def whole(begun: LinearStart, *, direct: Sequence[bool]) -> Block:

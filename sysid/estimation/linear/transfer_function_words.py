@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.transfer_function_runs import Candidate
 from sysid.models import TransferFunctionModel
 from sysid.models.orthonormal_basis import Domain
@@ -44,15 +45,16 @@ def of_stability(model: TransferFunctionModel) -> str:
     Returns:
         The sentence.
     """
-    if model.stable:
-        return "The transfer function is stable."
     poles = np.concatenate([model.poles(j) for j in range(len(model.sections))])
     discrete = model.orders.domain is Domain.DISCRETE
     away = np.abs(poles) - 1.0 if discrete else poles.real
-    at_edge = int(np.count_nonzero(np.abs(away) <= 1e-9 * (1.0 if discrete else float(np.abs(poles).max()) or 1.0)))
-    if float(away.max()) <= 1e-9 * (1.0 if discrete else float(np.abs(poles).max()) or 1.0):
-        word = {1: "An integrator", 2: "A double integrator"}.get(at_edge, f"{at_edge} poles at the edge")
-        return f"The transfer function is not stable: {word.lower()}; an error of its input adds up for ever."
+    edge = slow_poles.INTEGRATES * (1.0 if discrete else float(np.abs(poles).max(initial=0.0)) or 1.0)
+    at_edge = int(np.count_nonzero(np.abs(away) <= edge))
+    if at_edge and float(away.max()) <= edge:
+        word = {1: "an integrator", 2: "a double integrator"}.get(at_edge, f"{at_edge} poles at the edge")
+        return f"The transfer function is not stable: {word}; an error of its input adds up for ever."
+    if model.stable:
+        return "The transfer function is stable."
     largest = poles[int(np.argmax(away))]
     return (
         f"The transfer function is not stable: the pole {complex(largest):.6g} lies outside; its free run grows "

@@ -263,3 +263,14 @@ def test_a_curve_with_more_pieces_than_the_record_shows_is_told_in_one_sentence(
     assert "simpler curve" in told
     plain = fit_hammerstein_wiener([a_trace(u, block(u))], MAPPING, HammersteinWiener(states=2), Training(starts=1))
     assert plain.warnings == ()
+
+
+@pytest.mark.parametrize(("kind", "drift"), [(StartKind.REST, 0.0), (StartKind.ESTIMATED, -0.02)])
+def test_a_block_may_integrate_an_input_that_is_off(kind: StartKind, drift: float) -> None:
+    u = steps(7)
+    y = 5.0 + np.concatenate([[0.0], np.cumsum(0.05 * u + drift)[:-1]])
+    found = fit_hammerstein_wiener(
+        [a_trace(u + 3.0, y)], MAPPING, HammersteinWiener(states=1), ONE, start=Start(kind=kind), rest_output=5.0
+    )
+    run = found.model.simulate(u[4:, None] + 3.0, History(inputs=u[:4, None] + 3.0, output=y[:4]))
+    assert np.abs(run - y[4:]).max() < 1e-6 * np.std(y)

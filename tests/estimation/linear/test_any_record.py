@@ -87,6 +87,13 @@ def test_a_plant_that_integrates_is_fitted_exactly(integrators: int, domain: Dom
     np.testing.assert_allclose(arx.b[0], 0.5 * np.array(b[1:]), atol=1e-9)
 
 
+def test_a_plant_that_integrates_and_drifts_is_not_called_stable() -> None:
+    u = steps(300, 1)
+    y = lfilter([0.0, 0.05], [1.0, -1.0], u) - 0.01 * np.arange(len(u))
+    fit = tf(trace_of(u[:, None], y), TransferFunction(poles=(1,), zeros=(0,), delays=(1,)))
+    assert "integrator" in fit.notes[-1]
+
+
 @pytest.mark.parametrize("domain", list(Domain), ids=lambda d: d.value)
 @pytest.mark.parametrize("pole", [1.01, 1.2, 1.6])
 def test_an_unstable_plant_in_a_loop_is_fitted_exactly(pole: float, domain: Domain) -> None:
