@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadFileScheduling, Scheduling
 
 from sysid.names import visible
 from sysid.workbench.fits import steps
@@ -25,6 +26,23 @@ settings.load_profile("sysid")
 # A shell that starts the tests in the background has them, and what they start, ignore Ctrl-C, which some tests press.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+TOGETHER = ("tests/browser/",)
+"""Folders whose files stay in one process, with a run that takes a minute to prepare for all of them."""
+
+
+class LoadFolderScheduling(LoadFileScheduling):
+    """A file of tests stays in one process, and so do some folders."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        folders = [folder for folder in TOGETHER if nodeid.startswith(folder)]
+        return folders[0] if folders else super()._split_scope(nodeid)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Scheduling | None:
+    """In place of xdist's where the command line asks for files that stay together."""
+    return LoadFolderScheduling(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
 @pytest.fixture(autouse=True)

@@ -42,7 +42,9 @@ fits:
     training: {loop: closed, max_iterations: 8}
     initial: open loop
 export: null
+stability: {count: 20}
 """
+"""A check on the thousand sequences of the default takes longer than these fits; the tests of stability have it."""
 
 
 def rig_record(seed: int, n_samples: int = 400) -> tuple[np.ndarray, ...]:

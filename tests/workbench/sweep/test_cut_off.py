@@ -34,7 +34,7 @@ structure: {kind: NARX, input_delays: 1, output_delays: 1, neurons: {from: 1, to
 training: {loop: closed, max_iterations: 5}
 pruning: [{iterations: 2, keep: 0.5}]
 beside: [{kind: ARX, na: 1, nb: 1, nk: 1}]
-stability: {choose: false}
+stability: {count: 20, choose: false}
 export: {formats: [onnx]}
 """
 

@@ -32,6 +32,7 @@ training: {loop: closed, max_iterations: 8}
 pruning: [{iterations: 3, keep: 0.5}]
 beside: [{kind: NARX, input_delays: 1, output_delays: 1, neurons: 2}]
 export: {formats: [onnx]}
+stability: {count: 100}
 """
 
 
@@ -88,7 +89,9 @@ def test_the_winner_is_the_best_stable_one_and_goes_through_the_steps_of_any_fit
 
 
 def test_the_best_may_be_taken_as_it_is_and_says_that_it_is_unstable(workspace: Path, swept: Swept) -> None:
-    found = run(workspace, SWEEP.replace("{formats: [onnx]}", "null") + "stability: {choose: false}\n")
+    found = run(
+        workspace, SWEEP.replace("{formats: [onnx]}", "null").replace("{count: 100}", "{count: 100, choose: false}")
+    )
     assert found.record.winning is not None
     assert found.record.choice(found.record.winning) == min(map(found.record.choice, found.record.tried_in_full))
     first = found.results.fits[0]
