@@ -17,6 +17,7 @@ from sysid.api.comparison import compare
 from sysid.api.saving import save
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.estimation import FitResult
+from sysid.estimation.grey_box.by_case import for_case
 from sysid.ingest.arrays import inputs_of
 from sysid.ingest.frames import as_array
 from sysid.models import Cascade, History, Start
@@ -103,6 +104,20 @@ class Fit(FitResult):
                 remedy="give both over the same samples",
             )
         return self.model.predict(inputs, output, self._history(inputs, initial), steps=steps)
+
+    def for_case(self, name: str) -> Fit:
+        """The same fit for one case, where parameters of equations differ by case: its model is a plain one.
+
+        Args:
+            name: Of the case, or of a record of it.
+
+        Returns:
+            The fit.
+
+        Raises:
+            ConfigError: If no parameter differs by case, or that case was not fitted.
+        """
+        return Fit.of(for_case(self, name), self.traces, self.start)
 
     def residuals(
         self, traces: TraceSet | None = None, *, free_run: bool = False, output: str | None = None

@@ -102,6 +102,7 @@ def fit(
             got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
             remedy="give one that role",
         )
+    structure.check_records([one.name for one in estimation], traces.names, start)
     fits: list[Fit] = []
     for one in chosen:
         found = estimators.fit(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.equations.graph import CONTINUOUS_STATE, WEIGHT, Program
+from sysid.equations.graph import CONTINUOUS_STATE, FREE, WEIGHT, Program
 
 RUNGE_KUTTA, ROSENBROCK = "runge-kutta", "rosenbrock"
 SOLVERS = (RUNGE_KUTTA, ROSENBROCK)
@@ -134,6 +134,11 @@ class Lowered:
     def n_weights(self) -> int:
         """Weights of all networks."""
         return self.counts[WEIGHT]
+
+    @property
+    def n_estimated(self) -> int:
+        """Parameters and weights that have sensitivities."""
+        return self.counts[FREE] + self.counts[WEIGHT]
 
     @property
     def depth(self) -> int:

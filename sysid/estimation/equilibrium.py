@@ -67,11 +67,12 @@ def _plain_models(traces: Sequence[Trace], model: AbstractModel) -> list[Abstrac
 def _of(model: AbstractModel, trace: Trace, start: Start) -> list[str]:
     inputs, output = trace.columns(model.mapping.inputs), model.measured(trace)
     usable = trace.usable_samples
-    begun = beginning(model, inputs, output, ESTIMATED, usable)
+    begun = beginning(model, inputs, output, ESTIMATED, usable, case=trace.name)
     n = begun.first
     if n == 0:
         return []
-    declared = model.simulate(inputs[:n], start.history(inputs, output, model.resting, usable))
+    stood = model.recursion.cased(start.history(inputs, output, model.resting, usable), trace.name)
+    declared = model.simulate(inputs[:n], stood)
     after = model.simulate(inputs[n:], begun.history) - output[n:]
     off = np.abs(declared - output[:n])[usable[:n]].reshape(-1, len(model.mapping.outputs))
     later = after[usable[n:]].reshape(-1, len(model.mapping.outputs))

@@ -70,7 +70,7 @@ class Experiment:
         if not isinstance(rest_output, np.ndarray):
             mapping.check_single()
             output = output[:, 0]
-        history = start.history(inputs, output, rest_output, trace.usable_samples)
+        history = replace(start.history(inputs, output, rest_output, trace.usable_samples), case=trace.name)
         if start.kind is StartKind.ESTIMATED:
             return cls._of(trace, inputs, output, Beginning(history=history, first=0), np.zeros(1, dtype=np.bool_))
         n = start.n_measured
@@ -94,7 +94,7 @@ class Experiment:
             TraceError: If the trace is not longer than a measured start.
         """
         inputs, output = trace.columns(model.mapping.inputs), model.measured(trace)
-        begun = beginning(model, inputs, output, start, trace.usable_samples)
+        begun = beginning(model, inputs, output, start, trace.usable_samples, case=trace.name)
         return cls._of(trace, inputs, output, begun, trace.usable_samples[: begun.first] if begun.first else None)
 
     @classmethod

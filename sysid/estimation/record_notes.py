@@ -128,7 +128,7 @@ class FreeRun:
             The run.
         """
         inputs, output, usable = trace.columns(model.mapping.inputs), model.measured(trace), trace.usable_samples
-        begun = beginning(model, inputs, output, start, usable)
+        begun = beginning(model, inputs, output, start, usable, case=trace.name)
         window = slice(begun.first, begun.first + MOST_SAMPLES)
         shape = (-1, len(model.mapping.outputs))
         return cls(

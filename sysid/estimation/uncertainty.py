@@ -1,4 +1,4 @@
-"""Uncertainty: how well the data determine the parameters of a linear model."""
+"""Uncertainty: how well the data determine the parameters of a model."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ class Uncertainty:
         values: Estimates, shape ``(n_parameters,)``.
         covariance: Shape ``(n_parameters, n_parameters)``; NaN in rows of parameters that the data do not determine.
         noise_variance: Variance of the residuals, :math:`\sum e^2 / (N - p)`, in the output's unit squared.
+        profile: Ends of 95 % intervals by profile likelihood, shape ``(n_parameters, 2)``; infinite where the data do
+            not end one. ``None`` where nobody asked for them.
 
     Example:
         >>> u = Uncertainty(names=("a1",), values=np.array([0.5]), covariance=np.array([[0.01]]), noise_variance=1.0)
@@ -31,6 +33,7 @@ class Uncertainty:
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
     noise_variance: float
+    profile: NDArray[np.float64] | None = None
 
     @property
     def standard_deviations(self) -> NDArray[np.float64]:
@@ -56,7 +59,7 @@ class Uncertainty:
             "values": self.values.tolist(),
             "covariance": self.covariance.tolist(),
             "noise_variance": self.noise_variance,
-        }
+        } | ({} if self.profile is None else {"profile": self.profile.tolist()})
 
     @classmethod
     def from_dict(cls, fields: Dict[str, Any]) -> Uncertainty:
@@ -73,4 +76,5 @@ class Uncertainty:
             values=np.asarray(fields["values"], dtype=np.float64),
             covariance=np.asarray(fields["covariance"], dtype=np.float64),
             noise_variance=float(fields["noise_variance"]),
+            profile=np.asarray(fields["profile"], dtype=np.float64) if "profile" in fields else None,
         )

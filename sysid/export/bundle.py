@@ -18,6 +18,7 @@ from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.result import FitResult
 from sysid.export.archive import write_archive
 from sysid.export.card import model_card
+from sysid.export.case_inputs import with_case_inputs
 from sysid.export.exporters import exporter, usual_formats
 from sysid.export.manifest import (
     CARD,
@@ -155,6 +156,9 @@ def export_bundle(
     The model's free run is checked over 1,000 random sequences too; a bundle whose free run is unstable is written, and
     its status says so.
 
+    Parameters that differ by case are inputs of the files, each with the range that the fitted cases have; a fit whose
+    model is that of one case (``replace(fit, model=fit.model.for_case("run1"))``) has them inside.
+
     The folder appears, or is replaced, only when the new bundle is complete. The same fit, traces and metrics
     give the same bytes.
 
@@ -187,6 +191,9 @@ def export_bundle(
         ParityError: If a file differs from the model by more than the tolerance; nothing is published then.
     """
     writers = [exporter(name) for name in usual_formats(formats)]
+    recorded = traces
+    if isinstance(fit, FitResult):
+        fit, traces = with_case_inputs(fit, traces, start or Start())
     source = fit if isinstance(fit, Cascade) else fit.model
     known = dict(fits or {}) if isinstance(fit, Cascade) else {str(fit.model.mapping): fit}
     start = Start() if start is None or source.single is None else start
@@ -207,7 +214,9 @@ def export_bundle(
             purposes[WORST] = "the random sequence on which the free run did worst"
         (draft / SCHEMA).write_text(schema_text(), encoding="utf-8", newline="\n")
         purposes[SCHEMA] = f"JSON schema of {MANIFEST}"
-        manifest = describe(surrogate, known, traces, start=start, metrics=metrics, provenance=provenance or {})
+        manifest = describe(
+            surrogate, known, traces, start=start, metrics=metrics, provenance=provenance or {}, recorded=recorded
+        )
         manifest["amplification"] = amplification(cases, sequences, surrogate.sample_time)
         manifest["stability"] = None
         if stability is not None:

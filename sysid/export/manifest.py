@@ -70,6 +70,7 @@ def describe(
     start: Start,
     metrics: Metrics | CascadeMetrics | None,
     provenance: Dict[str, Any],
+    recorded: TraceSet | None = None,
 ) -> dict[str, Any]:
     """Everything that ``model.json`` says before the files are known.
 
@@ -80,6 +81,7 @@ def describe(
         start: How the free runs began.
         metrics: The figures, if there are any.
         provenance: Where the fit comes from.
+        recorded: The cases as they were recorded, where channels were added since.
 
     Returns:
         JSON values; a number that is not finite is ``None``.
@@ -107,7 +109,7 @@ def describe(
         "fit": stages[0]["fit"] if single else None,
         "cases_start": {"kind": start.kind.value, "n_measured": start.n_measured},
         "metrics": None if metrics is None else _metrics(metrics),
-        "provenance": {**provenance, "data": _data(traces), "software": _software()},
+        "provenance": {**provenance, "data": _data(recorded or traces), "software": _software()},
     }
     return {name: _json(value) for name, value in manifest.items()}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping as Dict
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.models.ends import Ends, check_record
 from sysid.models.form import AbstractForm
-from sysid.models.history import History
+from sysid.models.history import History, Start
 from sysid.models.lags import Lagged
 from sysid.models.mapping import Mapping
 from sysid.models.ratio import Ratio
@@ -45,6 +46,11 @@ class AbstractStructure(ABC):
 
     per_input: tuple[str, ...] = ()
     """Fields that hold one number per input."""
+
+    @property
+    def names_records(self) -> bool:
+        """Whether a fit depends on what its records are called."""
+        return False
 
     def lagged(self, n_inputs: int) -> Lagged | None:
         """What its one-step map is made of, where that is a function of lagged samples.
@@ -92,6 +98,20 @@ class AbstractStructure(ABC):
             The mapping where one model has all outputs, else one an output.
         """
         return (mapping,) if self.several_outputs else mapping.each
+
+    def check_records(self, fitted: Sequence[str], run: Sequence[str], start: Start) -> None:
+        """Refuse records that its models could not be run over; of most structures there are none.
+
+        Args:
+            fitted: Names of the estimation traces.
+            run: Names of the traces that are run afterwards.
+            start: How their free runs begin.
+
+        Raises:
+            ConfigError: If parameters differ by case, one of them is of none that is fitted, and its start shows no
+                sample of it.
+        """
+        del fitted, run, start
 
     def check_mapping(self, mapping: Mapping) -> None:
         """Refuse channels that the structure is not for.
@@ -234,6 +254,11 @@ class AbstractModel(ABC):
     @property
     def models(self) -> tuple[AbstractModel, ...]:
         """Itself, as the members of a cascade."""
+        return (self,)
+
+    @property
+    def variants(self) -> tuple[AbstractModel, ...]:
+        """What runs without a record that is known: itself, or one for each case where parameters differ by case."""
         return (self,)
 
     @property

@@ -69,6 +69,8 @@ def beginning(
     output: NDArray[np.float64],
     start: Start,
     usable: NDArray[np.bool_] | None = None,
+    *,
+    case: str = "",
 ) -> Beginning:
     """How the free run of a model over a record begins.
 
@@ -79,21 +81,24 @@ def beginning(
             several outputs; read only as the start allows.
         start: Which start.
         usable: Which samples are not masked; all by default.
+        case: Name of the record, for models with parameters that differ by case.
 
     Returns:
         The history, and the first sample that is run and scored.
 
     Raises:
+        ConfigError: If the model has parameters by case, and neither knows the record nor sees samples of it.
         TraceError: If the record is not longer than a measured start.
     """
+    form = model.recursion
     if start.kind is not StartKind.ESTIMATED:
-        history = start.history(inputs, output, model.resting, usable)
+        history = form.cased(start.history(inputs, output, model.resting, usable), case)
         return Beginning(history=history, first=start.n_measured)
     known = np.ones(len(output), dtype=np.bool_) if usable is None else usable
-    form = model.recursion
     first = window(form.memory, known, asked=start.n_measured)
     if first == 0:  # a single sample: nothing is left to estimate on
-        return Beginning(history=History.at_rest(inputs=inputs[0], output=model.resting), first=0)
+        history = form.cased(History.at_rest(inputs=inputs[0], output=model.resting), case)
+        return Beginning(history=history, first=0)
     seen = None if known[:first].all() else known[:first]
     history = History(inputs=inputs[:first], output=output[:first], usable=seen)
-    return Beginning(history=form.refined(history), first=first)
+    return Beginning(history=form.cased(form.refined(history), case), first=first)

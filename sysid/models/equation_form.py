@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from sysid.equations import Lowered
 from sysid.errors import TraceError
 from sysid.kernels import register_machine as machine
+from sysid.models.case_search import shown
+from sysid.models.case_values import CaseValues
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
 from sysid.models.scaling import Scaling, VectorScaling
@@ -71,6 +73,7 @@ class EquationForm(AbstractForm):
         several: Whether outputs have columns.
         low: None: the equations hold what they hold.
         high: Likewise.
+        cases: What is known of parameters that differ by case; ``None`` where none does.
     """
 
     lowered: Lowered
@@ -83,6 +86,7 @@ class EquationForm(AbstractForm):
     several: bool = False
     low: float = -math.inf
     high: float = math.inf
+    cases: CaseValues | None = None
     predicts: bool = field(default=False, init=False)
 
     @property
@@ -92,8 +96,14 @@ class EquationForm(AbstractForm):
 
     @property
     def memory(self) -> int:
-        """Twice as many samples as states, and one more."""
-        return 2 * self.lowered.n_states + 1
+        """Twice as many samples as states and parameters by case, and one more."""
+        n_constants = 0 if self.cases is None else len(self.cases.places)
+        return 2 * (self.lowered.n_states + n_constants) + 1
+
+    @property
+    def constants(self) -> tuple[str, ...]:  # type: ignore[override]  # read only: a form is frozen
+        """Names of parameters that differ by case."""
+        return () if self.cases is None else self.cases.names
 
     @property
     def n_outputs(self) -> int:
@@ -131,7 +141,8 @@ class EquationForm(AbstractForm):
 
     def simulate(self, inputs: Array, history: History) -> Array:
         """Free run; see the base class."""
-        return self._shaped(self.run(self.given(inputs, history.inputs), self.state(history)))
+        form = self.of_case(history)
+        return form._shaped(form.run(form.given(inputs, history.inputs), form.state(history)))
 
     def predict(
         self,
@@ -145,7 +156,52 @@ class EquationForm(AbstractForm):
 
     def followed(self, history: History) -> Array:
         """The free run over a history itself; see the base class."""
-        return self._shaped(self.run(self.given(history.inputs, history.inputs[:1]), self._begun(history)))
+        form = self.of_case(history)
+        return form._shaped(form.run(form.given(history.inputs, history.inputs[:1]), form._begun(history)))
+
+    def cased(self, history: History, case: str) -> History:
+        """The history before a record, with the values of its case: known, or shown by the samples of the history.
+
+        Args:
+            history: The samples.
+            case: Name of the record.
+
+        Returns:
+            The history; as it is where no parameter differs by case.
+
+        Raises:
+            ConfigError: If the case was not fitted, and the history is a single sample.
+            TraceError: If the samples of one that was not fitted do not show a value.
+        """
+        if self.cases is None:
+            return history
+        row = self.cases.row(case)
+        if row is not None:
+            return replace(history, case=case, constants=tuple(map(float, self.cases.values[row])))
+        if len(history.output) == 1:
+            raise self.cases.unknown(case)
+        return replace(history, case=case, constants=shown(self, history, case))
+
+    def of_case(self, history: History) -> EquationForm:
+        """The form with the values that a history has of the parameters by case; itself where there are none."""
+        if self.cases is None:
+            return self
+        constants = history.constants or self.cased(history, history.case).constants
+        return self.with_constants(np.array(constants))
+
+    def with_constants(self, values: Array) -> EquationForm:
+        """The form of one case.
+
+        Args:
+            values: Of each parameter by case, in its unit.
+
+        Returns:
+            A form in which none differs by case any more.
+        """
+        assert self.cases is not None  # noqa: S101 - asked for by who calls
+        theta = self.theta.copy()
+        theta[self.cases.places] = values
+        return replace(self, theta=theta, cases=None)
 
     def state(self, history: History) -> Array:
         """The state after some samples.

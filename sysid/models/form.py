@@ -26,6 +26,8 @@ class AbstractForm(ABC):
     """Lower bound of the output in scaled numbers; ``-inf`` for none."""
     high: float
     """Upper bound of the output in scaled numbers; ``inf`` for none."""
+    constants: tuple[str, ...] = ()
+    """Names of parameters that differ by case, in the order of :attr:`sysid.models.History.constants`."""
     predicts: bool = True
     """Whether there is a prediction from measured output that is not the free run itself."""
 
@@ -54,6 +56,19 @@ class AbstractForm(ABC):
     @abstractmethod
     def memory(self) -> int:
         """Samples of a record from which the state after them can be told."""
+
+    def cased(self, history: History, case: str) -> History:
+        """The history before a record, with the values of parameters that differ by case.
+
+        Args:
+            history: The samples.
+            case: Name of the record.
+
+        Returns:
+            The history; as it is for a form without such parameters.
+        """
+        del case
+        return history
 
     def refined(self, history: History) -> History:
         """The history with which the free run that begins at its oldest samples comes closest to its output.

@@ -14,6 +14,8 @@ from typing import Any
 from sysid.equations import RUNGE_KUTTA, SOLVERS, Lowered, System, Terms, lower
 from sysid.errors import ConfigError, shortened
 from sysid.models.base import AbstractStructure
+from sysid.models.case_values import case_of, cases_among, cases_of, unknown_case
+from sysid.models.history import Start, StartKind
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 
@@ -21,6 +23,8 @@ MOST_PARAMETERS = 500
 MOST_SUBSTEPS = 1_000
 MOST_POINTS = 10_000
 """Points of all tables together."""
+CASE = "case"
+"""What a parameter may have a value per."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +39,7 @@ class Parameter:
         prior: Standard deviation of what is known of it before the data, around the start; ``None`` where nothing is.
         fixed: Whether it is known, and not estimated.
         unit: Its unit, for people.
+        per: ``case`` where each case has a value of its own; ``None`` where all share one.
 
     Raises:
         ConfigError: If the numbers do not go together.
@@ -47,9 +52,21 @@ class Parameter:
     prior: float | None = None
     fixed: bool = False
     unit: str = ""
+    per: str | None = None
 
     def __post_init__(self) -> None:
         where = f"parameters, {self.name}"
+        if self.per not in {None, CASE}:
+            raise ConfigError(
+                "no such thing to have a value per", where=where, expected=CASE, got=shortened(self.per),
+                remedy=f"write per: {CASE} where each record has its own value, and cases: for records that share one",
+            )  # fmt: skip
+        if self.per and self.fixed:
+            raise ConfigError(
+                f"{self.name} is known, and each case is to have its own", where=where,
+                expected=f"fixed: true, or per: {CASE}", got="both",
+                remedy=f"what is known of each record is an input: give the data a channel {self.name}",
+            )  # fmt: skip
         for name in ("start", "low", "high", "prior"):
             _number(self, name, where, least_finite=name in {"start", "prior"})
         if not self.low <= self.start <= self.high or not self.low < self.high:
@@ -132,13 +149,15 @@ class GreyBox(AbstractStructure):
     Args:
         equations: One a line: ``dx/dt = ...``, ``x[k+1] = ...``, and what is computed now, ``y = ...``, the outputs
             among it. Names that are neither states, definitions nor parameters are inputs of the mapping.
-        parameters: By name the start, or ``{start:, low:, high:, prior:, fixed:, unit:}``.
+        parameters: By name the start, or ``{start:, low:, high:, prior:, fixed:, unit:, per:}``.
         initial: By state its value before the first sample, or ``{start:, low:, high:, fixed:}``. What is not named is
             at equilibrium in a record that begins at rest, and estimated in others.
         tables: By name the points ``[[x, y], ...]`` of a function that is interpolated between them.
         substeps: Steps of the solver from sample to sample; by default as many as the records need, which is told.
         solver: ``runge-kutta``, or ``rosenbrock`` for stiff equations (implicit, as ``ode23s``); by default the one
             that the equations need where their parameters start, which is told.
+        cases: By case the names of its records, which share its values of the parameters that are ``per: case``. A
+            record that is not named is a case of its own.
 
     Raises:
         ConfigError: With line and column of what is wrong with the equations, or naming another field.
@@ -155,6 +174,7 @@ class GreyBox(AbstractStructure):
     tables: tuple[Table, ...] | Dict[str, Any] = ()
     substeps: int | None = None
     solver: str | None = None
+    cases: tuple[tuple[str, tuple[str, ...]], ...] | Dict[str, Any] = ()
 
     kind = "GreyBox"
 
@@ -171,6 +191,13 @@ class GreyBox(AbstractStructure):
         object.__setattr__(self, "parameters", _entries(self.parameters, Parameter, "parameters"))
         object.__setattr__(self, "initial", _entries(self.initial, InitialState, "initial"))
         object.__setattr__(self, "tables", _tables(self.tables))
+        object.__setattr__(self, "cases", cases_of(self.cases))
+        if self.cases and not self.by_case:
+            raise ConfigError(
+                "no parameter has a value per case", where="cases", expected=f"a parameter with per: {CASE}",
+                got=", ".join(name for name, _ in self.grouped),
+                remedy=f"write for example k: {{start: 1, per: {CASE}}} among the parameters, or remove cases",
+            )  # fmt: skip
         if self.substeps is not None and not (whole(self.substeps) and 1 <= self.substeps <= MOST_SUBSTEPS):
             raise ConfigError(
                 "not a number of steps", where="substeps", expected=f"a whole number from 1 to {MOST_SUBSTEPS:,}",
@@ -217,6 +244,21 @@ class GreyBox(AbstractStructure):
         return tuple(one for one in self.named if one.fixed)
 
     @property
+    def by_case(self) -> tuple[Parameter, ...]:
+        """Parameters that are estimated for each case."""
+        return tuple(one for one in self.named if one.per)
+
+    @property
+    def grouped(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """Cases of several records, and the records."""
+        return self.cases  # type: ignore[return-value]  # brought into this form when it was made
+
+    @property
+    def names_records(self) -> bool:
+        """Whether a fit depends on what its records are called."""
+        return bool(self.by_case)
+
+    @property
     def begins(self) -> dict[str, InitialState]:
         """By state what is known of it before the first sample."""
         return {one.name: one for one in self._states_given}
@@ -247,6 +289,16 @@ class GreyBox(AbstractStructure):
         """Refuse a mapping whose inputs or outputs the equations do not know."""
         self.system.check_names(mapping.inputs, mapping.outputs)
 
+    def check_records(self, fitted: Sequence[str], run: Sequence[str], start: Start) -> None:
+        """Refuse records that would be run with another case's values; see the base class."""
+        if not self.by_case:
+            return
+        cases = cases_among(fitted, self.grouped)
+        if start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE}:
+            for record in run:
+                if case_of(record, self.grouped) not in cases:
+                    raise unknown_case([one.name for one in self.by_case], cases, record)
+
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
         return {
@@ -257,7 +309,7 @@ class GreyBox(AbstractStructure):
             "tables": {name: [list(point) for point in points] for name, points in self.points.items()},
             "substeps": self.substeps,
             "solver": self.solver,
-        }
+        } | ({"cases": {name: list(records) for name, records in self.grouped}} if self.cases else {})
 
 
 @dataclass(frozen=True, kw_only=True)

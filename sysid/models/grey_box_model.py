@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.equations import RUNGE_KUTTA, Lowered
+from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel, SeveralOutputs
+from sysid.models.case_values import CaseValues
 from sysid.models.equation_form import EquationForm, StateTerms
 from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
 from sysid.models.history import History
@@ -39,6 +42,7 @@ class EquationModel(AbstractModel):
     sample_time: float
     input_units: tuple[str, ...]
     solver: str = RUNGE_KUTTA
+    cases: tuple[str, ...] = ()
 
     clamp = np.inf
     """Bound of the output: none."""
@@ -47,7 +51,7 @@ class EquationModel(AbstractModel):
         theta = np.array(self.theta, dtype=np.float64)
         theta.setflags(write=False)
         object.__setattr__(self, "theta", theta)
-        for name in ("norms", "levels", "spans", "input_units"):
+        for name in ("norms", "levels", "spans", "input_units", "cases"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
 
     @property
@@ -62,9 +66,103 @@ class EquationModel(AbstractModel):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Every parameter with a name, in its unit; those that were fixed too."""
+        """Every parameter with a name that all cases share, in its unit; those that were fixed too."""
         found = dict(zip((one.name for one in self.grey.free), map(float, self.theta), strict=False))
-        return {one.name: found.get(one.name, one.start) for one in self.grey.named}
+        return {one.name: found.get(one.name, one.start) for one in self.grey.named if not one.per}
+
+    @cached_property
+    def case_values(self) -> CaseValues | None:
+        """Parameters that differ by case, and their values; ``None`` where none does."""
+        by_case = self.grey.by_case
+        if not self.cases:
+            return None
+        places = np.array([self.grey.free.index(one) for one in by_case], dtype=np.int64)
+        p = self.n_of_form
+        values = np.vstack([self.theta[places], self.theta[p:].reshape(-1, len(by_case))])
+        differ = np.maximum(values.std(axis=0), np.abs(values.mean(axis=0)))
+        return CaseValues(
+            names=tuple(one.name for one in by_case),
+            places=places,
+            low=np.array([one.low for one in by_case]),
+            high=np.array([one.high for one in by_case]),
+            scale=np.array([
+                one.prior or float(d) or one.scale for one, d in zip(by_case, differ, strict=True)
+            ]),
+            cases=self.cases,
+            values=values,
+            grouped=self.grey.grouped,
+        )  # fmt: skip
+
+    @property
+    def n_of_form(self) -> int:
+        """Parameters and weights of the equations, each once; behind them stand those of further cases."""
+        return len(self.theta) - max(len(self.cases) - 1, 0) * len(self.grey.by_case)
+
+    @property
+    def by_case(self) -> dict[str, dict[str, float]]:
+        """Of each parameter that differs by case, its value in every case that was fitted, in its unit."""
+        found = self.case_values
+        if found is None:
+            return {}
+        columns = zip(found.names, found.values.T.tolist(), strict=True)
+        return {name: dict(zip(found.cases, column, strict=True)) for name, column in columns}
+
+    def for_case(self: _ModelT, name: str) -> _ModelT:
+        """The plain model of one case, in which its values are parameters like all others.
+
+        Args:
+            name: Of the case, or of a record of it.
+
+        Returns:
+            The model.
+
+        Raises:
+            ConfigError: If there are no parameters by case, or that one was not fitted.
+        """
+        found = self.case_values
+        row = None if found is None else found.row(name)
+        if found is None or row is None:
+            near = difflib.get_close_matches(name, self.cases, n=1)
+            raise ConfigError(
+                f"there is no case {name}" if found else "no parameter differs by case", where="for_case",
+                expected=f"one of {', '.join(self.cases)}" if found else "a parameter with per: case", got=name,
+                remedy=f"did you mean {near[0]}?" if near else "name one of these" if found else "use the model as it "
+                "is",
+            )  # fmt: skip
+        theta = self.theta[: self.n_of_form].copy()
+        theta[found.places] = found.values[row]
+        named = tuple(replace(one, per=None) for one in self.grey.named)
+        return replace(self, grey=replace(self.grey, parameters=named, cases=()), theta=theta, cases=())
+
+    def with_case_inputs(self: _ModelT) -> _ModelT:
+        """The plain model of all cases: what differs by case goes in, as inputs behind the others.
+
+        Returns:
+            The model; itself where nothing differs.
+        """
+        found, by_case = self.case_values, self.grey.by_case
+        if found is None:
+            return self
+        named = tuple(one for one in self.grey.named if not one.per)
+        more = len(by_case)
+        return replace(
+            self,
+            grey=replace(self.grey, parameters=named, cases=()),
+            theta=np.delete(self.theta[: self.n_of_form], found.places),
+            cases=(),
+            mapping=Mapping(inputs=(*self.mapping.inputs, *found.names), outputs=self.mapping.outputs),
+            input_units=(*self.input_units, *(one.unit or "1" for one in by_case)),
+            scaling=replace(
+                self.scaling,
+                input_offset=(*self.scaling.input_offset, *[0.0] * more),
+                input_scale=(*self.scaling.input_scale, *[1.0] * more),
+            ),
+        )
+
+    @property
+    def variants(self) -> tuple[AbstractModel, ...]:
+        """Itself, or the plain model of each case where parameters differ."""
+        return tuple(self.for_case(case) for case in self.cases) or (self,)
 
     @cached_property
     def lowered(self) -> Lowered:
@@ -78,13 +176,14 @@ class EquationModel(AbstractModel):
         fixed = [one.start for one in self.grey.fixed]
         return EquationForm(
             lowered=low,
-            theta=np.concatenate([self.theta, fixed, self.norms]),
+            theta=np.concatenate([self.theta[: self.n_of_form], fixed, self.norms]),
             scaling=self.scaling,
             terms=self.state_terms,
             substeps=self.substeps,
             sample_time=self.sample_time,
             widths=np.zeros(len(low.switches)),
             several=self.structure.several_outputs,
+            cases=self.case_values,
         )
 
     @property
@@ -116,9 +215,13 @@ class EquationModel(AbstractModel):
     ) -> Array:
         """How the free run moves with the parameters; see the base class.
 
-        A state that is estimated from several samples stays where it is; one at rest moves with the parameters.
+        A state that is estimated from several samples stays where it is, and so does a parameter by case; a state at
+        rest moves with the parameters.
         """
-        form, p = self.recursion, len(self.theta)
+        form, p = self.recursion.of_case(history), self.n_of_form
+        if self.case_values is not None:
+            places = self.case_values.columns(history.case, p)
+            factor = np.where(places[:, None] >= 0, factor[places], 0.0)
         if len(history.output) > 1:
             x, S = form.state(history), np.zeros((len(self.levels), p))
         else:
@@ -141,7 +244,7 @@ class EquationModel(AbstractModel):
             "spans": list(self.spans),
             "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
-        }
+        } | ({"cases": list(self.cases)} if self.cases else {})
 
     @staticmethod
     def _read(fields: Dict[str, Any]) -> dict[str, Any]:
@@ -150,6 +253,7 @@ class EquationModel(AbstractModel):
         found = {name: fields[name] for name in given}
         theta = np.array(fields["theta"], dtype=np.float64)
         found["solver"] = fields.get("solver", RUNGE_KUTTA)  # the only one, once
+        found["cases"] = tuple(fields.get("cases", ()))
         return found | {"theta": theta, "mapping": Mapping.parse(fields["mapping"])}
 
 
@@ -159,7 +263,8 @@ class GreyBoxModel(EquationModel):
 
     Args:
         grey: The equations.
-        theta: Parameters that were estimated, then the weights of networks, in their units.
+        theta: Parameters that were estimated, then the weights of networks, in their units. Of parameters by case the
+            first case's stand among them, those of the further cases behind the weights, case by case.
         norms: Levels and scales of what networks see.
         levels: An ordinary value of each state, in its unit.
         spans: How far each ordinarily goes from there.
@@ -171,6 +276,7 @@ class GreyBoxModel(EquationModel):
         input_units: Unit of each input.
         output_unit: Unit of the output.
         rest_output: Output at rest, in its unit.
+        cases: Names of the cases, where parameters differ by case.
     """
 
     scaling: Scaling

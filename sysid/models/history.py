@@ -22,6 +22,9 @@ class History:
         inputs: Shape ``(n_past, n_inputs)``.
         output: Shape ``(n_past,)``, or ``(n_past, n_outputs)`` before a model of several outputs.
         usable: Which outputs are not masked, shape ``(n_past,)``; ``None`` for all. A state is estimated from those.
+        case: Name of the record that it stands before; empty where there is none.
+        constants: Values of a model's parameters by case in the record, in their units; empty where they are not known
+            yet, or there are none.
 
     Raises:
         TraceError: If the two have different lengths, or there is no sample.
@@ -34,6 +37,8 @@ class History:
     inputs: NDArray[np.float64]
     output: NDArray[np.float64]
     usable: NDArray[np.bool_] | None = None
+    case: str = ""
+    constants: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         inputs = np.array(self.inputs, dtype=np.float64, ndmin=2)

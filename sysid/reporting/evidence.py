@@ -12,6 +12,7 @@ from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure
 from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.linear_view import linear_views
 from sysid.reporting.modes_table import modes_table
+from sysid.reporting.parameter_table import parameter_tables
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.residuals import GroupRecord, read_residuals
 from sysid.reporting.results import FitRecord, LinearityRecord, Results
@@ -36,6 +37,9 @@ def evidence_sections(folder: Path, results: Results) -> list[Section]:
     residuals = {fit.name: read_residuals(folder / "fits" / fit.slug) for fit in results.fits}
     if any(residuals.values()):
         sections.append(_residuals(results, residuals))
+    tables = [table for fit in results.fits if not _linear(fit) for table in _parameters(folder, fit)]
+    if tables:
+        sections.append(Section(anchor="parameters", title="Parameters", parts=tuple(tables)))
     parts = [part for fit in results.fits if _linear(fit) for part in _responses(folder, fit)]
     if parts:
         sections.append(Section(anchor="frequency-response", title="Frequency response", parts=tuple(parts)))
@@ -156,6 +160,13 @@ def _responses(folder: Path, fit: FitRecord) -> list[Part]:
         ),
         *([] if poles is None else [poles]),
     ]
+
+
+def _parameters(folder: Path, fit: FitRecord) -> list[Table]:
+    if "equations" not in fit.structure:  # only names that somebody gave mean something
+        return []
+    stored = _read_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
+    return [] if stored is None else parameter_tables(fit, stored)
 
 
 def _read_fit(path: Path) -> FitResult | None:

@@ -82,6 +82,9 @@ class CaseRecord(Record):
     by_state: dict[str, StateRecord] | None = Field(
         default=None, description="Free run by the name of a state, where an annotator says in which each sample is."
     )
+    constants: dict[str, float] | None = Field(
+        default=None, description="Parameters that differ by case, as the run had them; null where none does."
+    )
     published: dict[str, PublishedRecord] | None = Field(
         default=None, description="By kind of figure: free_run, one_step (mse) or run_time."
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ class CaseResult:
         intervals: Of the output, where the fit has a posterior.
         by_state: By the name of a state: figures of the free run while it lasts, and its share of the samples that
             count; ``None`` where nobody said in which state a sample is.
+        constants: Parameters that differ by case, as the run had them, by name; empty where none does.
     """
 
     case: str
@@ -50,6 +51,7 @@ class CaseResult:
     first: int = 0
     intervals: CaseIntervals | None = None
     by_state: Dict[str, tuple[Figures, float]] | None = None
+    constants: Dict[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Figures and run time as JSON values, without the signals."""
@@ -67,6 +69,7 @@ class CaseResult:
                 "simulated_s": float(self.time[-1] - self.time[0]),
             }
             | ({} if self.intervals is None else {"coverage": self.intervals.to_dict()})
+            | ({"constants": dict(self.constants)} if self.constants else {})
         )
 
 
@@ -174,7 +177,7 @@ def case_results(
         ChannelError: If the trace lacks a channel of the mapping.
     """
     inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-    begun = beginning(model, inputs, target, start, trace.usable_samples)
+    begun = beginning(model, inputs, target, start, trace.usable_samples, case=trace.name)
     history, scored = begun.history, slice(begun.first, None)
     inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
     simulated = model.simulate(inputs, history)
@@ -203,6 +206,7 @@ def case_results(
             simulated=run,
             predicted=ahead,
             intervals=interval,
+            constants=dict(zip(model.recursion.constants, history.constants, strict=True)),
         )
         for output, unit, measured, run, ahead, interval in zip(
             model.mapping.outputs, model.ends.output_units, *columns, intervals, strict=True

@@ -212,7 +212,7 @@ def analyse_residuals(
 
 def _record(model: AbstractModel, trace: Trace, start: Start, free_run: bool, column: int) -> _Record:
     inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-    begun = beginning(model, inputs, target, start, trace.usable_samples)
+    begun = beginning(model, inputs, target, start, trace.usable_samples, case=trace.name)
     history, scored = begun.history, slice(begun.first, None)
     inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
     # With noise added to the output alone the free run is the best prediction, any number of steps ahead.

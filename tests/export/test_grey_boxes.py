@@ -6,6 +6,7 @@ import ctypes
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from sysid.equations import ROSENBROCK, RUNGE_KUTTA
+from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
 from sysid.export import EXPORTERS, Surrogate, expected_flags, export_bundle, read_bundle
 from sysid.export.compiler import build_library
@@ -21,6 +23,7 @@ from sysid.export.operations import OPERATIONS
 from sysid.export.parity import largest_difference
 from sysid.kernels import register_machine as machine
 from sysid.models import NARX, Cascade, Limit, Mapping
+from sysid.traces import Role
 from tests.export.conftest import usable
 from tests.export.grey_boxes import EVERYTHING, GREY_BOXES, VALVE, build_grey
 
@@ -151,3 +154,43 @@ def test_a_cascade_may_hold_one(narx, kind, inputs, tmp_path) -> None:
         result = exporter.load(file, tmp_path)(u[:, np.newaxis], surrogate.at_rest(u[0])[np.newaxis])
         tolerance = 1e-9 if file.dtype == "float64" else 1e-3
         assert largest_difference(result.output[:, 0], surrogate.simulate(u)) <= tolerance
+
+
+def by_case_fit() -> FitResult:
+    model = build_grey(
+        "dBC/dt = 0.3*(BP - BC) + 0.01*gain*AR",
+        parameters={"gain": {"start": 0.3, "per": "case", "unit": "1/s"}},
+        initial={"BC": {"start": 12, "fixed": True}},
+    )
+    return FitResult(
+        model=replace(model, cases=("EST01", "EST02"), theta=np.array([0.3, 0.5])),
+        status=Status.CONVERGED, loop=Loop.CLOSED, train_time_s=1.0,
+        history={"iteration": np.arange(2.0), "mse": np.array([2.0, 1.0])},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["onnx", "c"])
+def test_a_parameter_by_case_is_an_input_of_every_file_or_inside_that_of_a_case(kind, inputs, tmp_path) -> None:
+    model = by_case_fit().model
+    for one, ranges in (
+        (model.with_case_inputs(), RANGES | {"gain": (0.3, 0.5)}),
+        (model.for_case("EST02"), RANGES),
+    ):
+        check_files(Surrogate.of(one, ranges), kind, inputs, tmp_path)
+
+
+def test_a_bundle_of_cases_says_what_goes_in_and_keeps_the_records_as_they_were(traces, tmp_path) -> None:
+    fit = by_case_fit()
+    named = [trace.name for trace in traces]
+    fit = replace(fit, model=replace(fit.model, cases=tuple(named), theta=np.linspace(0.3, 0.5, len(named))))
+    bundle = export_bundle(fit, traces, tmp_path / "bundle", formats=("c",))
+    gain = bundle.inputs[-1]
+    fitted = [fit.model.by_case["gain"][trace.name] for trace in traces.with_role(Role.ESTIMATION)]
+    assert (gain["name"], gain["unit"], gain["range"]) == ("gain", "1/s", [min(fitted), max(fitted)])
+    assert "constant over a record" in gain["description"]
+    assert bundle.metadata["provenance"]["data"]["sha256"] == traces.digest
+    u = traces[named[1]].columns(["BP", "AR"])
+    own = np.column_stack([u, np.full(len(u), fit.model.by_case["gain"][named[1]])])
+    np.testing.assert_array_equal(bundle.simulate(own), fit.model.for_case(named[1]).simulate(u))
+    with pytest.raises(ConfigError, match="is none of those that are fitted"):
+        export_bundle(by_case_fit(), traces, tmp_path / "other", formats=("c",))

@@ -49,6 +49,11 @@ GREY = {
     "equations": "doutlet/dt = (gain*(valve + inlet) - outlet + level)/lag",
     "parameters": {"gain": {"start": 1, "low": 0}, "level": 80, "lag": {"start": 2, "low": 0.1}},
 }
+OF_A_CASE = {"start": 80, "per": "case"}
+GREY_BY_CASE = GREY | {
+    "parameters": {**GREY["parameters"], "level": OF_A_CASE},
+    "cases": {"monday": ["run-1", "run-2", "run-3"]},
+}
 HW = {"kind": "HammersteinWiener", "states": 1, "input": ["saturation", "none"], "output": "polynomial 2"}
 WH = {"kind": "WienerHammerstein", "first": 1, "second": 1, "curve": "network 2"}
 POLYNOMIAL_NARX = {"kind": "PolynomialNARX", "input_delays": 1, "output_delays": 1, "terms": 4}
@@ -80,6 +85,7 @@ FITS = [
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
     pytest.param(GREY, {"seed": 7, "max_iterations": 12, "starts": 2}, ALONE, id="GreyBox"),
+    pytest.param(GREY_BY_CASE, {"seed": 7, "max_iterations": 6, "starts": 1}, ALONE, id="GreyBox by case"),
     pytest.param(VECTOR_GREY, {"seed": 7, "max_iterations": 12, "starts": 1}, ALONE, id="VectorGreyBox, of one"),
     pytest.param(HW, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="HammersteinWiener"),
     pytest.param(WH, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="WienerHammerstein"),
@@ -249,6 +255,12 @@ WRONG = {
         GREY | {"parameters": {"gain": 1, "level": 80}},
         None,
         "nothing says what lag is",
+        ALONE[:2],
+    ),
+    "a record of a case that is not fitted, at rest": (
+        GREY_BY_CASE | {"cases": {}},
+        None,
+        "run-2 is none of those that are fitted",
         ALONE[:2],
     ),
     "an unknown choice": (NARX, {"choose_by": "dice"}, "unknown value of choose_by", EVERYWHERE),

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.grey_box.named import Named
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import Solution
 from sysid.estimation.uncertainty import Uncertainty
-from sysid.models.grey_box import Parameter
 
 Array = NDArray[np.float64]
 
@@ -55,50 +55,51 @@ class Findings:
     """What is known of the parameters with a name where a fit ended.
 
     Args:
-        parameters: Those that were estimated.
+        named: Those that were estimated, those by case once for each case.
         values: In their units.
         covariance: In their units; NaN of those that the records leave open.
         bound: Of each the bound at which it stands; an empty text for none.
     """
 
-    parameters: tuple[Parameter, ...]
+    named: tuple[Named, ...]
     values: Array
     covariance: Array
     bound: tuple[str, ...]
 
     @classmethod
-    def of(cls, solution: Solution, provider: EquationProvider, parameters: tuple[Parameter, ...]) -> Findings:
+    def of(cls, solution: Solution, provider: EquationProvider, named: tuple[Named, ...]) -> Findings:
         """What a solution says.
 
         Args:
             solution: Where the fit ended, with its evidence.
             provider: The records.
-            parameters: Those that were estimated.
+            named: Those that were estimated.
 
         Returns:
             The findings. A parameter at a bound is taken to be there for the others' sake, and has no interval.
         """
-        n, prior = len(parameters), solution.state.prior
-        low, high = (side[:n] for side in provider.bounds)
-        theta, scale = solution.theta[:n], provider.scale[:n]
+        prior, places = solution.state.prior, np.array([one.place for one in named], dtype=np.int64)
+        low, high = (side[places] for side in provider.bounds)
+        theta, scale = solution.theta[places], provider.scale[places]
         at = ["low" if t <= a else "high" if t >= b else "" for t, a, b in zip(theta, low, high, strict=True)]
         held = np.zeros(len(solution.theta), dtype=np.bool_)
-        held[:n] = [bool(side) for side in at]
+        held[places] = [bool(side) for side in at]
         H = prior.beta * solution.at.gauss_newton + np.diag(prior.precision)
-        covariance = np.full((n, n), np.nan)
         free = np.flatnonzero(~held)
         root = np.sqrt(np.diag(H)[free])
         values, vectors = np.linalg.eigh(H[np.ix_(free, free)] / np.outer(root, root))
         half = vectors / np.sqrt(np.maximum(values, 1e-15)) / root[:, None]
-        named = free[free < n]
-        inner = (half @ half.T)[: len(named), : len(named)]
-        left = np.diag(inner) * prior.precision[named]
-        lost = (left > OPEN) & np.array([parameters[i].prior is None for i in named], dtype=np.bool_)
+        open_ = np.flatnonzero(~held[places])
+        rows = half[np.searchsorted(free, places[open_])]
+        inner = rows @ rows.T
+        left = np.diag(inner) * prior.precision[places[open_]]
+        lost = (left > OPEN) & np.array([named[i].parameter.prior is None for i in open_], dtype=np.bool_)
         inner[lost, :] = np.nan
         inner[:, lost] = np.nan
-        covariance[np.ix_(named, named)] = inner
+        covariance = np.full((len(named), len(named)), np.nan)
+        covariance[np.ix_(open_, open_)] = inner
         return cls(
-            parameters=parameters,
+            named=named,
             values=theta * scale,
             covariance=covariance * np.outer(scale, scale),
             bound=tuple(at),
@@ -113,7 +114,7 @@ class Findings:
         Returns:
             The uncertainty; a parameter's unit stands behind its name.
         """
-        names = tuple(f"{one.name} [{one.unit}]" if one.unit else one.name for one in self.parameters)
+        names = tuple(one.label for one in self.named)
         return Uncertainty(names=names, values=self.values, covariance=self.covariance, noise_variance=noise_variance)
 
     @property
@@ -122,7 +123,7 @@ class Findings:
         deviations = np.sqrt(np.diag(self.covariance))
         with np.errstate(invalid="ignore"):
             correlation = np.abs(self.covariance / np.outer(deviations, deviations))
-        named = zip(self.parameters, deviations, self.bound, strict=True)
+        named = zip(self.named, deviations, self.bound, strict=True)
         return tuple(
             one.name
             for i, (one, deviation, side) in enumerate(named)
@@ -132,7 +133,7 @@ class Findings:
     @property
     def more_than_shown(self) -> tuple[str, ...]:
         """Of equations that nobody wrote, whose parameters nobody can fix: that they hold more than records show."""
-        left, n = self.open, len(self.parameters)
+        left, n = self.open, len(self.named)
         if not left:
             return ()
         names = ", ".join(left[:MOST_NAMES]) + (", ..." if len(left) > MOST_NAMES else "")
@@ -146,14 +147,14 @@ class Findings:
     def warnings(self) -> tuple[str, ...]:
         """Parameters at a bound, that the records leave open, or that cannot be told apart."""
         told = []
-        for one, value, side in zip(self.parameters, self.values, self.bound, strict=True):
+        for one, value, side in zip(self.named, self.values, self.bound, strict=True):
             if side:
                 told.append(
                     f"The parameter {one.name} stands at its bound, {value:g}: it has no interval. Widen the bound, or "
                     "fix it there."
                 )
         deviations = np.sqrt(np.diag(self.covariance))
-        for one, deviation, side in zip(self.parameters, deviations, self.bound, strict=True):
+        for one, deviation, side in zip(self.named, deviations, self.bound, strict=True):
             if np.isnan(deviation) and not side:
                 told.append(
                     f"The records do not determine the parameter {one.name}. Fix it, give it a prior, or record "
@@ -161,9 +162,9 @@ class Findings:
                 )
         with np.errstate(invalid="ignore"):
             correlation = self.covariance / np.outer(deviations, deviations)
-        for i, one in enumerate(self.parameters):
+        for i, one in enumerate(self.named):
             for j in range(i):
-                pair, found = f"{self.parameters[j].name} and {one.name}", correlation[i, j]
+                pair, found = f"{self.named[j].name} and {one.name}", correlation[i, j]
                 told += [
                     f"The parameters {pair} can hardly be told apart (correlation {found:.4f}): the run hardly changes "
                     "where both move, and the interval of each may be too short. Fix one of them, or give it a prior."

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.grey_box.findings import with_evidence
+from sysid.estimation.grey_box.named import Named, named_of
 from sysid.estimation.grey_box.preparing import ROUNDS, SHARPER, seen_terms
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.stepping import ACCURACY, Stepping, substeps_for
 from sysid.estimation.least_squares.damping import DAMPINGS
+from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, at_minimum
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks import multistart as starts
@@ -28,6 +30,9 @@ NOISE_ROUNDS, WIDEST, ALIKE = 3, 1e4, 0.05
 """Times that outputs are weighed anew; by how much their errors may differ; and below which difference they are alike,
 as a natural logarithm."""
 
+PRIOR_ROUNDS = 10
+"""Times that declared priors are weighed anew."""
+
 SHARE_OF_ERROR, FINEST = 0.03, 1e-8
 """What a step may add to the errors that remain, as a share of them; and the least that is asked of it."""
 
@@ -43,6 +48,11 @@ class Ready:
     provider: EquationProvider
     theta: Array
     stepping: Stepping
+
+    @property
+    def named(self) -> tuple[Named, ...]:
+        """The parameters with a name, as they are trained."""
+        return named_of(self.template.grey, self.template.cases, self.template.lowered.n_weights)
 
     @property
     def to_plain(self) -> Array:
@@ -99,6 +109,8 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stop
     softened = float("nan")
     if provider.form.n_outputs > 1 and not stopped:
         provider, solution = _weighed(provider, solution, training)
+    if any(one.parameter.prior is not None for one in ready.named) and training.regularisation is None and not stopped:
+        solution = _balanced(provider, solution, training)
     if provider.form.lowered.switches and not stopped:
         provider, solution, softened = _sharpened(provider, solution, training)
     exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
@@ -138,6 +150,17 @@ def _weighed(provider: EquationProvider, solution: Solution, training: Training)
         provider = replace(provider, noise=noise)
         solution = _gone_on(provider, solution, training)
     return provider, solution
+
+
+def _balanced(provider: EquationProvider, solution: Solution, training: Training) -> Solution:
+    """Declared priors weighed against the noise that is left: a fit may converge before its evidence has spoken."""
+    for _ in range(PRIOR_ROUNDS):
+        state, before = solution.state, solution.at.loss
+        prior, _ = update(state.prior, state.theta, state.at, provider.n_samples)
+        solution = _gone_on(provider, replace(solution, state=replace(state, prior=prior)), training)
+        if not solution.at.loss < (1.0 - ALIKE) * before:  # what is left says what the noise is
+            break
+    return solution
 
 
 def _accuracy(solution: Solution, provider: EquationProvider) -> float:

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from sysid.equations import ROSENBROCK, RUNGE_KUTTA, Lowered
 from sysid.errors import TraceError
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
+from sysid.estimation.grey_box.by_case import case_notes, with_cases
 from sysid.estimation.grey_box.findings import Findings
 from sysid.estimation.grey_box.finishing import Done, Ready, finished, settled
 from sysid.estimation.grey_box.layout import EquationLayout
+from sysid.estimation.grey_box.named import Named, named_of
 from sysid.estimation.grey_box.preparing import (
     WINDOW,
     first_terms,
@@ -227,12 +229,14 @@ def fit_equations(
     began = time.perf_counter() if began is None else began
     training = (training or Training()).with_starts(STARTS)
     check_training(training)
+    template = with_cases(template, experiments, data[1], data[2])
     ready = _ready(template, experiments)
     starts.check_samples(ready.provider)
     multistart = starts.Multistart(
         training=training,
         layout=EquationLayout(
-            parameters=template.grey.free,
+            named=ready.named,
+            first_weight=len(template.grey.free),
             nets=ready.template.lowered.nets,
             provider=ready.provider,
             begun=ready.theta,
@@ -258,7 +262,7 @@ def fit_equations(
     status = multistart_status(done.candidate, candidates, records, interrupted=multistart.stop.is_set())
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
     found = multistart_result(choice, candidates, training, status, seconds)
-    return _told(found, done, data)
+    return _told(found, done, data, ready.named)
 
 
 def _chosen_by(training: Training, ready: Ready) -> str:
@@ -289,17 +293,22 @@ def _ready(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence[Ex
     """Levels, ranges and a step, from the records at the declared start."""
     grey, form = template.grey, template.recursion
     n_weights = template.lowered.n_weights
+    named = named_of(grey, template.cases, n_weights)
     records = tuple(Record.of(experiment, form) for experiment in experiments)
     means = np.array([np.mean([np.mean(record.output[:, j]) for record in records]) for j in range(form.n_outputs)])
-    limits = np.array([[one.low, one.high] for one in grey.free] + [[-np.inf, np.inf]] * n_weights).reshape(-1, 2).T
+    places = np.array([one.place for one in named], dtype=np.int64)
+    limits = np.array([[-np.inf, np.inf]] * len(template.theta)).reshape(-1, 2).T
+    limits[:, places] = np.array([[one.parameter.low, one.parameter.high] for one in named]).reshape(-1, 2).T
+    scale = np.ones(len(template.theta))
+    scale[places] = [one.parameter.scale for one in named]
     provider = EquationProvider(
         form=first_terms(form, template.mapping.outputs, means),
         records=records,
-        scale=np.array([*(one.scale for one in grey.free), *[1.0] * n_weights]),
+        scale=scale,
         limits=limits,
     )
     theta = np.zeros(provider.n_parameters)
-    theta[: len(grey.free)] = template.theta[: len(grey.free)] / provider.scale[: len(grey.free)]
+    theta[places] = template.theta[places] / scale[places]
     provider, theta, stepping = _stepping(template, provider, theta)
     seen, begun = seen_terms(provider, theta)
     provider = provider.with_form(seen)
@@ -361,14 +370,17 @@ def _implicit(template: GreyBoxModel | VectorGreyBoxModel) -> Lowered:
     return replace(template, solver=ROSENBROCK).lowered
 
 
-def _told(found: FitResult, done: Done, data: tuple[Sequence[Trace], Sequence[Trace], Start]) -> FitResult:
+def _told(
+    found: FitResult, done: Done, data: tuple[Sequence[Trace], Sequence[Trace], Start], named: tuple[Named, ...]
+) -> FitResult:
     """The result with what is known of its parameters, and what was chosen on the way."""
     model, solution = done.model, done.candidate.solution
     posterior = _posterior(done, *data)
-    findings = Findings.of(solution, done.provider, model.grey.free)
+    findings = Findings.of(solution, done.provider, named)
     n = max(done.provider.n_samples - model.n_parameters, 1)
     variance = 2.0 * solution.at.loss / n * model.scaling.error_unit
     notes = [step_note(model, done.stepping)] if model.lowered.n_continuous else []
+    notes += case_notes(model, data[0])
     unread = [one for i, one in enumerate(model.mapping.inputs) if i not in {i for i, _ in model.lowered.lagged}]
     notes += [f"The equations do not read {', '.join(unread)}."] if unread else []
     switches = sum(not one.root for one in model.lowered.switches)

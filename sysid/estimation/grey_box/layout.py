@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.equations import Net
+from sysid.estimation.grey_box.named import Named
 from sysid.estimation.grey_box.preparing import WINDOW
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.networks.initialise import AbstractLayout
-from sysid.models.grey_box import Parameter
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,8 @@ class EquationLayout(AbstractLayout):
     """Where the parameters of one fit stand, and where they start.
 
     Args:
-        parameters: Those that are estimated.
+        named: The parameters, those by case once for each case.
+        first_weight: Where the networks' weights begin.
         nets: The networks.
         provider: The records.
         begun: What is trained where the fit starts: declared starts, networks that do nothing, and initial states.
@@ -43,16 +44,13 @@ class EquationLayout(AbstractLayout):
         scattered: Names of the parameters around which the starts after these are drawn; ``None`` for all.
     """
 
-    parameters: tuple[Parameter, ...]
+    named: tuple[Named, ...]
+    first_weight: int
     nets: tuple[Net, ...]
     provider: EquationProvider
     begun: Array
     others: tuple[Array, ...] = ()
     scattered: frozenset[str] | None = None
-
-    @property
-    def _first_weight(self) -> int:
-        return len(self.parameters)
 
     def centre(self) -> Array:
         """What the prior draws the model's parameters to: the declared starts, and networks that do nothing."""
@@ -71,14 +69,15 @@ class EquationLayout(AbstractLayout):
             The prior: what is declared of a parameter is known, of the others and of initial states nothing is, and
             the networks' weights are the evidence's.
         """
-        scale, p, w = self.provider.scale, len(self.provider.scale), self._first_weight
-        vague = [i for i, one in enumerate(self.parameters) if one.prior is None]
+        scale, p, w = self.provider.scale, len(self.provider.scale), self.first_weight
+        vague = [one.place for one in self.named if one.parameter.prior is None]
         entries: list[tuple[str, NDArray[np.int64], bool, float]] = [
             ("parameters", np.array(vague, dtype=np.int64), True, FLAT_ALPHA)
         ]
-        for i, one in enumerate(self.parameters):
-            if one.prior is not None:
-                entries.append((one.name, np.array([i]), True, float(scale[i] / one.prior) ** 2))
+        for one in self.named:
+            if one.parameter.prior is not None:
+                at, known = one.place, one.parameter.prior
+                entries.append((one.name, np.array([at]), True, float(scale[at] / known) ** 2))
         for number, net in enumerate(self.nets, start=1):
             hidden = w + np.arange(net.hidden.start, net.hidden.stop).reshape(net.neurons, -1)
             parts = {f"hidden {j}": hidden[:, j] for j in range(net.arguments + 1)}
@@ -105,7 +104,7 @@ class EquationLayout(AbstractLayout):
         Returns:
             What is trained.
         """
-        theta, w = centre.copy(), self._first_weight
+        theta, w = centre.copy(), self.first_weight
         for net in self.nets:
             k, n = net.neurons, net.arguments
             directions = rng.uniform(-1.0, 1.0, (k, n))
@@ -132,7 +131,7 @@ class EquationLayout(AbstractLayout):
         if number == 0:
             return begun, self.begun
         if number <= len(self.others):
-            w = self._first_weight
+            w = self.first_weight
             begun[:w] = self.others[number - 1] / self.provider.scale[:w]
             begun = self.provider.with_states(begun, self.provider.states(begun, WINDOW))
             return begun, begun
@@ -146,8 +145,11 @@ class EquationLayout(AbstractLayout):
     def _scattered(self, theta: Array, rng: np.random.Generator) -> Array:
         """Parameters around the declared ones, within their bounds."""
         moved, (low, high) = theta.copy(), self.provider.bounds
-        for i, one in enumerate(self.parameters):
-            z = APART * rng.standard_normal()
+        drawn: dict[str, float] = {}  # the cases begin alike: none is known to differ from the others
+        for entry in self.named:
+            one, i = entry.parameter, entry.place
+            z = drawn[one.name] if one.name in drawn else APART * rng.standard_normal()
+            drawn[one.name] = z
             if self.scattered is not None and one.name not in self.scattered:
                 continue
             if one.prior is not None:

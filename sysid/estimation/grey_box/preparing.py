@@ -60,7 +60,8 @@ def seen_terms(provider: EquationProvider, theta: Array) -> tuple[EquationForm, 
         The form with these, its parameters being those given, and the state before each record.
     """
     form = provider.at(theta)
-    begun = [provider.begin(form, theta, i) for i in range(len(provider.records))]
+    each = [provider.of_record(form, theta, i) for i in range(len(provider.records))]
+    begun = [provider.begin(one, theta, i) for i, one in enumerate(each)]
     paths = [path[np.isfinite(path).all(axis=1)] for _, path in provider.paths(theta)]
     whole = np.concatenate(paths) if paths else np.zeros((0, form.lowered.n_states))
     if not len(whole):
@@ -131,10 +132,11 @@ def _net_scale(form: EquationForm, provider: EquationProvider, theta: Array, pla
     """What a network has to give to move the output by its range."""
     squares, n = 0.0, 0
     for i, record in enumerate(provider.records):
-        x = provider.begin(form, theta, i)
+        own = provider.of_record(form, theta, i)
+        x = provider.begin(own, theta, i)
         S = np.zeros((len(x), place + 1))
         with np.errstate(over="ignore", invalid="ignore"):  # an unstable start has none
-            _, J = form.moved(record.u[:STEPPED], x, S, place + 1)
+            _, J = own.moved(record.u[:STEPPED], x, S, place + 1)
             moves = (J[:, :, place] / form.output_scale).ravel()
         moves = moves[np.isfinite(moves)]
         squares, n = squares + float(moves @ moves), n + len(moves)

@@ -29,6 +29,7 @@ class Record:
         roots: Roots of the weights, shape ``(n_samples,)``; ``None`` for all ones.
         rest: What the programs read and the outputs of a system that has stood before the record.
         free: Whether its initial state is estimated; otherwise it is at rest.
+        name: Of the record.
     """
 
     u: Array
@@ -36,6 +37,7 @@ class Record:
     roots: Array | None
     rest: tuple[Array, Array]
     free: bool
+    name: str = ""
 
     @classmethod
     def of(cls, experiment: Experiment, form: EquationForm) -> Record:
@@ -66,6 +68,7 @@ class Record:
                 np.atleast_1d(history.output[0]),
             ),
             free=first.free and not stood,
+            name=history.case,
         )
 
     @property
@@ -86,14 +89,15 @@ class Record:
 class EquationProvider(AbstractProvider):
     """Residuals of an :class:`EquationForm` in free run, over the outputs' scales.
 
-    What is trained is ``[parameters and weights over their scales | initial states, less their levels, over theirs]``,
-    initial states of those records that nothing is declared of.
+    What is trained is ``[parameters and weights over their scales | parameters by case of the second case, of the
+    third, ... over theirs | initial states, less their levels, over theirs]``, initial states of those records that
+    nothing is declared of. The first case's parameters stand among the others.
 
     Args:
         form: Programs, scaling and what is known of the states; its first parameters are ignored.
         records: The records.
-        scale: Of each parameter and weight, in its unit, shape ``(p,)``.
-        limits: Least and greatest of each, in its unit, shape ``(2, p)``.
+        scale: Of each parameter and weight, those of further cases included, in its unit, shape ``(q,)``.
+        limits: Least and greatest of each, in its unit, shape ``(2, q)``.
         noise: How much of each output is left, relative to the others: what its residuals count over.
     """
 
@@ -125,8 +129,9 @@ class EquationProvider(AbstractProvider):
         Returns:
             Shape ``(n_outputs,)``.
         """
-        form, total = self.at(theta), np.zeros(self.form.n_outputs)
+        shared, total = self.at(theta), np.zeros(self.form.n_outputs)
         for i, record in enumerate(self.records):
+            form = self.of_record(shared, theta, i)
             error = record.errors(form.run(record.u, self.begin(form, theta, i)), form.output_scale)
             total += np.sum(error**2, axis=0)
         return np.sqrt(total * form.n_outputs / max(self.n_samples, 1))
@@ -156,8 +161,18 @@ class EquationProvider(AbstractProvider):
         at = len(self.scale) + self._free.index(record) * n
         return slice(at, at + n)
 
+    @property
+    def n_of_form(self) -> int:
+        """Parameters and weights of the form, each once."""
+        return self.form.lowered.n_estimated
+
+    def columns(self, number: int) -> NDArray[np.int64]:
+        """Where the parameters and weights of a record stand in what is trained, shape ``(p,)``."""
+        cases, p = self.form.cases, self.n_of_form
+        return np.arange(p) if cases is None else cases.columns(self.records[number].name, p)
+
     def at(self, theta: Array) -> EquationForm:
-        """The form with these parameters.
+        """The form with these parameters, those by case being the first case's.
 
         Args:
             theta: What is trained.
@@ -165,7 +180,24 @@ class EquationProvider(AbstractProvider):
         Returns:
             The form.
         """
-        return self.form.with_theta(theta[: len(self.scale)] * self.scale)
+        p = self.n_of_form
+        return self.form.with_theta(theta[:p] * self.scale[:p])
+
+    def of_record(self, form: EquationForm, theta: Array, number: int) -> EquationForm:
+        """A form with the parameters by case that a record has.
+
+        Args:
+            form: Any with the parameters that all share.
+            theta: What is trained.
+            number: Which record.
+
+        Returns:
+            The form; as it is where nothing differs by case.
+        """
+        if form.cases is None:
+            return form
+        places = self.columns(number)[form.cases.places]
+        return form.with_constants(theta[places] * self.scale[places])
 
     def with_states(self, theta: Array, states: Sequence[Array]) -> Array:
         """The same parameters with other initial states.
@@ -187,7 +219,7 @@ class EquationProvider(AbstractProvider):
         """The state before a record.
 
         Args:
-            form: With the parameters.
+            form: With the parameters, those by case being the record's.
             theta: What is trained.
             number: Which record.
 
@@ -204,9 +236,10 @@ class EquationProvider(AbstractProvider):
 
     def loss(self, theta: Array) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
-        form, total = self.at(theta), 0.0
+        shared, total = self.at(theta), 0.0
         with np.errstate(over="ignore", invalid="ignore"):  # a free run that explodes has no loss
             for i, record in enumerate(self.records):
+                form = self.of_record(shared, theta, i)
                 error = record.errors(form.run(record.u, self.begin(form, theta, i)), self.unit)
                 total += 0.5 * float(np.vdot(error, error))
         return total if np.isfinite(total) else np.inf
@@ -236,16 +269,16 @@ class EquationProvider(AbstractProvider):
 
     def _blocks(self, theta: Array, number: int) -> Iterator[tuple[Array, Array, NDArray[np.int64]]]:
         """Weighted errors and their derivatives by some of what is trained, and which."""
-        form, record, p = self.at(theta), self.records[number], len(self.scale)
+        form, record, p = self.of_record(self.at(theta), theta, number), self.records[number], self.n_of_form
         if record.free:
             free = self.open_states
             x, S = self.begin(form, theta, number), np.zeros((form.lowered.n_states, p + len(free)))
             S[free, p + np.arange(len(free))] = form.terms.scale[free]
-            places = np.concatenate([np.arange(p), np.arange(p + len(theta))[self.places(number)]])
+            places = np.concatenate([self.columns(number), np.arange(len(theta))[self.places(number)]])
         else:
             x, S = form.resting_moves(*record.rest, p)
-            places = np.arange(p)
-        scale = np.concatenate([self.scale, np.ones(S.shape[1] - p)])
+            places = self.columns(number)
+        scale = np.concatenate([self.scale[places[:p]], np.ones(S.shape[1] - p)])
         for first in range(0, len(record.output), BLOCK):
             rows = slice(first, min(first + BLOCK, len(record.output)))
             y, J = form.moved(record.u[rows], x, S, p)
@@ -264,9 +297,9 @@ class EquationProvider(AbstractProvider):
         Returns:
             One pair for each record.
         """
-        form = self.at(theta)
-        found = []
+        shared, found = self.at(theta), []
         for i, record in enumerate(self.records):
+            form = self.of_record(shared, theta, i)
             path = np.empty((len(record.u), form.lowered.n_states))
             form.run(record.u, self.begin(form, theta, i), path)
             found.append((record.u, path))
@@ -282,9 +315,9 @@ class EquationProvider(AbstractProvider):
         Returns:
             One for each record, in units; at rest for those that are.
         """
-        form = self.at(theta)
-        found = []
-        for record in self.records:
+        shared, found = self.at(theta), []
+        for i, record in enumerate(self.records):
+            form = self.of_record(shared, theta, i)
             x = form.resting(*record.rest)
             if record.free:
                 known = record.known[:samples]

@@ -91,8 +91,8 @@ def _runs(provider: EquationProvider, theta: Array, form: EquationForm) -> list[
     found = []
     with np.errstate(over="ignore", invalid="ignore"):  # a step that is too long explodes
         for i, record in enumerate(provider.records):
-            x = provider.begin(form, theta, i)
-            found.append(form.run(record.u[:STEPPED], x) / form.output_scale)
+            own = provider.of_record(form, theta, i)
+            found.append(own.run(record.u[:STEPPED], provider.begin(own, theta, i)) / form.output_scale)
     return found
 
 
@@ -108,23 +108,26 @@ def explicit_steps(provider: EquationProvider, theta: Array) -> float:
     """
     form, fastest = provider.at(theta), 0.0
     n = form.lowered.n_continuous
-    for x, u in _places(provider, form, theta) if n else ():
-        J = form.rates_by_state(x, u)[:, :n]
+    for own, x, u in _places(provider, form, theta) if n else ():
+        J = own.rates_by_state(x, u)[:, :n]
         if np.isfinite(J).all():
             fastest = max(fastest, float(np.abs(np.linalg.eigvals(J)).max()))
     return fastest * form.sample_time / REACH
 
 
-def _places(provider: EquationProvider, form: EquationForm, theta: Array) -> Iterator[tuple[Array, Array]]:
+def _places(
+    provider: EquationProvider, shared: EquationForm, theta: Array
+) -> Iterator[tuple[EquationForm, Array, Array]]:
     for i, record in enumerate(provider.records):
+        form = provider.of_record(shared, theta, i)
         begun, path = provider.begin(form, theta, i), np.empty((min(len(record.u), STEPPED), form.lowered.n_states))
         with np.errstate(over="ignore", invalid="ignore"):  # a step that is too long explodes
             form.run(record.u[: len(path)], begun.copy(), path)
-        yield begun, record.u[0]
-        yield form.resting(*record.rest), record.rest[0]
+        yield form, begun, record.u[0]
+        yield form, form.resting(*record.rest), record.rest[0]
         for t in np.unique(np.linspace(0, len(path) - 1, LOOKED_AT).astype(int)):
             if np.isfinite(path[t]).all():
-                yield path[t], record.u[t]
+                yield form, path[t], record.u[t]
 
 
 def solver_for(

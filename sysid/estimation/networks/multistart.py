@@ -419,7 +419,7 @@ def score(multistart: Multistart, model: Network) -> float:
     errors, unit = [], model.scaling.error_unit / np.square(model.scaling.output_scale)
     for trace in multistart.selection:
         inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-        begun = beginning(model, inputs, target, multistart.start, trace.usable_samples)
+        begun = beginning(model, inputs, target, multistart.start, trace.usable_samples, case=trace.name)
         n, history = begun.first, begun.history
         if multistart.training.loop is Loop.CLOSED:
             output = model.simulate(inputs[n:], history)

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import islice
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
@@ -235,16 +235,19 @@ def _says_nothing(
 def _runs(
     model: AbstractModel | Run, sequences: Iterable[InputSequence]
 ) -> Iterator[tuple[InputSequence, NDArray[np.float64]]]:
-    """Each sequence with the run over it, in order; a model's kernels leave the interpreter to a second thread."""
+    """Each sequence with the run over it, in order; a model's kernels leave the interpreter to a second thread.
+
+    Where parameters differ by case, the sequences are dealt out to the cases.
+    """
     if not isinstance(model, AbstractModel):
         yield from ((sequence, model(sequence)) for sequence in sequences)
         return
-    several = model.structure.several_outputs
+    several, dealt = model.structure.several_outputs, model.variants
 
-    def run(one: InputSequence) -> NDArray[np.float64]:
-        return model.simulate(one.inputs, one.history(several=several))
+    def run(one: InputSequence, variant: AbstractModel) -> NDArray[np.float64]:
+        return variant.simulate(one.inputs, one.history(several=several))
 
-    waiting = iter(sequences)
+    waiting, turns = iter(sequences), cycle(dealt)
     with ThreadPoolExecutor(2) as pool:
         while some := list(islice(waiting, AT_ONCE)):
-            yield from zip(some, pool.map(run, some), strict=True)
+            yield from zip(some, pool.map(run, some, islice(turns, len(some))), strict=True)

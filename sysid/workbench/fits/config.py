@@ -89,6 +89,7 @@ class ExportConfig(BaseModel):
         formats: File formats; by default ONNX and C, as far as they can be written here.
         tolerance: Largest difference allowed between a file and its model, in the output's unit.
         run_times: Whether every file is timed beside the model's own free run; some seconds a format.
+        case: Of parameters that differ by case, the case whose values the files have; by default they are inputs.
     """
 
     model_config = STRICT
@@ -97,6 +98,7 @@ class ExportConfig(BaseModel):
     formats: tuple[FormatField, ...] | None = None
     tolerance: float = Field(default=1e-9, gt=0.0)
     run_times: bool = False
+    case: str | None = None
 
 
 class ReportConfig(BaseModel):
@@ -199,6 +201,20 @@ class PipelineConfig(BaseModel):
                 got=", ".join(strangers),
                 remedy=f"write rest: {{{outputs[0]}: 0}}; inputs rest at their first sample",
             )
+        return self
+
+    @model_validator(mode="after")
+    def _check_case(self) -> PipelineConfig:
+        case = None if self.export is None else self.export.case
+        asked = [fit for fit in self.fits if self.export and self.export.fit in {"best", fit.name}]
+        for fit in asked if case is not None else ():
+            if not fit.structure.names_records:
+                raise FieldError(
+                    f"export names the case {case!r}, and no parameter of {fit.name} differs by case",
+                    expected="a fit of equations with a parameter that is per: case",
+                    got=fit.structure.label,
+                    remedy="remove case, or export such a fit",
+                )
         return self
 
     @model_validator(mode="after")

@@ -112,6 +112,7 @@ def read_scores(folder: Path) -> Scores:
             by_state={state: (Figures.from_dict(one), float(one["share"])) for state, one in fields["by_state"].items()}
             if "by_state" in fields
             else None,
+            constants=fields.get("constants", {}),
             **{signal: np.asarray(arrays[f"{name}/{signal}"], dtype=np.float64) for signal in SIGNALS},
         )
         for name, fields in stored["cases"].items()

@@ -20,6 +20,7 @@ from sysid.code_digest import code_digest
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
 from sysid.estimation.estimators import estimator_of
+from sysid.estimation.grey_box.by_case import for_case
 from sysid.export.exporters import wanted_formats
 from sysid.models import AbstractStructure, Cascade
 from sysid.traces import Role
@@ -100,6 +101,8 @@ def fit_key(fit: FitConfig, config: PipelineConfig, data: Data, initial: str | N
         "stability": None if row.stability.by_poles else config.stability.options(data.sequences).terms,
         "code": fit_code(fit.structure),
     }
+    if fit.structure.names_records:  # of which digests know nothing
+        terms["records"] = [trace.name for trace in (*data.estimation, *data.selection)]
     return digest(_plain(terms | _common(config)))
 
 
@@ -139,6 +142,7 @@ def fit_traces(
     Raises:
         ConfigError: If what is asked does not go together.
     """
+    fit.structure.check_records([trace.name for trace in data.estimation], data.traces.names, config.start)
     return estimators.fit(
         data.estimation,
         config.mapping,
@@ -335,7 +339,9 @@ def export(
     if config.export is None:
         raise ConfigError("the pipeline exports nothing", where=config.name, remedy="add export: {fit: best}")
     figures = {output: one.evaluation for output, one in scores.items()}
-    several = len(fits) > 1
+    several, case = len(fits) > 1, config.export.case
+    if case is not None:
+        fits = [for_case(fit, case) for fit in fits]
     return export_bundle(
         Cascade(models=tuple(fit.model for fit in fits)) if several else fits[0],
         data.traces,

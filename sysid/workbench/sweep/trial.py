@@ -311,7 +311,7 @@ def _case(
     seconds = 0.0
     for model in models:
         inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-        begun = beginning(model, inputs, target, start, trace.usable_samples)
+        begun = beginning(model, inputs, target, start, trace.usable_samples, case=trace.name)
         history, n = begun.history, begun.first
         inputs, target, counted = inputs[n:], target[n:], trace.usable_samples[n:]
         runs = {"free_run_mse": model.simulate(inputs, history), "one_step_mse": np.full(target.shape, np.nan)}
