@@ -237,6 +237,10 @@ class Trace:
     def __len__(self) -> int:
         return len(self.values)
 
+    def __repr__(self) -> str:
+        channels = ", ".join(channel.label for channel in self.channels)
+        return f"<Trace {self.name}: {len(self):,} samples of {self.sample_time:g} s; {channels}>"
+
     def __getitem__(self, channel: str) -> NDArray[np.float64]:
         return self.values[:, self.index(channel)]
 
@@ -382,6 +386,12 @@ class TraceSet:
 
     def __len__(self) -> int:
         return len(self.traces)
+
+    def __repr__(self) -> str:
+        first, samples = self.traces[0], sum(map(len, self.traces))
+        roles = ", ".join(f"{len(ours)} {role.value}" for role in Role if (ours := self.with_role(role)))
+        channels = ", ".join(channel.label for channel in first.channels)
+        return f"<TraceSet {self.name}: {roles}; {samples:,} samples of {first.sample_time:g} s; {channels}>"
 
     def __iter__(self) -> Iterator[Trace]:
         return iter(self.traces)

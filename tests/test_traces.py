@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import TraceError
-from sysid.traces import Channel, Trace, TraceSet
+from sysid.traces import Channel, Role, Trace, TraceSet
 
 TRACE = Trace(name="EST01", sample_time=0.1, channels=(Channel(name="BP", unit="psi"),), values=np.zeros((5, 1)))
 
@@ -54,3 +54,13 @@ def test_values_whose_squares_are_no_numbers_are_refused(size: float) -> None:
     assert "power of ten" in refused.value.remedy
     some = np.array([[0.0], [1e-300], [1e99]])
     Trace(name="a", sample_time=0.1, channels=TRACE.channels, values=some).check_sizes([name])
+
+
+def test_traces_are_shown_in_a_line_however_long_they_are() -> None:
+    traces = [
+        Trace(name=name, sample_time=0.1, channels=(Channel(name="u", unit="V"),), values=np.zeros((2000, 1)))
+        for name in "ab"
+    ]
+    known = TraceSet(name="rig", traces=tuple(traces), roles={"a": Role.ESTIMATION})
+    assert repr(known) == "<TraceSet rig: 1 estimation, 1 validation; 4,000 samples of 0.1 s; u [V]>"
+    assert repr(traces[0]) == "<Trace a: 2,000 samples of 0.1 s; u [V]>"

@@ -11,7 +11,7 @@ import numpy as np
 from sysid.api.several import Several
 from sysid.estimation import FitResult
 from sysid.extras import need
-from sysid.models import Start, StartKind
+from sysid.models import Start, StartKind, StartLike
 from sysid.traces import TraceSet
 from sysid.validation import Evaluation, evaluate_outputs
 from sysid.validation.metrics import percent
@@ -106,19 +106,20 @@ class Comparison:
         return comparison_figure(list(panels.values()))
 
 
-def compare(traces: TraceSet, *fits: FitResult | Several, start: Start = ESTIMATED) -> Comparison:
+def compare(traces: TraceSet, *fits: FitResult | Several, start: StartLike = ESTIMATED) -> Comparison:
     """Run fitted models over every case: fed with nothing but inputs and their own past output.
 
     Args:
         traces: The cases; those for validation count.
         fits: What is compared; a fit of several outputs has a row for each.
-        start: How each free run begins, and from which sample on it is scored.
+        start: How each free run begins, and from which sample on it is scored, as for :func:`~sysid.fit`.
 
     Returns:
         The figures; printing them shows a table, ``plot()`` draws them.
     """
     evaluations: dict[str, Evaluation] = {}
     outputs: dict[str, tuple[str, str]] = {}
+    start = Start.of(start)
     for fit in fits:
         members = [fit] if isinstance(fit, FitResult) else list(fit.fits.values())
         several = len(members) > 1 or len(members[0].model.mapping.outputs) > 1

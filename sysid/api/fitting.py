@@ -12,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
 from sysid.ingest import READERS, load_dataset, read_trace
-from sysid.models import AbstractStructure, Mapping, Start
+from sysid.models import AbstractStructure, Mapping, Start, StartLike
 from sysid.traces import Role, TraceSet
 
 
@@ -60,7 +60,7 @@ def fit(
     structure: AbstractStructure,
     training: Options | None = None,
     *,
-    start: Start = ESTIMATED,
+    start: StartLike = ESTIMATED,
     rest_output: float | Dict[str, float] | None = None,
     initial: FitResult | None = None,
     stability: StabilityOptions = StabilityOptions(),  # noqa: B008 - frozen
@@ -75,7 +75,8 @@ def fit(
             ``{"inputs": ["P+"], "output": "V->C"}``, names may hold anything.
         structure: What is fitted.
         training: How a network is trained, or a transfer function; an ARX model has nothing to choose.
-        start: How each free run begins.
+        start: How each free run begins: ``"estimated"``, ``"rest"``, ``"first-sample"``, ``{"measured": 50}`` after 50
+            measured samples, or a :class:`~sysid.Start`.
         rest_output: The output's value at rest, in its unit, or by name of several; needed where ``start`` is rest.
         initial: A fit to begin with: of the same network, whose loop is to be closed, of a smaller one, or of an ARX
             model over its lags.
@@ -90,7 +91,7 @@ def fit(
             apply to it.
         ChannelError: If a channel of the mapping is missing.
     """
-    mapped = Mapping.of(mapping)
+    mapped, start = Mapping.of(mapping), Start.of(start)
     structure = structure.for_outputs(len(mapped.outputs))
     chosen = structure.mappings(mapped)
     estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)

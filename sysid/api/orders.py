@@ -17,7 +17,7 @@ from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
 from sysid.extras import need
-from sysid.models import ARX, Mapping, Start
+from sysid.models import ARX, Mapping, Start, StartLike
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.metrics import percent
 from sysid.validation.order_finalists import Finalist, run_finalists
@@ -197,7 +197,7 @@ def search_orders(
     max_na: int | None = None,
     max_nb: int | None = None,
     max_nk: int | None = None,
-    start: Start = ESTIMATED,
+    start: StartLike = ESTIMATED,
     structures: Sequence[str] = (ARX_KIND,),
     most: int = MOST,
     selection: Sequence[Trace] | None = None,
@@ -238,7 +238,7 @@ def search_orders(
         >>> sysid.search_orders(sysid.data((u, y), sample_time=1.0, split=0.6), "u -> y").best("BIC").label
         'ARX [2; 1; 3]'
     """
-    chosen = Mapping.of(mapping)
+    chosen, start = Mapping.of(mapping), Start.of(start)
     chosen.check_single("an order search")
     estimation = traces.with_role(Role.ESTIMATION)
     if not estimation:

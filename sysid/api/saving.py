@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sysid.api.several import Several
 from sysid.estimation import FitResult
-from sysid.models import Start
+from sysid.models import Start, StartLike
 from sysid.traces import TraceSet
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ def save(
     folder: str | Path,
     *,
     formats: tuple[str, ...] | None = None,
-    start: Start | None = None,
+    start: StartLike | None = None,
 ) -> Bundle:
     """Write a fit as files that run elsewhere, each checked against its model on every case before it is published.
 
@@ -43,7 +43,7 @@ def save(
     if not isinstance(fit, FitResult):
         fits = {str(one.model.mapping): one for one in fit.fits.values()}
         return export_bundle(fit.model, traces, Path(folder), outputs=fit.outputs, formats=formats, fits=dict(fits))
-    begun = start or getattr(fit, "start", Start())
+    begun = getattr(fit, "start", Start()) if start is None else Start.of(start)
     return export_bundle(fit, traces, Path(folder), start=begun, formats=formats)
 
 

@@ -14,7 +14,7 @@ from sysid.models.equation_form import EquationForm
 from sysid.models.form import AbstractForm
 from sysid.models.grey_box import GreyBox, InitialState, Parameter, VectorGreyBox
 from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
-from sysid.models.history import History, Start, StartKind
+from sysid.models.history import History, Start, StartKind, StartLike
 from sysid.models.innovations import Innovations
 from sysid.models.interpolation import Interpolation
 from sysid.models.lags import Lagged, Lags
@@ -90,6 +90,7 @@ __all__ = [
     "SeveralOutputs",
     "Start",
     "StartKind",
+    "StartLike",
     "StateSpace",
     "TransferFunction",
     "TransferFunctionModel",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError
+from sysid.errors import ConfigError, TraceError, shortened
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -136,6 +137,46 @@ class Start:
                 remedy="write start: estimated, start: rest, start: first-sample, or start: {measured: 50}",
             )
 
+    @classmethod
+    def of(cls, value: object) -> Start:
+        """A start as people write it.
+
+        Args:
+            value: A start, or ``"estimated"``, ``"rest"``, ``"first-sample"``, ``{"measured": 50}`` or
+                ``"measured=50"``.
+
+        Returns:
+            The start.
+
+        Raises:
+            ConfigError: If it is none.
+
+        Example:
+            >>> Start.of("measured=50") == Start.of({"measured": 50})
+            True
+        """
+        if isinstance(value, Start):
+            return value
+        found: object = value
+        if isinstance(found, str):
+            word, equals, number = found.partition("=")
+            found = {word: int(number)} if equals and number.strip().isdecimal() else word
+        try:
+            if isinstance(found, str) and found != StartKind.MEASURED.value:
+                return cls(kind=StartKind(found))
+            if isinstance(found, Mapping) and len(found) == 1 and set(found) <= {"measured", "estimated"}:
+                ((kind, n),) = found.items()
+                if type(n) is int:
+                    return cls(kind=StartKind(kind), n_measured=n)
+        except ValueError:
+            pass
+        raise ConfigError(
+            "not a way to start a free run",
+            expected="estimated, rest, first-sample, or {measured: 50} for 50 measured samples",
+            got=shortened(value),
+            remedy="choose one of the four, or leave start out: it is then estimated",
+        )
+
     def history(
         self,
         inputs: NDArray[np.float64],
@@ -172,3 +213,7 @@ class Start:
                 remedy="use fewer measured samples, or a longer record",
             )
         return History(inputs=inputs[: self.n_measured], output=output[: self.n_measured])
+
+
+StartLike = Start | str | Mapping[str, int]
+"""What :meth:`Start.of` takes."""

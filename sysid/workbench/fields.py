@@ -22,7 +22,7 @@ from sysid.estimation import (
 from sysid.estimation.estimator import Estimator
 from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.export.exporters import EXPORTERS
-from sysid.models import AbstractStructure, Mapping, Start, StartKind, structure_from_dict
+from sysid.models import AbstractStructure, Mapping, Start, structure_from_dict
 from sysid.models.lags import LagSpec, parse_lags
 from sysid.workbench.old_words import JOINT_TRAINING, STRICT, TRAINING, TRAINING_VALUES, Words, with_new_words
 from sysid.yaml_files import FieldError
@@ -166,25 +166,10 @@ def _structure_schema() -> dict[str, Any]:
 
 def _start(value: object) -> Start:
     """How a free run starts: a word, or ``{measured: n}``."""
-    if isinstance(value, Start):
-        return value
     try:
-        if isinstance(value, str) and value != StartKind.MEASURED.value:
-            return Start(kind=StartKind(value))
-        if isinstance(value, Dict) and len(value) == 1 and set(value) <= {"measured", "estimated"}:
-            ((kind, n),) = value.items()
-            if type(n) is int:
-                return Start(kind=StartKind(kind), n_measured=n)
+        return Start.of(value)
     except ConfigError as error:
         raise as_field_error(error) from error
-    except ValueError:
-        pass
-    raise FieldError(
-        "not a way to start a free run",
-        expected="estimated, rest, first-sample, or {measured: 50} for 50 measured samples",
-        got=shortened(value),
-        remedy="choose one of the four, or leave start out: it is then estimated",
-    )
 
 
 def _start_text(start: Start) -> str | dict[str, int]:

@@ -69,3 +69,12 @@ def test_without_a_trace_to_fit_it_says_so(traces: TraceSet) -> None:
     only = TraceSet(name="only", traces=traces.traces, roles={"record": Role.TEST})
     with pytest.raises(ConfigError, match="no trace is for estimation"):
         sysid.fit(only, "u -> y", sysid.ARX(na=1, nb=(1,), nk=(1,)))
+
+
+def test_a_start_may_be_a_word_as_in_a_pipeline(traces: TraceSet) -> None:
+    arx = sysid.ARX(na=1, nb=1, nk=1)
+    fit = sysid.fit(traces, "u -> y", arx, start="first-sample")
+    assert fit.start == Start(kind=StartKind.FIRST_SAMPLE)
+    ((_, found),) = sysid.compare(traces, fit, start={"measured": 3}).evaluations.items()
+    (case,) = found.cases.values()
+    assert len(case.target) == len(traces.traces[0]) - 3

@@ -47,3 +47,28 @@ def test_a_record_shorter_than_its_start_is_refused():
 def test_a_history_of_unequal_parts_is_refused():
     with pytest.raises(TraceError, match=r"shapes \(2, 1\) and \(3,\)"):
         History(inputs=np.zeros((2, 1)), output=np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("rest", Start()),
+        ("first-sample", Start(kind=StartKind.FIRST_SAMPLE)),
+        ("estimated", Start(kind=StartKind.ESTIMATED)),
+        ("measured=50", Start(kind=StartKind.MEASURED, n_measured=50)),
+        ({"measured": 50}, Start(kind=StartKind.MEASURED, n_measured=50)),
+        ({"estimated": 20}, Start(kind=StartKind.ESTIMATED, n_measured=20)),
+        (Start(), Start()),
+    ],
+    ids=str,
+)
+def test_a_start_is_read_as_people_write_it(written: object, meant: Start):
+    assert Start.of(written) == meant
+
+
+@pytest.mark.parametrize(
+    "written", ["measured", "measured=-1", "measured=1.5", "Rest", {"rest": 5}, {}, 5, None], ids=str
+)
+def test_what_is_no_start_is_refused_in_words(written: object):
+    with pytest.raises(ConfigError, match=r"not a way to start|does not go with the kind"):
+        Start.of(written)

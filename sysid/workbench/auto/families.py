@@ -49,19 +49,25 @@ class Family:
         linear: Whether it is tried in the first round.
         first: What of it is tried unasked.
         around: What stands next to one of it, the most promising first; nothing for what is tried in full at once.
+        in_motion: What of it is tried before all else where runs do not begin at rest: what learns where it begins, or
+            remembers one sample alone.
     """
 
     kind: str
     linear: bool
     first: Callable[[Looked], Sequence[Try]]
     around: Callable[[Try, Looked], Sequence[Try]] = lambda _, __: ()
+    in_motion: Callable[[Looked], Sequence[Try]] = lambda _: ()
 
 
 def _arx(looked: Looked) -> list[Try]:
+    return [Try(structure=one) for one in looked.orders]
+
+
+def _shortest_arx(looked: Looked) -> list[Try]:
+    """One past output is known at the beginning, where that before it is not."""
     m = looked.n_inputs
-    # In motion, one past output is known at the beginning, where that before it is not.
-    shortest = [ARX(na=1, nb=(1,) * m, nk=(looked.delay,) * m)] if looked.in_motion else []
-    return [Try(structure=one) for one in (*shortest, *looked.orders)]
+    return [Try(structure=ARX(na=1, nb=(1,) * m, nk=(looked.delay,) * m))]
 
 
 def _state_spaces(_: Looked) -> list[Try]:
@@ -82,12 +88,14 @@ def _neural(looked: Looked) -> list[Try]:
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
         for n, k, r in sizes
     ]
-    if looked.in_motion:
-        found = [Try(structure=NeuralStateSpace(states=n, neurons=k)) for n, k in ((1, 4), (2, 0), (3, 0))] + found
     if looked.never_negative:
         signless = NeuralStateSpace(states=3, neurons=4, output="absolute")
         found.append(Try(structure=signless, training={"regularisation": 1e-2}))
     return found
+
+
+def _neural_in_motion(_: Looked) -> list[Try]:
+    return [Try(structure=NeuralStateSpace(states=n, neurons=k)) for n, k in ((1, 4), (2, 8), (3, 8), (2, 0), (3, 0))]
 
 
 def _around_neural(one: Try, looked: Looked) -> list[Try]:
@@ -103,18 +111,12 @@ def _around_neural(one: Try, looked: Looked) -> list[Try]:
 
 
 def _narx(looked: Looked) -> list[Try]:
-    wanted = [(looked.lags, k) for k in (4, 10)]
-    wanted = [(1, 10), *wanted] if looked.in_motion and looked.lags > 1 else wanted
-    return [
-        Try(
-            structure=NARX(
-                input_delays=f"{looked.delay}:{looked.delay + n - 1}" if looked.n_inputs else [],
-                output_delays=n,
-                neurons=k,
-            )
-        )
-        for n, k in wanted
-    ]
+    return [_narx_of(looked.lags, neurons, looked) for neurons in (4, 10)]
+
+
+def _narx_of(lags: int, neurons: int, looked: Looked) -> Try:
+    inputs = f"{looked.delay}:{looked.delay + lags - 1}" if looked.n_inputs else []
+    return Try(structure=NARX(input_delays=inputs, output_delays=lags, neurons=neurons))
 
 
 def _around_narx(one: Try, _: Looked) -> list[Try]:
@@ -192,11 +194,17 @@ def suggested(looked: Looked, *, linear: bool) -> list[Try]:
 
 
 FAMILIES = (
-    Family(kind=ARX.kind, linear=True, first=_arx),
+    Family(kind=ARX.kind, linear=True, first=_arx, in_motion=_shortest_arx),
     Family(kind=TransferFunction.kind, linear=True, first=_transfer_functions),
     Family(kind=LinearStateSpace.kind, linear=True, first=_state_spaces),
-    Family(kind=NeuralStateSpace.kind, linear=False, first=_neural, around=_around_neural),
-    Family(kind=NARX.kind, linear=False, first=_narx, around=_around_narx),
+    Family(kind=NeuralStateSpace.kind, linear=False, first=_neural, around=_around_neural, in_motion=_neural_in_motion),
+    Family(
+        kind=NARX.kind,
+        linear=False,
+        first=_narx,
+        around=_around_narx,
+        in_motion=lambda looked: [_narx_of(1, 10, looked)],
+    ),
     Family(kind=HammersteinWiener.kind, linear=False, first=_blocks, around=_around_blocks),
     Family(kind=PolynomialNARX.kind, linear=False, first=_polynomials),
 )

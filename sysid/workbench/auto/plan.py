@@ -142,13 +142,19 @@ class Plan:
             yield finals
 
     def _search(self) -> Iterator[list[Try]]:
-        # In motion, linear models that begin at rest are far off: what learns where it begins comes before them.
-        if not self.looked.in_motion:
-            yield from self._unasked(linear=True)
+        # In motion, what begins at rest is far off, however large: what learns where it begins comes first.
+        if self.looked.in_motion:
+            self.budget.unlimited = 1
+            nonlinear_first = sorted(self.families, key=lambda family: family.linear)
+            yield from self._rounds_of([one for family in nonlinear_first for one in family.in_motion(self.looked)])
+            yield from self._near_the_best()
+        yield from self._unasked(linear=True)
         self.budget.unlimited = 1  # on a slow machine linear models alone would have taken all
         yield from self._unasked(linear=False)
-        if self.looked.in_motion:
-            yield from self._unasked(linear=True)
+        yield from self._near_the_best()
+
+    def _near_the_best(self) -> Iterator[list[Try]]:
+        """What stands next to good ones, as long as it gains."""
         stale = 0
         while stale < PATIENCE:
             before = self.least()

@@ -14,7 +14,7 @@ from sysid.api.fits import Fit, SystemFit
 from sysid.api.looking import mapping_of
 from sysid.errors import ConfigError
 from sysid.extras import need
-from sysid.models import Mapping, Start, StartKind
+from sysid.models import Mapping, Start, StartKind, StartLike
 from sysid.names import slug
 from sysid.reporting.sweep_record import FIGURES, SweepRecord
 from sysid.traces import TraceSet
@@ -93,7 +93,7 @@ def auto(
     minutes: float | None = None,
     iterations: int | None = None,
     seed: int = 0,
-    start: Start = Start(kind=StartKind.ESTIMATED),  # noqa: B008 - frozen
+    start: StartLike = Start(kind=StartKind.ESTIMATED),  # noqa: B008 - frozen
     rest_output: float | Dict[str, float] | None = None,
     workers: int = 1,
     folder: str | Path | None = None,
@@ -121,7 +121,7 @@ def auto(
         ConfigError: If no trace is for estimation, both budgets are given, or nothing that was tried can be used.
         ChannelError: If a channel of the mapping is missing.
     """
-    chosen = mapping_of(traces, mapping)
+    chosen, start = mapping_of(traces, mapping), Start.of(start)
     if not isinstance(rest_output, Dict):
         rest_output = {} if rest_output is None else {chosen.output: rest_output}
     fields = {

@@ -10,7 +10,7 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.models import ARX, AbstractStructure
 from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.auto.budget import TRIAL, Budget
+from sysid.workbench.auto.budget import FINAL, TRIAL, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
@@ -147,6 +147,7 @@ class Search:
             tell=lambda event: self.run.tell(_progress(event, plan)),
         )
         trials = Trials.of(driver)
+        again = AGAIN if self.parts.partial else 0
         budget = Budget(
             wall_s=self.config.wall_s,
             iterations=self.config.iterations,
@@ -154,9 +155,9 @@ class Search:
             is_stored=trials.is_stored,
             side_by_side=self.config.workers,
             folds=len(self.parts.folds),
+            kept=FINAL if again else 0.0,
         )
         training = {**self.parts.training, **budget.limits(TRIAL / len(self.parts.folds))}
-        again = AGAIN if self.parts.partial else 0
         plan = Plan(
             looked=self.looked, budget=budget, error=error, training=training, seed=self.config.seed, again=again
         )

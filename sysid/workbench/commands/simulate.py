@@ -139,10 +139,9 @@ def parse_start(word: str | None) -> Start | None:
     """
     if word is None:
         return None
-    kind, _, number = word.partition("=")
     try:
-        return Start(kind=StartKind(kind), n_measured=int(number or 0))
-    except (ValueError, ConfigError):
+        return Start.of(word)
+    except ConfigError:
         raise ConfigError(
             "a run cannot begin so", where="option --start",
             expected="estimated, rest, first-sample or measured=N", got=word,

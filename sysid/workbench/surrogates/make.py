@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from sysid.bounded_text import read_bounded
 from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.models import Mapping, Start
@@ -28,17 +30,20 @@ from sysid.workbench.experiments.run import DATASET, Experimented
 from sysid.workbench.experiments.run import program_of as experiment_program
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.runner.program import Program
+from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.surrogates.grown import GROWN, Ground, grow
 from sysid.workbench.surrogates.grown import program_of as grown_program
-from sysid.workbench.surrogates.plan import RUNNING
+from sysid.workbench.surrogates.plan import PROOF, RUNNING, search_share
 from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
 from sysid.yaml_files import check, read_yaml
 
 T = TypeVar("T")
 Perform = Callable[[Program[Any], Path], Any]
 """Carries a program out in a folder, and gives its results."""
-SEARCHING, GROWING = 0.5, 0.25
-"""Share of the time in which a model is looked for, and the part of it in which its data grow, where they do."""
+GROWING = 0.25
+"""Share of the time in which data grow, where they do; it is taken from the search's."""
+TIMES = "search-share.txt"
+"""The search's share of the time: decided once, so that a run that was killed finds its trials again."""
 FORMATS = ("c", "fmi2", "fmi3")
 
 
@@ -101,7 +106,9 @@ def make_surrogate(
     begins = restless(found, mapping)
     for note in begins:  # before an hour is spent
         say(f"note: {note}")
-    share = SEARCHING if growth is None else SEARCHING - GROWING
+    runs = ReferenceRuns(config=reference)
+    share = _share(folder / TIMES, runs, len(found.traces), minutes=minutes, workers=config.workers)
+    share -= 0.0 if growth is None else GROWING
     fields: dict[str, Any] = {
         **{"kind": "auto", "name": "model", "data": str((run_in / DATASET).resolve()), "mapping": mapping},
         **{"start": Start(), "rest": dict(found.before), "seed": seed, "workers": config.workers},
@@ -120,7 +127,7 @@ def make_surrogate(
         notes.append(said)
     bundle = read_bundle(place / "bundle")
     notes += beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if begins else []
-    count = proof or _affordable(config, reference_runs=ReferenceRuns(config=reference), minutes=minutes)
+    count = proof or _affordable(config, reference_runs=runs, minutes=minutes)
     shown, section = prove(
         bundle, reference, config.experiment, found.traces, count=count, workers=config.workers,
         progress=lambda name, n, of: say(f"proof: {name} ({n} of {of})") if n % max(1, of // 20) == 0 else None,
@@ -130,7 +137,7 @@ def make_surrogate(
     page, fmu = write_report(place), fmu_of(bundle)
     if fmu is not None:
         fmu = Path(shutil.copyfile(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu"))
-    if len(shown.errors) < 1000:
+    if len(shown.errors) < PROOF:
         notes.append(f"the proof is of {len(shown.errors)} experiments; --proof 1000 makes it of 1,000")
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes)
 
@@ -159,7 +166,17 @@ def _affordable(config: ExperimentConfig, *, reference_runs: ReferenceRuns, minu
     with reference_runs as runs:
         each = runs.seconds_each()[0]
     each = config.reference.time_limit if each is None else max(each, 1e-3)
-    return int(np.clip(RUNNING * 60.0 * minutes * config.workers / each, 20, 1000))
+    return int(np.clip(RUNNING * 60.0 * minutes * config.workers / each, 20, PROOF))
+
+
+def _share(kept: Path, runs: ReferenceRuns, count: int, *, minutes: float, workers: int) -> float:
+    """Share of the time for the search, as it was decided first."""
+    with suppress(OSError, ValueError, TypeError):
+        return float(read_bounded(kept))
+    with runs as known:
+        share = round(search_share(known.seconds_each()[0], count, minutes=minutes, workers=workers), 3)
+    write_bytes(kept, f"{share}\n".encode())
+    return share
 
 
 def restless(found: Experimented, mapping: Mapping) -> list[str]:

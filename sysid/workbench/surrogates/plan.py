@@ -18,6 +18,10 @@ from sysid.yaml_files import check, yaml_text
 
 RUNNING = 0.2
 """Share of the time in which the reference is run for data; as much again for the proof."""
+SEARCHING, LONGEST, ELSE = 0.5, 0.75, 0.1
+"""Share of the time in which a model is looked for, at least and at most, and what export and report take."""
+PROOF = 1000
+"""New experiments of the proof where there is time for them."""
 FEWEST, MOST = 8, 60
 """Experiments that are fitted."""
 
@@ -99,6 +103,28 @@ def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, wo
     each = one.wall_s if np.isfinite(one.wall_s) else reference.time_limit
     count = int(np.clip(RUNNING * 60.0 * minutes * workers / max(each, 1e-3) / 1.5, FEWEST, MOST))
     return Counts(estimation=count, selection=max(3, count // 4), test=max(3, count // 4))
+
+
+def search_share(each: float | None, runs: int, *, minutes: float, workers: int) -> float:
+    """Share of the time for the search: all that neither experiments nor proof take, as far as that is known.
+
+    Args:
+        each: Seconds of a run of the reference; ``None`` where nobody knows.
+        runs: Experiments for the data.
+        minutes: Time for all.
+        workers: Processes.
+
+    Returns:
+        The share.
+
+    Example:
+        >>> search_share(0.03, 20, minutes=5.0, workers=2), search_share(30.0, 20, minutes=5.0, workers=2)
+        (0.75, 0.5)
+    """
+    if each is None:
+        return SEARCHING
+    whole = 60.0 * minutes * workers / max(each, 1e-6)
+    return float(np.clip(1.0 - ELSE - runs / whole - min(RUNNING, PROOF / whole), SEARCHING, LONGEST))
 
 
 def pairs(options: Sequence[str], flag: str) -> dict[str, tuple[float, float]]:
