@@ -1,7 +1,7 @@
 """How often the 95 % intervals of transfer functions hold the true parameters, over many records.
 
 Run with ``python -m tests.benchmarks coverage``: 500 records of each domain and noise, six parameters each. The tests
-count 15 of each.
+count four of each.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
 from matplotlib.ticker import Formatter, LogFormatter, NullFormatter, ScalarFormatter
 
@@ -75,6 +76,16 @@ class Drawing(Figure):
     Its words are words: a name between dollar signs is no formula, and none turns the text around.
     """
 
+    _is_saved = False
+
+    def savefig(self, *words: Any, **more: Any) -> None:
+        """Save it as matplotlib does, drawn once instead of twice."""
+        self._is_saved = True
+        try:
+            super().savefig(*words, **more)
+        finally:
+            self._is_saved = False
+
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
         with styled():
@@ -104,10 +115,15 @@ class Drawing(Figure):
             if isinstance(text, Text) and text not in numbers:
                 text.set_parse_math(False)
                 text.set_text(_fitting(text.get_text(), UPRIGHT if text.get_rotation() else ACROSS))
+        engine = self.get_layout_engine()
         with warnings.catch_warnings():
             # A letter that our font lacks stays text in the drawing, and the reader's machine may have it.
             warnings.filterwarnings("ignore", message="Glyph .* missing")
-            super().draw(renderer)
+            if self._is_saved and isinstance(engine, ConstrainedLayoutEngine):
+                # To save a figure matplotlib draws it first for its layout, into nothing, and then without an engine.
+                engine.execute(self)
+            else:
+                super().draw(renderer)
 
 
 def new_figure(width: float, height: float, *, fixed: bool = False) -> Figure:

@@ -85,12 +85,10 @@ def _plain_names(root: ET.Element) -> None:
 
 def _without(root: ET.Element, tags: set[str]) -> None:
     """Drop what is not drawn; a style element would reach beyond the figure."""
-    for parent in list(root.iter()):
-        for child in list(parent):
-            if child.tag in tags or (child.tag == "defs" and not len(child)):
-                parent.remove(child)
-            else:
-                _without(child, tags)
+    for child in list(root):
+        _without(child, tags)
+        if child.tag in tags or (child.tag == "defs" and not len(child)):
+            root.remove(child)
 
 
 def _short_ids(root: ET.Element, name: str) -> None:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
+from sysid.reporting.figures.style import Drawing, new_figure, styled
 from sysid.reporting.figures.svg import FAR, relative_path, svg
 
 POINT = st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
@@ -31,6 +32,25 @@ def walk(path: str) -> list[tuple[float, float]]:
             y += numbers[0]
         points.append((x, y))
     return points
+
+
+def busy() -> Figure:
+    """A figure with what is placed late: ticks of a log axis, a legend, names in a foreign script, a second panel."""
+    with styled():
+        figure = new_figure(5.0, 3.0)
+        left, right = figure.subplots(1, 2)
+        left.semilogy(np.arange(9.0), np.exp(np.arange(9.0)), label="$a$ \u4e2d")
+        left.legend()
+        right.bar(["one", "two $x$", "three"], [1.0, 2e5, 3.0])
+        right.set(title="a title", xlabel="x", ylabel="y in V")
+    return figure
+
+
+def test_a_figure_that_is_drawn_once_is_what_matplotlib_makes_in_two_drawings(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = {"title": "t", "description": "d", "name": "n"}
+    once = svg(busy(), **words)
+    monkeypatch.setattr(Drawing, "savefig", Figure.savefig)
+    assert once == svg(busy(), **words)
 
 
 @given(st.lists(POINT, min_size=1, max_size=30))
