@@ -7,6 +7,7 @@ import enum
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from sysid.errors import ReaderError
@@ -42,6 +43,10 @@ TOUCHING = re.compile(r"(?<=[0-9])-(?=[0-9]*\.[0-9])")
 _WHOLE = re.compile(r"[+-]?[0-9]{16,19}")
 
 
+SHORT = 32
+"""Letters of a cell; longer ones are rows that were not taken apart."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Row:
     """A row of cells and the line it stands on (the last one, if a cell holds line breaks)."""
@@ -65,14 +70,25 @@ def kind_of(cell: str, missing: Sequence[str] = ()) -> Kind:
     Returns:
         The kind; what usually stands for a missing value is nothing.
     """
-    text = cell.strip()
-    if text.casefold() in MISSING or usually_missing(text) or text in missing:
+    if missing and cell.strip() in missing:
         return Kind.NOTHING
+    return _usual_kind(cell) if len(cell) <= SHORT else _kind(cell)
+
+
+def _kind(cell: str) -> Kind:
+    """What it looks like in any file; nearly every cell is a number."""
+    text = cell.strip()
     if _NUMBER.fullmatch(text):
         return Kind.WHOLE if _WHOLE.fullmatch(text) and not is_calendar(text) else Kind.NUMBER
+    if text.casefold() in MISSING or usually_missing(text):
+        return Kind.NOTHING
     if is_calendar(text):
         return Kind.TIME
     return Kind.NUMBER if suffix_of(text) else Kind.WORD
+
+
+_usual_kind = lru_cache(maxsize=16384)(_kind)
+"""For short cells: a file is gone through for each separator that it may have, and more than once for that it has."""
 
 
 def suffix_of(text: str) -> str:
