@@ -15,6 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import copy_numbers, copy_rows
+
 
 @njit(cache=True, nogil=True)
 def reflect(W, pivot, columns, n_columns, target, rank, tolerance):
@@ -101,7 +103,7 @@ def nested_losses(base, rank, input_columns, least, output_columns, target, tole
     while level >= 0:
         source_rank = rank if level == 0 else ranks[level - 1]
         if fresh:
-            levels[level] = base if level == 0 else levels[level - 1]
+            copy_rows(base if level == 0 else levels[level - 1], levels[level])
             ranks[level] = source_rank
             counts[level] = -1
         counts[level] += 1
@@ -133,8 +135,8 @@ def nested_losses(base, rank, input_columns, least, output_columns, target, tole
         fresh = False
         used = ranks[level]
         for c in range(n_out):
-            leaf_table[output_columns[c]] = levels[level, output_columns[c]]
-        leaf_table[target] = levels[level, target]
+            copy_numbers(levels[level, output_columns[c]], leaf_table[output_columns[c]])
+        copy_numbers(levels[level, target], leaf_table[target])
         losses[leaf, 0] = residual_square(leaf_table, target, used)
         for a in range(n_out):
             pivot = output_columns[a]
