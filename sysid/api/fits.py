@@ -17,7 +17,9 @@ from sysid.api.comparison import compare
 from sysid.api.saving import save
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.estimation import FitResult
+from sysid.estimation.grey_box.again import profile_again
 from sysid.estimation.grey_box.by_case import for_case
+from sysid.estimation.grey_box.profile import Profile
 from sysid.ingest.arrays import inputs_of
 from sysid.ingest.frames import as_array
 from sysid.models import Cascade, History, Start
@@ -119,6 +121,21 @@ class Fit(FitResult):
         """
         return Fit.of(for_case(self, name), self.traces, self.start)
 
+    def profile(self, name: str, *, level: float = 0.95) -> Profile:
+        """How far a parameter of equations may move while the others, fitted again, keep the error within the noise.
+
+        Args:
+            name: Of the parameter; ``mass of run1`` of one that differs by case.
+            level: Probability of the interval.
+
+        Returns:
+            The profile: ``low`` and ``high`` end its interval, ``values`` and ``deviances`` draw it.
+
+        Raises:
+            ConfigError: If the fit is none of equations, or has no such parameter.
+        """
+        return profile_again(self, self.traces.with_role(Role.ESTIMATION), self.start, name, level)
+
     def residuals(
         self, traces: TraceSet | None = None, *, free_run: bool = False, output: str | None = None
     ) -> ResidualAnalysis:
@@ -162,6 +179,10 @@ class Fit(FitResult):
                 f"  {name:<16} {value:>12.6g} ± " + ("- (not determined)" if np.isnan(spread) else f"{spread:.3g}")
                 for name, value, spread in pairs
             ]
+            if self.uncertainty.profile is not None:
+                ends = zip(self.uncertainty.names, self.uncertainty.profile, strict=True)
+                lines += [f"  {name:<16} {low:>12.6g} to {high:.6g}" for name, (low, high) in ends]
+                lines[-len(self.uncertainty.names)] += " (95 %, by profile likelihood)"
         lines += [f"Note: {note}" for note in self.notes]
         return "\n".join([*lines, str(self._compared)])
 

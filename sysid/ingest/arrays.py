@@ -116,7 +116,7 @@ def _experiments(values: Any) -> dict[str, Any]:
     Arrays of a single column are columns, whether they lie flat or stand, as those of ``scipy.io.loadmat`` do.
     """
     standing = isinstance(values, Mapping) and any(
-        np.shape(one)[1:] == (1,) and not _is_frame(one) for one in values.values()
+        not isinstance(one, tuple) and np.shape(one)[1:] == (1,) and not _is_frame(one) for one in values.values()
     )
     if isinstance(values, Mapping) and values and not standing and all(_is_record(one) for one in values.values()):
         return {str(label): one for label, one in values.items()}

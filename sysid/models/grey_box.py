@@ -23,6 +23,9 @@ MOST_PARAMETERS = 500
 MOST_SUBSTEPS = 1_000
 MOST_POINTS = 10_000
 """Points of all tables together."""
+WALD, PROFILE = "wald", "profile"
+INTERVALS = (WALD, PROFILE)
+"""How intervals of parameters are found."""
 CASE = "case"
 """What a parameter may have a value per."""
 
@@ -158,6 +161,8 @@ class GreyBox(AbstractStructure):
             that the equations need where their parameters start, which is told.
         cases: By case the names of its records, which share its values of the parameters that are ``per: case``. A
             record that is not named is a case of its own.
+        intervals: ``wald``, from the curvature at the minimum; or ``profile``, by profile likelihood beside it, for
+            which the others are fitted again some ten times for each parameter.
 
     Raises:
         ConfigError: With line and column of what is wrong with the equations, or naming another field.
@@ -175,6 +180,7 @@ class GreyBox(AbstractStructure):
     substeps: int | None = None
     solver: str | None = None
     cases: tuple[tuple[str, tuple[str, ...]], ...] | Dict[str, Any] = ()
+    intervals: str = WALD
 
     kind = "GreyBox"
 
@@ -209,6 +215,12 @@ class GreyBox(AbstractStructure):
                 "there is no such solver", where="solver", expected=f"one of {', '.join(SOLVERS)}",
                 got=shortened(self.solver),
                 remedy=f"did you mean {near[0]}?" if near else "leave solver out: the one that is needed is chosen",
+            )  # fmt: skip
+        if self.intervals not in INTERVALS:
+            near = difflib.get_close_matches(str(self.intervals), INTERVALS, n=1)
+            raise ConfigError(
+                "there are no such intervals", where="intervals", expected=f"one of {', '.join(INTERVALS)}",
+                got=shortened(self.intervals), remedy=f"did you mean {near[0]}?" if near else "leave intervals out",
             )  # fmt: skip
         self._check_system()
 
@@ -301,7 +313,7 @@ class GreyBox(AbstractStructure):
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
-        return {
+        found: dict[str, Any] = {
             "kind": self.kind,
             "equations": self.equations,
             "parameters": {one.name: one.to_dict() for one in self.named},
@@ -309,7 +321,10 @@ class GreyBox(AbstractStructure):
             "tables": {name: [list(point) for point in points] for name, points in self.points.items()},
             "substeps": self.substeps,
             "solver": self.solver,
-        } | ({"cases": {name: list(records) for name, records in self.grouped}} if self.cases else {})
+        }
+        if self.cases:
+            found["cases"] = {name: list(records) for name, records in self.grouped}
+        return found if self.intervals == WALD else found | {"intervals": self.intervals}
 
 
 @dataclass(frozen=True, kw_only=True)

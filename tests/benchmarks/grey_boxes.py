@@ -1,10 +1,12 @@
 """Grey boxes: coverage of their intervals on simulated systems, time beside SciPy, and the Cascaded Tanks.
 
     [SYSID_DATA=<folder>] python -m tests.benchmarks grey_boxes [--seeds=20] [--only=coverage,time,tanks]
+    python -m tests.benchmarks grey_boxes --only=profile [--seeds=20] [--systems="two tanks,DC motor"]
 
 Coverage: each system is run at known parameters, with white noise of 2 % of the output's range; the fit starts at
 parameters that are off by up to 40 %; how often the 95 % interval of a parameter holds the true one is counted over
-parameters and seeds. Time: two tanks, beside ``scipy.optimize.least_squares`` over ``solve_ivp`` (RK45, held inputs,
+parameters and seeds; with ``profile``, which is no default, from the curvature and by profile likelihood side by side.
+Time: two tanks, beside ``scipy.optimize.least_squares`` over ``solve_ivp`` (RK45, held inputs,
 finite differences), both from the same start to the same cost. Tanks: ``cascaded_tanks/dataBenchmark.csv`` (4TU
 10.4121/12960104): equations are tried on the first part of the estimation record and chosen by the rest of it, then
 fitted to all of it; the first 50 samples of the validation record give its state, and the samples after them count.
@@ -16,7 +18,7 @@ import os
 import re
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -113,6 +115,36 @@ def record(system: System, rng: np.random.Generator) -> Trace:
 
 def started(system: System, rng: np.random.Generator) -> GreyBox:
     return system.grey({name: value * rng.uniform(0.6, 1.4) for name, value in system.true.items()})
+
+
+def profiles(seeds: int, systems: list[str]) -> None:
+    """Coverage of both kinds of intervals on the same fits, of two starts."""
+    for name in systems:
+        system, began = SYSTEMS[name], time.perf_counter()
+        inside, widths, endless = np.zeros((2, len(system.true))), np.zeros((2, len(system.true))), 0
+        true = np.array(list(system.true.values()))
+        for seed in range(seeds):
+            rng = np.random.default_rng([seed, len(name)])
+            data, grey = record(system, rng), started(system, rng)
+            fit = fit_grey_box(
+                [data], MAPPING, replace(grey, intervals="profile"), Training(starts=2), start=ESTIMATED
+            )  # fmt: skip
+            known = fit.uncertainty
+            assert known is not None
+            assert known.profile is not None
+            for row, ends in enumerate((known.interval(0.95), known.profile)):
+                inside[row] += (ends[:, 0] <= true) & (true <= ends[:, 1])
+                width = ends[:, 1] - ends[:, 0]
+                widths[row] += np.where(np.isfinite(width), width, 0.0)
+            endless += int(np.count_nonzero(~np.isfinite(known.profile).all(axis=1)))
+        seconds = (time.perf_counter() - began) / seeds
+        for row, kind in enumerate(("the curvature", "profile likelihood")):
+            each = ", ".join(f"{key} {100 * n / seeds:.0f} %" for key, n in zip(system.true, inside[row], strict=True))
+            note = (
+                f"{each}; {endless} without an end by profile; {seconds:.1f} s a record with fit and profiles, 2 starts"
+            )
+            share = 100.0 * inside[row].sum() / (seeds * len(true))
+            found(f"{name}: true parameters within 95 % intervals by {kind}", share, "%", note=note)
 
 
 def coverage(seeds: int) -> None:
@@ -253,6 +285,8 @@ def main() -> None:
     asked = given.get("only", "coverage,time,tanks").split(",")
     if "coverage" in asked:
         coverage(int(given.get("seeds", 20)))
+    if "profile" in asked:
+        profiles(int(given.get("seeds", 20)), given.get("systems", "two tanks").split(","))
     if "time" in asked:
         beside_scipy()
     if "tanks" in asked and "SYSID_DATA" in os.environ:

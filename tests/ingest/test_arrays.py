@@ -127,6 +127,8 @@ def test_experiments_stay_apart_and_may_differ_in_length() -> None:
     assert [len(trace) for trace in traces] == [20, 12]
     assert list(traces.roles.values()) == [Role.ESTIMATION, Role.VALIDATION]
     assert data({"monday": (U, Y), "tuesday": (U, Y)}, sample_time=0.1).names == ("monday", "tuesday")
+    both = data({"monday": (np.column_stack([U, U]), Y), "tuesday": (np.column_stack([U, U]), Y)}, sample_time=0.1)
+    assert both.names == ("monday", "tuesday")
 
 
 def test_where_the_numbers_come_from_is_said() -> None:

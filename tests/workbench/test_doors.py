@@ -53,6 +53,7 @@ OF_A_CASE = {"start": 80, "per": "case"}
 GREY_BY_CASE = GREY | {
     "parameters": {**GREY["parameters"], "level": OF_A_CASE},
     "cases": {"monday": ["run-1", "run-2", "run-3"]},
+    "intervals": "profile",
 }
 HW = {"kind": "HammersteinWiener", "states": 1, "input": ["saturation", "none"], "output": "polynomial 2"}
 WH = {"kind": "WienerHammerstein", "first": 1, "second": 1, "curve": "network 2"}

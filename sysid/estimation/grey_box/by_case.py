@@ -99,12 +99,12 @@ def case_notes(model: EquationModel, traces: Sequence[Trace]) -> list[str]:
     if not model.cases:
         return []
     names, grouped = ", ".join(one.name for one in model.grey.by_case), model.grey.grouped
+    many = f"Each of {len(model.cases)} cases has its own {names}."
+    alone = f"There is one case alone: its {names} might as well be shared."
     told = [
-        f"Each of {len(model.cases)} cases has its own {names}. A record of none of them is run with what its first "
-        "samples show, or not at all; exported files take it as an input."
+        f"{many if len(model.cases) > 1 else alone} A record of another case is run with what its first samples show, "
+        "or not at all; exported files take it as an input."
     ]
-    if len(model.cases) == 1:
-        told.append(f"There is one case alone: {names} might as well be shared.")
     fitted = {trace.name for trace in traces}
     others = [one for _, records in grouped for one in records if one not in fitted]
     if others:

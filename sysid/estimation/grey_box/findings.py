@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.grey_box.named import Named
+from sysid.estimation.grey_box.profile import Profile
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import Solution
@@ -26,6 +28,12 @@ MOST_NAMES = 4
 
 ALIKE = 0.9999
 """The same of parameters that nobody named: coefficients of one smooth response are nearly as correlated as a rule."""
+
+NORMAL = 1.959964
+"""Standard deviations of half a 95 % interval."""
+
+UNLIKE = 0.2
+"""Share of half an interval by which the end of another may differ and not be told."""
 
 EVIDENCE_STEPS = 3
 """Steps of the evidence of a fit that ended before its first."""
@@ -59,12 +67,14 @@ class Findings:
         values: In their units.
         covariance: In their units; NaN of those that the records leave open.
         bound: Of each the bound at which it stands; an empty text for none.
+        profiles: Of each, where somebody asked for them.
     """
 
     named: tuple[Named, ...]
     values: Array
     covariance: Array
     bound: tuple[str, ...]
+    profiles: Sequence[Profile] = ()
 
     @classmethod
     def of(cls, solution: Solution, provider: EquationProvider, named: tuple[Named, ...]) -> Findings:
@@ -115,7 +125,41 @@ class Findings:
             The uncertainty; a parameter's unit stands behind its name.
         """
         names = tuple(one.label for one in self.named)
-        return Uncertainty(names=names, values=self.values, covariance=self.covariance, noise_variance=noise_variance)
+        profile = np.array([[one.low, one.high] for one in self.profiles]) if self.profiles else None
+        return Uncertainty(
+            names=names,
+            values=self.values,
+            covariance=self.covariance,
+            noise_variance=noise_variance,
+            profile=profile,
+        )
+
+    @property
+    def profiled(self) -> tuple[str, ...]:
+        """What the profiles say: intervals without an end, other ends than the curvature's, and better minima."""
+        told, half = [], NORMAL * np.sqrt(np.diag(self.covariance))
+        for one, wald in zip(self.profiles, half, strict=False):  # none where nobody asked
+            between = f"{one.low:.5g} to {one.high:.5g}"
+            sides = " and ".join(side for side, end in (("low", one.low), ("high", one.high)) if np.isinf(end))
+            apart = (
+                np.abs([one.value - one.low - wald, one.high - one.value - wald]) / wald if wald > 0.0 else np.zeros(2)
+            )
+            if one.gained > 0.0:
+                told.append(
+                    f"The profile of {one.name} came to parameters that fit better than those of the fit (deviance "
+                    f"{one.gained:.3g}): ask for more starts."
+                )
+            elif sides:
+                told.append(
+                    f"The records do not end the 95 % interval of {one.name} by profile likelihood, {between}: "
+                    f"beyond its {sides} end others make up for it. Bound it, give it a prior, or record what tells it."
+                )
+            elif apart.max() > UNLIKE:
+                told.append(
+                    f"The 95 % interval of {one.name} by profile likelihood is {between}; from the curvature it would "
+                    f"be {one.value - wald:.5g} to {one.value + wald:.5g}."
+                )
+        return tuple(told)
 
     @property
     def open(self) -> tuple[str, ...]:

@@ -141,15 +141,28 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stop
 def _weighed(provider: EquationProvider, solution: Solution, training: Training) -> tuple[EquationProvider, Solution]:
     """Outputs over what is left of each: a noisy one does not blur what a clean one shows of the states they share."""
     for _ in range(NOISE_ROUNDS):
-        left = provider.left(solution.theta)
-        left = np.maximum(left, max(float(left.max()) / WIDEST, np.finfo(np.float64).eps))
-        noise = left / np.exp(np.mean(np.log(left)))
+        noise = noise_of(provider, solution.theta)
         before = np.ones(len(noise)) if provider.noise is None else provider.noise
         if np.abs(np.log(noise / before)).max() < ALIKE:
             break
         provider = replace(provider, noise=noise)
         solution = _gone_on(provider, solution, training)
     return provider, solution
+
+
+def noise_of(provider: EquationProvider, theta: Array) -> Array:
+    """How much is left of each output, relative to the others.
+
+    Args:
+        provider: The records.
+        theta: What is trained.
+
+    Returns:
+        Shape ``(n_outputs,)``, its geometric mean 1.
+    """
+    left = provider.left(theta)
+    left = np.maximum(left, max(float(left.max()) / WIDEST, np.finfo(np.float64).eps))
+    return np.asarray(left / np.exp(np.mean(np.log(left))))
 
 
 def _balanced(provider: EquationProvider, solution: Solution, training: Training) -> Solution:

@@ -24,9 +24,11 @@ from sysid.estimation.grey_box.preparing import (
     WINDOW,
     first_terms,
     norms_for,
+    provider_for,
     seen_terms,
     widths_for,
 )
+from sysid.estimation.grey_box.profile import Profiler
 from sysid.estimation.grey_box.provider import EquationProvider, Record
 from sysid.estimation.grey_box.stepping import (
     STIFF,
@@ -44,10 +46,10 @@ from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
-from sysid.estimation.result import FitResult
+from sysid.estimation.result import FitResult, Status
 from sysid.models import AbstractStructure, Mapping, Start
 from sysid.models.built_model import BuiltModel
-from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
+from sysid.models.grey_box import PROFILE, GreyBox, VectorGreyBox, lowered
 from sysid.models.grey_box_model import GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
 
@@ -292,23 +294,12 @@ def _common(first: Trace, mapping: Mapping, grey: GreyBox) -> dict[str, Any]:
 def _ready(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence[Experiment]) -> Ready:
     """Levels, ranges and a step, from the records at the declared start."""
     grey, form = template.grey, template.recursion
-    n_weights = template.lowered.n_weights
-    named = named_of(grey, template.cases, n_weights)
     records = tuple(Record.of(experiment, form) for experiment in experiments)
     means = np.array([np.mean([np.mean(record.output[:, j]) for record in records]) for j in range(form.n_outputs)])
-    places = np.array([one.place for one in named], dtype=np.int64)
-    limits = np.array([[-np.inf, np.inf]] * len(template.theta)).reshape(-1, 2).T
-    limits[:, places] = np.array([[one.parameter.low, one.parameter.high] for one in named]).reshape(-1, 2).T
-    scale = np.ones(len(template.theta))
-    scale[places] = [one.parameter.scale for one in named]
-    provider = EquationProvider(
-        form=first_terms(form, template.mapping.outputs, means),
-        records=records,
-        scale=scale,
-        limits=limits,
-    )
+    provider = provider_for(template, first_terms(form, template.mapping.outputs, means), records)
+    places = np.array([one.place for one in named_of(grey, template.cases, template.lowered.n_weights)], dtype=np.int64)
     theta = np.zeros(provider.n_parameters)
-    theta[places] = template.theta[places] / scale[places]
+    theta[places] = template.theta[places] / provider.scale[places]
     provider, theta, stepping = _stepping(template, provider, theta)
     seen, begun = seen_terms(provider, theta)
     provider = provider.with_form(seen)
@@ -377,9 +368,17 @@ def _told(
     model, solution = done.model, done.candidate.solution
     posterior = _posterior(done, *data)
     findings = Findings.of(solution, done.provider, named)
+    notes = []
+    if model.grey.intervals == PROFILE and solution.status is Status.CONVERGED:
+        try:
+            findings = replace(findings, profiles=Profiler(provider=done.provider, solution=solution).all(named))
+        except KeyboardInterrupt:  # the fit is there without them, and is made again by who asks again
+            found = replace(found, status=Status.INTERRUPTED)
+    elif model.grey.intervals == PROFILE:
+        notes.append("No intervals by profile likelihood: the fit has not come to a minimum from which they are told.")
     n = max(done.provider.n_samples - model.n_parameters, 1)
     variance = 2.0 * solution.at.loss / n * model.scaling.error_unit
-    notes = [step_note(model, done.stepping)] if model.lowered.n_continuous else []
+    notes += [step_note(model, done.stepping)] if model.lowered.n_continuous else []
     notes += case_notes(model, data[0])
     unread = [one for i, one in enumerate(model.mapping.inputs) if i not in {i for i, _ in model.lowered.lagged}]
     notes += [f"The equations do not read {', '.join(unread)}."] if unread else []
@@ -389,6 +388,7 @@ def _told(
             f"{switches} switch{'es' * (switches > 1)} were trained through a soft form and are exact in the model; "
             f"the squared error of the exact form is {done.softened:.3g} times that of the soft one."
         )
+    notes += findings.profiled
     built = isinstance(model, BuiltModel)
     warnings = list(findings.more_than_shown if built else findings.warnings)
     if model.lowered.n_continuous and not done.stepping.enough:

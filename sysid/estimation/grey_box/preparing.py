@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.grey_box.named import named_of
+from sysid.estimation.grey_box.provider import EquationProvider, Record
 from sysid.estimation.grey_box.stepping import STEPPED
 from sysid.models.equation_form import EquationForm
+from sysid.models.grey_box_model import EquationModel
 
 Array = NDArray[np.float64]
 
@@ -24,6 +26,26 @@ SOFT_ROOT = 1e-3
 """Width of a root in training, over the largest magnitude of its argument."""
 
 SHARPER, ROUNDS = 0.25, 6
+
+
+def provider_for(model: EquationModel, form: EquationForm, records: tuple[Record, ...]) -> EquationProvider:
+    """The residuals of a model over some records, what is trained in scales and bounds of its parameters.
+
+    Args:
+        model: The model.
+        form: What is run.
+        records: The records.
+
+    Returns:
+        The residuals.
+    """
+    named = named_of(model.grey, model.cases, model.lowered.n_weights)
+    places = np.array([one.place for one in named], dtype=np.int64)
+    scale, limits = np.ones(len(model.theta)), np.tile([[-np.inf], [np.inf]], len(model.theta))
+    scale[places] = [one.parameter.scale for one in named]
+    limits[0, places] = [one.parameter.low for one in named]
+    limits[1, places] = [one.parameter.high for one in named]
+    return EquationProvider(form=form, records=records, scale=scale, limits=limits)
 
 
 def first_terms(form: EquationForm, outputs: Sequence[str], means: Array) -> EquationForm:
