@@ -120,13 +120,23 @@ def designed(config: ReferenceConfig, design: Design) -> dict[str, list[Case]]:
     """
     counts = {role: getattr(design.runs, role) for role in PREFIX}
     return {
-        role: drawn(config, design, count, seed=(design.seed, place), prefix=PREFIX[role])
+        role: drawn(
+            config, design, count, seed=(design.seed, place), prefix=PREFIX[role], to_the_ends=role == "estimation"
+        )
         for place, (role, count) in enumerate(counts.items())
         if count
     }
 
 
-def drawn(config: ReferenceConfig, design: Design, count: int, *, seed: Sequence[int], prefix: str) -> list[Case]:
+def drawn(
+    config: ReferenceConfig,
+    design: Design,
+    count: int,
+    *,
+    seed: Sequence[int],
+    prefix: str,
+    to_the_ends: bool = False,
+) -> list[Case]:
     """Some experiments.
 
     Args:
@@ -135,11 +145,13 @@ def drawn(config: ReferenceConfig, design: Design, count: int, *, seed: Sequence
         count: How many.
         seed: Of everything random; others give others.
         prefix: Of their names.
+        to_the_ends: Whether both ends of each parameter's range are among its values: a model of what lies between is
+            asked for what lies there, and is worst beyond what it was fitted to.
 
     Returns:
         The experiments.
     """
-    parameters = _spread(config, design, count, np.random.default_rng([*seed, 1]))
+    parameters = _spread(config, design, count, np.random.default_rng([*seed, 1]), to_the_ends=to_the_ends)
     seeds = np.random.default_rng([*seed, 2]).integers(2**31, size=count)
     width = max(3, len(str(count)))
     cases = []
@@ -158,7 +170,9 @@ def drawn(config: ReferenceConfig, design: Design, count: int, *, seed: Sequence
     return cases
 
 
-def _spread(config: ReferenceConfig, design: Design, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def _spread(
+    config: ReferenceConfig, design: Design, count: int, rng: np.random.Generator, *, to_the_ends: bool
+) -> NDArray[np.float64]:
     ranges = np.array([port.range for port in config.parameters.values()]).reshape(-1, 2)
     if not len(ranges):
         return np.zeros((count, 0))
@@ -167,6 +181,8 @@ def _spread(config: ReferenceConfig, design: Design, count: int, rng: np.random.
         unit = qmc.Sobol(len(ranges), rng=rng).random_base2(power)[:count]
     else:
         unit = qmc.LatinHypercube(len(ranges), rng=rng).random(count)
+    if to_the_ends and count > 1:
+        unit = (unit - unit.min(axis=0)) / np.ptp(unit, axis=0)
     return np.asarray(ranges[:, 0] + unit * (ranges[:, 1] - ranges[:, 0]))
 
 

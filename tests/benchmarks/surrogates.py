@@ -19,7 +19,8 @@ from typing import Any
 import yaml
 
 import sysid
-from sysid.references.described import Wish, proposed
+from sysid.references.described import Wish
+from sysid.workbench.surrogates.plan import written
 
 MODELS = Path(__file__).parents[1] / "references"
 MINUTES = 5.0
@@ -53,15 +54,12 @@ FMUS = {
 """Parameters that vary: none of these has an input."""
 
 
-def pipeline(name: str, folder: Path) -> Path:
-    """The YAML of a reference."""
-    if name in PYTHON:
-        content: dict[str, Any] = {**PYTHON[name]}
-        content["reference"] = {"folder": str(MODELS), **content["reference"]}
-    else:
+def pipeline(name: str, folder: Path, *, minutes: float) -> Path:
+    """The YAML of a reference: of an FMU, the one that ``sysid surrogate`` proposes."""
+    if name not in PYTHON:
         file = Path(os.environ["REFERENCE_FMUS"]) / f"{name}.fmu"
-        fields, duration, _ = proposed(file, Wish(ranges={}, parameters=FMUS[name]))
-        content = {"reference": fields, "experiment": {"duration": duration, "runs": RUNS}}
+        return written(file, Wish(ranges={}, parameters=FMUS[name]), folder, minutes=minutes, workers=2, seed=0)[0]
+    content: dict[str, Any] = {**PYTHON[name], "reference": {"folder": str(MODELS), **PYTHON[name]["reference"]}}
     path = folder / f"{name}.yaml"
     path.write_text(yaml.safe_dump({"kind": "experiment", "name": name, "workers": 2, **content}), encoding="utf-8")
     return path
@@ -75,7 +73,7 @@ def main() -> None:
     print(f"{'reference':<14}{'new':>6}{'rms':>9}{'everywhere':>12}{'diverged':>10}{'faster':>10}{'FMU off':>10}")
     for name in names:
         with tempfile.TemporaryDirectory() as place:
-            made = sysid.surrogate(pipeline(name, Path(place)), Path(place) / "out", minutes=minutes)
+            made = sysid.surrogate(pipeline(name, Path(place), minutes=minutes), Path(place) / "out", minutes=minutes)
         proof = made.proof
         off = "-" if proof.dropped is None else f"{proof.dropped:.1e}"
         print(

@@ -47,6 +47,14 @@ def test_parameters_fill_their_ranges_evenly(sampling: str) -> None:
         assert sorted(strips) == list(range(16))
 
 
+def test_what_is_fitted_has_both_ends_of_each_parameter_and_what_judges_is_random() -> None:
+    design = Design(duration=5.0, runs=Counts(estimation=8, selection=8, test=8))
+    for role, cases in designed(CONFIG, design).items():
+        for name, port in CONFIG.parameters.items():
+            values = [case.parameters[name] for case in cases]
+            assert ((min(values), max(values)) == pytest.approx(port.range)) is (role == "estimation")
+
+
 def test_no_two_roles_share_an_experiment_and_a_seed_repeats_them_all() -> None:
     design = Design(duration=20.0, runs=Counts(estimation=6, selection=6, test=6))
     first, again = designed(CONFIG, design), designed(CONFIG, design)

@@ -25,6 +25,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -138,6 +139,7 @@ class Excursions(AbstractSequences):
     _rows: NDArray[np.float64] = field(init=False, repr=False)
     _left: NDArray[np.int64] = field(init=False, repr=False)
     _firsts: NDArray[np.int64] = field(init=False, repr=False)
+    _group: NDArray[np.int64] = field(init=False, repr=False)
     _to_plateau: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -167,6 +169,18 @@ class Excursions(AbstractSequences):
             np.concatenate([np.where(r >= 0, r + f, -1) for r, f in zip(reach, firsts, strict=True)]),
         )
         object.__setattr__(self, "_firsts", firsts)
+        object.__setattr__(self, "_group", self._groups())
+
+    @cached_property
+    def _fixed(self) -> list[int]:
+        """Inputs that never move within a record: parameters of what was recorded, as a mass is."""
+        return [j for j in range(len(self.inputs)) if all(np.ptp(record[:, j]) == 0.0 for record in self.records)]
+
+    def _groups(self) -> NDArray[np.int64]:
+        """Of each row, with which others its passages may be joined: a parameter does not move within a sequence."""
+        if not self._fixed:
+            return np.zeros(len(self._rows), dtype=np.int64)
+        return np.unique(self._rows[:, self._fixed], axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
     @classmethod
     def of(cls, traces: Sequence[Trace], inputs: Sequence[str], outputs: Sequence[str]) -> Excursions:
@@ -227,6 +241,7 @@ class Excursions(AbstractSequences):
         for number in range(count):
             rows, held = self._sequence(np.random.default_rng([seed, number]))
             rows = np.clip(rows, low, high)
+            rows[:, self._fixed] = rows[0, self._fixed]  # to the last bit, whatever interpolation has rounded
             judged = np.zeros(len(rows), dtype=bool)
             if held:
                 judged[len(rows) - max(1, held // 10) :] = True
@@ -237,18 +252,22 @@ class Excursions(AbstractSequences):
         at = int(rng.choice(self._firsts))
         parts: list[NDArray[np.float64]] = []
         total = 0
+        alike = self._group == self._group[at]
+        long = alike & (self._left > self.passage[0])
+        long = long if long.any() else alike & (self._left > 1)
         while total < self.samples:
             if parts:
-                at = self._match(rng, at, self._left > self.passage[0])
+                at = self._match(rng, at, long)
             faster = self.warp ** rng.uniform(-1.0, 1.0)
             span = min(int(rng.integers(*self.passage)) * faster, int(self._left[at]) - 1)
             part = self._passage(at, span, max(2, round(span / faster)))
             parts.append(_led_over(parts[-1][-1], part, self.passage[0]) if parts else part)
             at += int(span)
             total += len(part)
-        if not self.has_plateaus:
+        ends = alike & (self._to_plateau >= 0)
+        if not ends.any():
             return np.concatenate(parts), 0
-        at = self._match(rng, at, self._to_plateau >= 0)
+        at = self._match(rng, at, ends)
         rest = int(self._to_plateau[at])
         # At least so long a way that the plateau is reached from the record, and not by the leading over.
         way = self._rows[at : rest + 1]

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -168,3 +169,27 @@ def test_traces_of_a_generator_are_judged_wherever_they_stand_still():
         for t in range(len(y))
     ]
     np.testing.assert_array_equal(judged, plain)
+
+
+def with_parameter(value: float, seed: int, n: int = 2000) -> Trace:
+    """The same, with its second input held all along: a parameter of the plant."""
+    made = record(seed, n)
+    values = np.array(made.values)
+    values[:, 1] = value
+    values[:, 2] = model().simulate(values[:, :2])
+    return replace(made, name=f"parameter {value}", values=values)
+
+
+def test_an_input_that_never_moves_within_a_record_does_not_move_within_a_sequence():
+    known = {0.1: 0, 0.4: 1, 0.9: 2}
+    source = excursions(*(with_parameter(value, seed) for value, seed in known.items()))
+    drawn = list(source.draw(40, seed=3))
+    values = [set(one.inputs[:, 1].tolist()) for one in drawn]
+    assert all(len(one) == 1 for one in values)
+    assert set.union(*values) == set(known)
+    assert sum(np.ptp(one.inputs[:, 0]) > 0.0 for one in drawn) > 20
+
+
+def test_records_of_one_parameter_that_are_shorter_than_a_passage_are_used_as_they_are():
+    source = excursions(with_parameter(0.1, 0, n=40_000), with_parameter(0.4, 1, n=200))
+    assert {one.inputs[0, 1] for one in source.draw(20, seed=0)} == {0.1, 0.4}
