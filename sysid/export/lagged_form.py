@@ -133,9 +133,17 @@ def lowered_form(model: Member) -> LaggedForm | StateSpaceForm | ProgramForm:
         The lowered form.
 
     Raises:
-        ConfigError: If it lowers to no kind.
+        ConfigError: If it lowers to no kind, or has parameters that differ by case: a file has one value, or an input.
     """
     form = model.recursion
+    if form.constants:
+        raise ConfigError(
+            f"{', '.join(form.constants)} differ by case, and a file runs one",
+            where=model.structure.label,
+            expected="the model of one case, or one that takes them as inputs",
+            got="a model of several cases",
+            remedy='export its fit, or model.with_case_inputs(), or model.for_case("run1")',
+        )
     lowered = HIDDEN.get(type(form))
     return LaggedForm.of(model) if lowered is None else lowered(form, model.ends)
 

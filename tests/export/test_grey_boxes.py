@@ -179,6 +179,11 @@ def test_a_parameter_by_case_is_an_input_of_every_file_or_inside_that_of_a_case(
         check_files(Surrogate.of(one, ranges), kind, inputs, tmp_path)
 
 
+def test_a_model_of_several_cases_is_no_stage_of_a_file() -> None:
+    with pytest.raises(ConfigError, match="gain differ by case, and a file runs one"):
+        Surrogate.of(Cascade(models=(by_case_fit().model,)), RANGES)
+
+
 def test_a_bundle_of_cases_says_what_goes_in_and_keeps_the_records_as_they_were(traces, tmp_path) -> None:
     fit = by_case_fit()
     named = [trace.name for trace in traces]
