@@ -218,12 +218,16 @@ def _levels(p, is_sum):
     members = len(p.neurons)
     level, last = np.zeros(members, dtype=np.int64), np.empty(members, dtype=np.bool_)
     for m in range(members):
-        last[m] = np.all(is_sum[p.output_first[m] : p.output_first[m + 1]])
+        last[m] = True
+        for o in range(p.output_first[m], p.output_first[m + 1]):
+            last[m] &= is_sum[o]
         for other in range(m):
             if _reads(p, m, other):
                 level[m] = max(level[m], level[other] + (0 if last[m] else 1))
-    order, first = np.empty(members, dtype=np.int64), np.zeros(level.max() + 2, dtype=np.int64)
-    at = 0
+    at, levels = 0, 1
+    for m in range(members):
+        levels = max(levels, level[m] + 1)
+    order, first = np.empty(members, dtype=np.int64), np.zeros(levels + 1, dtype=np.int64)
     for one in range(len(first) - 1):
         for sums in (False, True):
             for m in range(members):
@@ -306,20 +310,25 @@ def _by_output(p, order, level_first):
 def _networks(blocks, order, level_first):
     """Members that have neurons, level by level, and where each level begins among them and among their neurons."""
     network_first, neurons_first = np.zeros_like(level_first), np.zeros_like(level_first)
+    networks, found, neurons = np.empty_like(order), 0, 0
     for level in range(len(level_first) - 1):
-        some = blocks[order[level_first[level] : level_first[level + 1]]]
-        network_first[level + 1] = network_first[level] + np.sum(some > 0)
-        neurons_first[level + 1] = neurons_first[level] + LANES * np.sum(some)
-    return order[blocks[order] > 0], network_first, neurons_first
+        for at in range(level_first[level], level_first[level + 1]):
+            if blocks[order[at]] > 0:
+                networks[found] = order[at]
+                found += 1
+                neurons += LANES * blocks[order[at]]
+        network_first[level + 1], neurons_first[level + 1] = found, neurons
+    return networks[:found], network_first, neurons_first
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fixed(p, bounds):
     """Which outputs are held between two numbers, which these are, and what each of them is."""
     limits, codes = p.limits.copy(), np.empty(bounds.shape, dtype=np.int64)
-    codes[:, 0], codes[:, 1] = LOW, HIGH
-    fixed = (p.limit_channel[:, 0] < 0) & (p.limit_channel[:, 1] < 0)
+    fixed = np.empty(len(bounds), dtype=np.bool_)
     for o in range(len(bounds)):
+        codes[o, 0], codes[o, 1] = LOW, HIGH
+        fixed[o] = p.limit_channel[o, 0] < 0 and p.limit_channel[o, 1] < 0
         if bounds[o, 0] >= limits[o, 0]:
             limits[o, 0], codes[o, 0] = bounds[o, 0], LOST
         if bounds[o, 1] <= limits[o, 1]:
@@ -329,12 +338,16 @@ def _fixed(p, bounds):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _part(order_y, level_first_y, chosen):
-    """Some of the outputs in their order, and where each level begins among them."""
-    first = np.zeros_like(level_first_y)
+def _part(order_y, level_first_y, is_sum, wanted):
+    """The outputs that are sums, or the others, in their order, and where each level begins among them."""
+    first, part, found = np.zeros_like(level_first_y), np.empty_like(order_y), 0
     for level in range(len(first) - 1):
-        first[level + 1] = first[level] + np.sum(chosen[order_y[level_first_y[level] : level_first_y[level + 1]]])
-    return order_y[chosen[order_y]], first
+        for at in range(level_first_y[level], level_first_y[level + 1]):
+            if is_sum[order_y[at]] == wanted:
+                part[found] = order_y[at]
+                found += 1
+        first[level + 1] = found
+    return part[:found], first
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -370,9 +383,9 @@ def laid_out(p):
     networks, network_first, neurons_first = _networks(blocks, order, level_first)
     weights, weights_first, gate_blocks, neuron_first, readout, readout_first = _in_blocks(p, theta, order)
     order_y, level_first_y, member, constant, linear_first = _by_output(p, order, level_first)
-    sum_y, first = _part(order_y, level_first_y, is_sum)
+    sum_y, first = _part(order_y, level_first_y, is_sum, True)
     sums = _sums(p, theta, sum_y, first, member, constant, linear_first, fixed_limits, fixed_codes)
-    order_y, level_first_y = _part(order_y, level_first_y, ~is_sum)
+    order_y, level_first_y = _part(order_y, level_first_y, is_sum, False)
     return Layout(
         theta,
         bounds,

@@ -312,7 +312,7 @@ def free_run(programs, theta, x, u, method, substeps, step, widths, places, tabl
             path[t:] = math.nan
             return
         if len(path) > 0:
-            path[t] = x
+            copy_numbers(x, path[t])
         _fill(vh, ah, x, u[t])
         evaluate(outputs[0], vh, ah + n + m, widths, places, table)
         for j in range(len(outputs[1])):
@@ -471,5 +471,5 @@ def derivatives(program, theta, p, x, u, widths, places, table, r, Jx, Jp):
     for j in range(len(results)):
         r[j] = v[results[j]]
         _row(code, d, results[j], first, bar)
-        Jx[j] = bar[at : at + n]
-        Jp[j] = bar[len(constants) : len(constants) + p]
+        copy_numbers(bar[at : at + n], Jx[j])
+        copy_numbers(bar[len(constants) : len(constants) + p], Jp[j])
