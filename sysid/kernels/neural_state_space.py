@@ -116,6 +116,46 @@ def free_run(u, x, theta, k, q, kind, rectified, bound, low, high, y):
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
+def _mixed(factors, S, out):
+    """A weighted sum of rows, four at a time: each number of the sum is read and written once for four of them.
+
+    Args:
+        factors: Shape ``(n_states,)``.
+        S: Shape ``(n_states, n)``.
+        out: Shape ``(n,)``, written.
+    """
+    n, m = S.shape
+    if n == 0:
+        out[:m] = 0.0
+    elif n < 4:
+        a, first = factors[0], S[0]
+        for p in range(m):
+            out[p] = a * first[p]
+    else:
+        a, b, c, d = factors[0], factors[1], factors[2], factors[3]
+        first, second, third, fourth = S[0], S[1], S[2], S[3]
+        for p in range(m):
+            out[p] = a * first[p] + b * second[p] + c * third[p] + d * fourth[p]
+    at = min(n, 1) if n < 4 else 4
+    while at + 3 < n:
+        a, b, c, d = factors[at], factors[at + 1], factors[at + 2], factors[at + 3]
+        first, second, third, fourth = S[at], S[at + 1], S[at + 2], S[at + 3]
+        for p in range(m):
+            out[p] += a * first[p] + b * second[p] + c * third[p] + d * fourth[p]
+        at += 4
+    while at + 1 < n:
+        a, b = factors[at], factors[at + 1]
+        first, second = S[at], S[at + 1]
+        for p in range(m):
+            out[p] += a * first[p] + b * second[p]
+        at += 2
+    if at < n:
+        a, first = factors[at], S[at]
+        for p in range(m):
+            out[p] += a * first[p]
+
+
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _output_row(row, S, z, o, sign, L, v, Wy, hy, slope, G):
     """Derivative of output ``o``, which nothing clips: through the state, and through the output's own parameters.
 
@@ -138,11 +178,7 @@ def _output_row(row, S, z, o, sign, L, v, Wy, hy, slope, G):
         G[i] = sign * L[o, i]
         for j in range(q):
             G[i] += sign * v[o, j] * slope[j] * Wy[j, i]
-    row[:n_S] = 0.0
-    for i in range(n):
-        factor, past = G[i], S[i]
-        for p in range(n_S):
-            row[p] += factor * past[p]
+    _mixed(G, S, row)
     if n_y > 1:  # of the other outputs' weights it is no function
         row[n_S:] = 0.0
     for i in range(r):
@@ -157,38 +193,54 @@ def _output_row(row, S, z, o, sign, L, v, Wy, hy, slope, G):
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
-def _state_row(after, S, z, i, M, V, W, h, slope):
-    """Derivative of the next state ``i``, which nothing bounds; added to ``after``.
+def _state_row(after, S, z, i, F, spread, slope_z, h):
+    """Derivative of the next state ``i``, which nothing bounds.
 
     Args:
-        after: Shape ``(n_dynamic + n_states,)``, zeros at first.
+        after: Shape ``(n_dynamic + n_states,)``, written.
         S: As in :func:`_output_row`.
         z: As in :func:`_output_row`.
         i: The state.
-        M: Linear weights, shape ``(n_states, n_row)``.
+        F: Derivative of the next states by the states, row by row, shape ``(n_states ** 2,)``.
+        spread: Readout of the neurons, each repeated for the entries of ``z``, shape ``(n_states, n_neurons * n_row)``.
+        slope_z: Derivatives of the activations by their weights, shape ``(n_neurons * n_row,)``.
+        h: Activations.
+    """
+    n, r, k = len(S), len(z), len(h)
+    at_W, at_V = n * r, (n + k) * r
+    _mixed(F[i * n : (i + 1) * n], S, after)
+    own = after[i * r : (i + 1) * r]
+    for j in range(r):
+        own[j] += z[j]
+    weights, factors = after[at_W:at_V], spread[i]
+    for j in range(k * r):
+        weights[j] += factors[j] * slope_z[j]
+    readout = after[at_V + i * k : at_V + (i + 1) * k]
+    for o in range(k):
+        readout[o] += h[o]
+
+
+@njit(cache=True, nogil=True, fastmath=FAST)
+def _products(V, W, n, r):
+    """What does not change from sample to sample: the readout repeated, and how each neuron joins two states.
+
+    Args:
         V: Readout of the neurons, shape ``(n_states, n_neurons)``.
         W: Their weights, shape ``(n_neurons, n_row)``.
-        h: Their activations.
-        slope: Derivatives of the activations.
+        n: Number of states.
+        r: Entries of a row.
+
+    Returns:
+        ``spread`` of :func:`_state_row`, and ``V[i, o] W[o, j]``, shape ``(n_neurons, n_states ** 2)``.
     """
-    n, n_S = S.shape
-    r, k = len(z), len(h)
-    at_W, at_V = n * r, (n + k) * r
-    for j in range(n):
-        factor = M[i, j]
+    k = len(W)
+    spread, joined = np.empty((n, k * r)), np.empty((k, n * n))
+    for i in range(n):
         for o in range(k):
-            factor += V[i, o] * slope[o] * W[o, j]
-        past = S[j]
-        for p in range(n_S):
-            after[p] += factor * past[p]
-    for j in range(r):
-        after[i * r + j] += z[j]
-    for o in range(k):
-        factor = V[i, o] * slope[o]
-        place = at_W + o * r
-        for j in range(r):
-            after[place + j] += factor * z[j]
-        after[at_V + i * k + o] += h[o]
+            spread[i, o * r : (o + 1) * r] = V[i, o]
+            for j in range(n):
+                joined[o, i * n + j] = V[i, o] * W[o, j]
+    return spread, joined
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
@@ -230,6 +282,8 @@ def sensitivities(u, x, S, theta, k, q, kind, rectified, bound, low, high, y, J)
     h, slope = np.empty(k), np.empty(k)
     hy, slope_y = np.empty(q), np.empty(q)
     new_x = np.empty(n)
+    spread, joined = _products(V, plain_W, n, r)
+    F, slope_z = np.empty(n * n), np.empty(k * r)
     for t in range(len(u)):
         for i in range(n):
             z[i] = x[i]
@@ -255,6 +309,16 @@ def sensitivities(u, x, S, theta, k, q, kind, rectified, bound, low, high, y, J)
         # the state
         _activate(W, z, kind, h, slope)
         for i in range(n):
+            for j in range(n):
+                F[i * n + j] = M[i, j]
+        for o in range(k):
+            factor, row = slope[o], joined[o]
+            for j in range(n * n):
+                F[j] += factor * row[j]
+            place = o * r
+            for j in range(r):
+                slope_z[place + j] = factor * z[j]
+        for i in range(n):
             new = 0.0
             for j in range(r):
                 new += M[i, j] * z[j]
@@ -262,9 +326,9 @@ def sensitivities(u, x, S, theta, k, q, kind, rectified, bound, low, high, y, J)
                 new += V[i, j] * h[j]
             new_x[i] = _clip(new, -bound, bound)
             after = following[i]
-            after[:] = 0.0
             if new_x[i] != new:
+                after[:] = 0.0
                 continue
-            _state_row(after, S, z, i, M, V, plain_W, h, slope)
+            _state_row(after, S, z, i, F, spread, slope_z, h)
         copy_rows(following, S)
         copy_numbers(new_x, x)

@@ -42,10 +42,11 @@ from sysid.estimation.grey_box.stepping import (
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
-from sysid.estimation.networks.choosing import choose
+from sysid.estimation.networks.choosing import Choice, choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
+from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult, Status
 from sysid.models import AbstractStructure, Mapping, Start
 from sysid.models.built_model import BuiltModel
@@ -232,7 +233,8 @@ def fit_equations(
     training = (training or Training()).with_starts(STARTS)
     check_training(training)
     template = with_cases(template, experiments, data[1], data[2])
-    ready = _ready(template, experiments)
+    windows = Windows.of(experiments, replace(training, window=0) if template.grey.by_case else training)
+    ready = _ready(template, windows.experiments)
     starts.check_samples(ready.provider)
     multistart = starts.Multistart(
         training=training,
@@ -257,14 +259,35 @@ def fit_equations(
     # The latest first: of a start that converged, the last look at it is chosen, and not one that saw the same.
     candidates = [settled(one, ready.provider) for one in reversed(starts.run(multistart))]
     choice = choose(candidates, _chosen_by(training, ready), vet)
+    if windows.samples:
+        race = choice.chosen
+        ready, choice = _over_all(ready, multistart, windows, choice)
+        candidates = in_place(candidates, race, choice.chosen)
     done = finished(ready, choice.chosen, training, stopped=multistart.stop.is_set())
     candidates = [done.candidate if one is choice.chosen else one for one in candidates]
     choice = replace(choice, chosen=done.candidate)
     records = [(e.inputs, e.history) for e in experiments]
     status = multistart_status(done.candidate, candidates, records, interrupted=multistart.stop.is_set())
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
-    found = multistart_result(choice, candidates, training, status, seconds)
+    found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
     return _told(found, done, data, ready.named)
+
+
+def _over_all(ready: Ready, multistart: starts.Multistart, windows: Windows, choice: Choice) -> tuple[Ready, Choice]:
+    """The choice, trained on over all samples of the records, and what it is trained on with."""
+    whole = replace(ready.provider, records=tuple(Record.of(one, ready.provider.form) for one in windows.records))
+    p = len(whole.scale)
+    state = choice.chosen.solution.state
+    begun = np.zeros(whole.n_parameters)
+    begun[:p] = state.theta[:p]
+    begun = whole.with_states(begun, whole.states(begun, WINDOW))
+    found = [np.concatenate([values[:p], begun[p:]]) for values in (state.theta, state.prior.centre)]
+    ready = replace(ready, provider=whole)
+    layout = multistart.layout
+    assert isinstance(layout, EquationLayout)  # noqa: S101 - it was made so
+    own = replace(multistart, layout=replace(layout, provider=whole), to_plain=ready.to_plain)
+    choice = windows.finished(own, choice, whole, *found)
+    return ready, replace(choice, chosen=settled(choice.chosen, whole))
 
 
 def _chosen_by(training: Training, ready: Ready) -> str:

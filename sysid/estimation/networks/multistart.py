@@ -266,9 +266,15 @@ def _advance(multistart: Multistart, number: int, before: Candidate | None, shar
 
 
 def advanced(
-    multistart: Multistart, provider: AbstractProvider, before: Candidate, *, name: str, iterations: int
+    multistart: Multistart,
+    provider: AbstractProvider,
+    before: Candidate,
+    *,
+    name: str,
+    iterations: int,
+    begun: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> Candidate:
-    """A candidate that is trained on with other weights of its residuals.
+    """A candidate that is trained on with other residuals: other weights of them, or those of other records.
 
     Args:
         multistart: What the candidates have in common.
@@ -276,21 +282,25 @@ def advanced(
         before: The candidate.
         name: Of this run among those that are kept.
         iterations: At most.
+        begun: The parameters, and what they are drawn to, where those of the records' initial states are others; the
+            candidate's by default.
 
     Returns:
         The candidate that it becomes; its iterations go on from those before.
     """
     keep, state = multistart.checkpoints, before.solution.state
+    theta, centre = begun or (state.theta, state.prior.centre)
     with one_blas_thread():
-        at = provider.linearise(state.theta)
+        at = provider.linearise(theta)
         # Precisions that suited the residuals as they were may hold the weights where they are.
-        prior = first_prior(multistart.training, multistart.layout, provider, state.theta, state.prior.centre)
-        begun = replace(state, at=at, prior=prior, losses=(at.loss,), damping=DAMPINGS[multistart.training.damping]())
+        prior = first_prior(multistart.training, multistart.layout, provider, theta, centre)
+        damping = DAMPINGS[multistart.training.damping]()
+        first = replace(state, theta=theta, at=at, prior=prior, losses=(at.loss,), damping=damping)
         seconds = multistart.training.max_time_s - state.curve[-1].elapsed_s
         engine = _engine(multistart, before.number, state.iteration + iterations, seconds)
         if engine.evidence_after is not None:
             engine = replace(engine, evidence_after=state.iteration + SETTLED)
-        solution = keep.resume(name, engine, provider, begun)
+        solution = keep.resume(name, engine, provider, first)
     model = multistart.model(solution.theta)
     return replace(before, solution=solution, model=model, score=score(multistart, model))
 

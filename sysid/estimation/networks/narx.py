@@ -19,7 +19,7 @@ from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks import ensemble
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
-from sysid.estimation.networks.choosing import choose
+from sysid.estimation.networks.choosing import Choice, choose
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
@@ -28,6 +28,7 @@ from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import check_initial, grown
+from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult, Loop
 from sysid.models import NARX, History, Mapping, NARXModel, Recursion, Start
 from sysid.traces import Trace
@@ -82,7 +83,10 @@ def fit_narx(
     lags = network.lags(len(mapping.inputs))
     experiments = tuple(e.from_measured(lags) for e in experiments_of(traces, mapping, start, rest))
     experiments = (*experiments, *_offset(experiments, mapping, training))
-    task = _Task.of(_template(traces[0], mapping, network, experiments, rest), experiments, training)
+    template = _template(traces[0], mapping, network, experiments, rest)
+    windows = Windows.of(experiments, training)
+    seen = tuple(e.from_measured(lags) for e in windows.experiments)
+    task = _Task.of(template, seen, training)
     multistart = starts.Multistart(
         training=training,
         layout=task.layout,
@@ -95,12 +99,16 @@ def fit_narx(
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
         resume=resume,
-        pretraining=_pretraining(training, task, experiments),
+        pretraining=_pretraining(training, task, seen),
     )
-    tasks = _started(multistart, task, experiments)
+    tasks = _started(multistart, task, seen)
     on_checkpoint(Checkpoint.of(choose(list(tasks), training.choose_by).chosen.solution.state))
     tasks |= _with_ensemble(multistart, list(tasks), experiments, vet)
     choice = choose(list(tasks), training.choose_by, vet)
+    if windows.samples:
+        race = choice.chosen
+        choice = _over_all(multistart, windows, choice, tasks[race])
+        tasks = dict(zip(in_place(list(tasks), race, choice.chosen), tasks.values(), strict=True))
     chosen = choice.chosen
     records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     records += [(t.columns(mapping.inputs), None) for t in selection]
@@ -119,7 +127,7 @@ def fit_narx(
         )
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
     fit = multistart_result(choice, list(tasks), training, status, seconds)
-    return replace(fit, posterior=posterior)
+    return replace(with_note(fit, windows), posterior=posterior)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -152,6 +160,18 @@ class _Task(ensemble.Task):
         to_plain = embedding(layout, whole) @ basis.to_plain(layout)
         provider = RebasedProvider(inner=inner, to_plain=to_plain)
         return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider, inner=inner)
+
+
+def _over_all(multistart: starts.Multistart, windows: Windows, choice: Choice, task: _Task) -> Choice:
+    """The choice, trained on over all samples of the records."""
+    inner = replace(task.inner, experiments=windows.records)
+    own = replace(multistart, to_plain=task.to_plain)
+    if choice.chosen.without:
+        whole = Layout.of(task.template.network, len(task.template.mapping.inputs))
+        own = replace(own, layout=PartLayout(part=task.layout, whole=whole))
+    state = choice.chosen.solution.state
+    provider = RebasedProvider(inner=inner, to_plain=task.to_plain)
+    return windows.finished(own, choice, provider, state.theta, state.prior.centre)
 
 
 def _started(

@@ -171,13 +171,15 @@ class NeuralProvider(AbstractProvider):
         loss, correlated = 0.0, 0.0
         for record in self._records:
             residuals = []
-            for rows, y, block in self._blocks(record, theta):
+            raw_gradient, raw_matrix = np.zeros(self._n_raw), np.zeros((self._n_raw, self._n_raw))
+            for rows, y, raw in self._raw(record, theta):
                 residual = record.weighted(y - record.target[rows], rows)
-                weighted = record.weighted(block, rows)
+                weighted = record.weighted(raw, rows)
                 loss += 0.5 * float(residual @ residual)
-                gradient += weighted.T @ residual
-                matrix += weighted.T @ weighted  # one array twice: NumPy calls syrk, half the flops
+                raw_gradient += weighted.T @ residual
+                raw_matrix += weighted.T @ weighted  # one array twice: NumPy calls syrk, half the flops
                 residuals.append(residual)
+            self._add(record, raw_gradient, raw_matrix, gradient, matrix)
             for whole in np.concatenate(residuals).reshape(-1, self.template.sizes.outputs).T:
                 correlated += len(whole) * correlation_time(whole)
         return Linearisation(
@@ -239,6 +241,22 @@ class NeuralProvider(AbstractProvider):
         """
         return replace(self.template, theta=theta[: self.template.sizes.count])
 
+    def begun(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters of the model for these records, whose own initial states are where the map puts them.
+
+        Args:
+            theta: Flat parameters; those of other records' initial states may stand behind the model's.
+
+        Returns:
+            Shape ``(n_parameters,)``.
+        """
+        found = np.zeros(self.n_parameters)
+        found[: self.template.sizes.count] = theta[: self.template.sizes.count]
+        for record in self._records:
+            if record.free is not None:
+                found[record.free] = self._begin(replace(record, free=None), found)
+        return found
+
     def _begin(self, record: _Record, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """State before the record's first sample. Not bounded: a bound here would hide the way back."""
         if record.free is not None:
@@ -246,27 +264,65 @@ class NeuralProvider(AbstractProvider):
         E = theta[self.template.sizes.start].reshape(self.template.sizes.states, -1)
         return np.asarray(E @ record.oldest)
 
-    def _blocks(
+    @property
+    def _n_raw(self) -> int:
+        """Columns of a row as the kernel writes it: dynamics, the state that the record begins at, output."""
+        return int(self.template.sizes.output.stop) + self.template.sizes.states
+
+    def _of_begun(self, record: _Record) -> tuple[slice, NDArray[np.float64]]:
+        """Which parameters the state that a record begins at comes from, and its derivative by them."""
+        identity = np.eye(self.template.sizes.states, dtype=np.float64)
+        if record.free is not None:
+            return record.free, identity
+        return self.template.sizes.start, np.kron(identity, record.oldest).astype(np.float64, copy=False)
+
+    def _add(
+        self,
+        record: _Record,
+        raw_gradient: NDArray[np.float64],
+        raw_matrix: NDArray[np.float64],
+        gradient: NDArray[np.float64],
+        matrix: NDArray[np.float64],
+    ) -> None:
+        """Add the normal equations of one record's rows as the kernel writes them to those of the parameters."""
+        n, dynamic, output = self.template.sizes.states, self.template.sizes.dynamic, self.template.sizes.output
+        begun = slice(dynamic.stop, dynamic.stop + n)
+        kept = np.r_[dynamic, begun.stop : self._n_raw]
+        places = np.r_[dynamic, output]
+        to, D = self._of_begun(record)
+        gradient[places] += raw_gradient[kept]
+        gradient[to] += D.T @ raw_gradient[begun]
+        matrix[np.ix_(places, places)] += raw_matrix[np.ix_(kept, kept)]
+        across = raw_matrix[kept, begun] @ D
+        matrix[places, to] += across
+        matrix[to, places] += across.T
+        matrix[to, to] += D.T @ raw_matrix[begun, begun] @ D
+
+    def _raw(
         self, record: _Record, theta: NDArray[np.float64]
     ) -> Iterator[tuple[slice, NDArray[np.float64], NDArray[np.float64]]]:
+        """Outputs, and rows of the Jacobian as the kernel writes them; both are written over by the next block."""
         sizes = self.template.sizes
         n, dynamic = sizes.states, sizes.dynamic.stop
         x = self._begin(record, theta)
         S = np.zeros((n, dynamic + n))
         S[:, dynamic:] = np.eye(n)
-        raw = np.empty((BLOCK, sizes.outputs, sizes.output.stop + n))
-        J = np.zeros((BLOCK, sizes.outputs, len(theta)))
-        y = np.empty((BLOCK, sizes.outputs))
+        raw, y = np.empty((BLOCK, sizes.outputs, self._n_raw)), np.empty((BLOCK, sizes.outputs))
         for first in range(0, len(record.target), BLOCK):
             rows = min(BLOCK, len(record.target) - first)
             kernel.sensitivities(
                 record.u[first : first + rows], x, S, *self.template.arguments(theta), y[:rows], raw[:rows]
             )
-            J[:rows, :, :dynamic] = raw[:rows, :, :dynamic]
-            J[:rows, :, sizes.output] = raw[:rows, :, dynamic + n :]
-            begun = raw[:rows, :, dynamic : dynamic + n]
-            if record.free is None:
-                J[:rows, :, sizes.start] = (begun[..., None] * record.oldest).reshape(rows, sizes.outputs, -1)
-            else:
-                J[:rows, :, record.free] = begun
-            yield slice(first, first + rows), y[:rows], J[:rows]
+            yield slice(first, first + rows), y[:rows], raw[:rows]
+
+    def _blocks(
+        self, record: _Record, theta: NDArray[np.float64]
+    ) -> Iterator[tuple[slice, NDArray[np.float64], NDArray[np.float64]]]:
+        dynamic, output = self.template.sizes.dynamic, self.template.sizes.output
+        begun = slice(dynamic.stop, dynamic.stop + self.template.sizes.states)
+        to, D = self._of_begun(record)
+        for rows, y, raw in self._raw(record, theta):
+            J = np.zeros((*raw.shape[:2], len(theta)))
+            J[..., dynamic], J[..., output] = raw[..., dynamic], raw[..., begun.stop :]
+            J[..., to] = raw[..., begun] @ D
+            yield rows, y, J

@@ -23,6 +23,7 @@ from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
 from sysid.estimation.networks.output_weights import reweighted, weighed
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
+from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult
 from sysid.models import (
     AbstractStructure,
@@ -195,8 +196,8 @@ def _fit(
     began = time.perf_counter()
     training = (training or Training()).with_starts(STARTS)
     check_training(training)
-    experiments = records.experiments
-    provider = NeuralProvider(template=template.recursion, experiments=experiments)
+    experiments, windows = records.experiments, Windows.of(records.experiments, training)
+    provider = NeuralProvider(template=template.recursion, experiments=windows.experiments)
     starts.check_samples(provider)
     base = linear_start(provider)
     provider = weighed(provider, base)
@@ -215,6 +216,14 @@ def _fit(
     candidates = starts.run(multistart)
     candidates += reweighted(multistart, provider, choose(candidates, training.choose_by).chosen)
     choice = choose(candidates, training.choose_by, vet)
+    if windows.samples:
+        race = choice.chosen
+        provider = replace(provider, experiments=experiments)
+        theta, centre = map(provider.begun, (race.solution.theta, race.solution.state.prior.centre))
+        provider = weighed(provider, theta)
+        own = replace(multistart, to_plain=np.eye(template.n_parameters, provider.n_parameters))
+        choice = windows.finished(own, choice, provider, theta, centre)
+        candidates = in_place(candidates, race, choice.chosen)
     others = experiments_of(records.selection, template.mapping, records.start, template.resting)
     status = multistart_status(
         choice.chosen,
@@ -224,7 +233,8 @@ def _fit(
     )
     posterior = _posterior(choice.chosen, provider, records)
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
-    return replace(multistart_result(choice, candidates, training, status, seconds), posterior=posterior)
+    found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
+    return replace(found, posterior=posterior)
 
 
 def _posterior(chosen: starts.Candidate, provider: NeuralProvider, records: Records) -> Posterior | None:

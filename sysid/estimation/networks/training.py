@@ -17,6 +17,10 @@ CHOICES = {
 """Options that are words, and what they may be; the first is a good example."""
 
 
+LEAST_WINDOW = 10
+"""Samples of a window at least."""
+
+
 def check_choice(name: str, value: object, choices: Sequence[str]) -> None:
     """Refuse a word that is none of some.
 
@@ -70,6 +74,9 @@ class Training:
         pretraining_iterations: Iterations of the pretraining.
         stride: Every so-manieth sample counts in the loss. Residuals of a free run are correlated over tens of samples:
             a few of them say nearly as much as all, and the price of the normal equations falls with them.
+        window: Samples of a window of a long record: starts are raced on eight windows, and what is chosen is trained
+            on over all samples (``windows.py``). By default 5,000 where the records have more than 200,000 samples
+            together; 0 for never.
         ensemble: Picks that unite candidates of the multistart into one network whose one-step map is the mean of
             theirs (``ensemble.py``), selected on the selection traces; 1 for none. Each member adds its neurons.
         input_subsets: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs
@@ -93,6 +100,7 @@ class Training:
     pretraining: int = 0
     pretraining_iterations: int = 300
     stride: int = 1
+    window: int | None = None
     ensemble: int = 1
     input_subsets: tuple[tuple[str, ...], ...] = ()
 
@@ -125,6 +133,14 @@ class Training:
         if self.pretraining < 0:
             raise ConfigError(
                 "pretraining is too small", where="pretraining", expected="0 or more", got=self.pretraining
+            )
+        if self.window is not None and 0 != self.window < LEAST_WINDOW:
+            raise ConfigError(
+                "window is too small",
+                where="window",
+                expected=f"{LEAST_WINDOW} samples or more, or 0 for whole records",
+                got=self.window,
+                remedy="make it longer than what the system remembers",
             )
         if self.regularisation is not None and not 0.0 <= self.regularisation < float("inf"):
             raise ConfigError(

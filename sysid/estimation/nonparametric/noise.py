@@ -10,6 +10,9 @@ from scipy import linalg
 
 from sysid.estimation.nonparametric.segments import columns_of_lags
 
+BLOCK = 65_536
+"""Rows of a regression that are in memory at a time."""
+
 
 def whitener(residuals: Sequence[NDArray[np.float64]], most: int, *, exact: bool = False) -> NDArray[np.float64]:
     """The filter that whitens some residuals.
@@ -24,16 +27,16 @@ def whitener(residuals: Sequence[NDArray[np.float64]], most: int, *, exact: bool
         white.
     """
     white = np.ones(1)
-    blocks = [
-        np.column_stack([columns_of_lags(e, range(1, most + 1), slice(most, None)), e[most:]])
-        for e in residuals
-        if len(e) > most
-    ]
-    rows = sum(map(len, blocks))
+    rows = sum(max(len(e) - most, 0) for e in residuals)
     if most == 0 or rows <= 2 * most + 2:
         return white
-    # Leading columns of one triangular factor hold every smaller order.
-    R = linalg.qr(np.concatenate(blocks), mode="r")[0][: most + 1]
+    # Leading columns of one triangular factor hold every smaller order. It is brought up to date block by block.
+    R = np.zeros((0, most + 1))
+    for e in residuals:
+        for first in range(most, len(e), BLOCK):
+            some = slice(first, min(first + BLOCK, len(e)))
+            block = np.column_stack([columns_of_lags(e, range(1, most + 1), some), e[some]])
+            R = linalg.qr(np.concatenate([R, block]), mode="r")[0][: most + 1]
     left = np.append(np.cumsum(R[::-1, -1] ** 2)[::-1], 0.0)[: most + 1]
     scores = rows * np.log(np.maximum(left, np.finfo(np.float64).tiny) / rows) + np.log(rows) * np.arange(most + 1)
     order = most if exact else int(np.argmin(scores))
