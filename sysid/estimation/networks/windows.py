@@ -76,8 +76,8 @@ class Windows:
         """What was done, in a sentence."""
         total = sum(len(one.output) for one in self.records)
         return (
-            f"Raced on {len(self.experiments)} windows of {self.samples:,} samples at most; what was chosen was trained "
-            f"on over all {total:,} samples (`window: 0` races on all of them)."
+            f"Raced on {len(self.experiments)} windows of {self.samples:,} samples at most; what was chosen was "
+            f"trained on over all {total:,} samples (`window: 0` races on all of them)."
         )
 
     def finished(
