@@ -17,6 +17,8 @@ STILL = 8.0 * np.finfo(np.float64).eps
 SAME = 1e-9
 """Part of an input that others do not explain, below which it is made of them."""
 
+FAR, FEW = 20.0, 0.01
+"""Ranges of all other samples from which a sample is told to be far off, and the most that are, of each side."""
 LAGS = 5
 """Past errors and inputs that are taken out of the error, before the input of the same sample is looked at."""
 LEAST_SAMPLES = 100
@@ -30,6 +32,8 @@ WORSE, HARDLY = 1.1, 0.9
 above which it does as well, all but a twentieth of the output's movement."""
 SHARE, SURE = 0.2, 1e-6
 """Part of the error that an input of the same sample must explain, and how improbable that is by chance."""
+NEARLY_ALL = 0.9
+"""Part of what is new in an output that an input of the same sample explains, from which one may be the other."""
 
 
 def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
@@ -40,7 +44,7 @@ def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
         mapping: Which channels go in, which come out.
 
     Returns:
-        One sentence for each such channel.
+        One sentence for each such channel, and for each of which a few samples are far from all others.
     """
     usable = [trace.usable_samples for trace in traces]
     if not any(seen.any() for seen in usable):
@@ -59,7 +63,24 @@ def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
         elif j not in kept:
             names = ", ".join(mapping.inputs[i] for i in kept if i < j)
             told.append(f"{name} is made of {names} in these records: they do not tell their effects apart.")
-    return tuple(told)
+    columns = zip((*mapping.inputs, *mapping.outputs), (*inputs.T, *outputs.T), strict=True)
+    return (*told, *(told_ for name, column in columns for told_ in _far_off(name, column)))
+
+
+def _far_off(name: str, column: NDArray[np.float64]) -> list[str]:
+    """A few samples so far from all others that squared errors see nothing else: a fault of the recording."""
+    if len(column) < LEAST_SAMPLES:
+        return []
+    low, high = np.quantile(column, [FEW, 1.0 - FEW], method="nearest")
+    away = np.maximum(low - column, column - high)
+    far = away > FAR * (high - low)
+    if not far.any() or high == low:
+        return []
+    return [
+        f"{int(far.sum())} of {len(column)} samples of {name} lie up to {float(away.max() / (high - low)):.3g} times the "
+        "range of all others away from them, and squared errors see nothing else. If they are faults of the recording, "
+        "leave their cells empty and mask them (repairs: {nan: mask})."
+    ]
 
 
 def outnumbered(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...]:
@@ -150,7 +171,7 @@ def contradicted(model: AbstractModel, traces: Sequence[Trace], start: Start) ->
 
     Returns:
         One sentence for each output whose free run a constant beats or equals, and for each input that acts at once
-        where the model lets it act only later.
+        where the model lets it act only later, or lets it without being asked.
     """
     runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
     longest = max(runs, key=lambda run: len(run.output))
@@ -191,8 +212,10 @@ def _acts_at_once(model: AbstractModel, run: FreeRun) -> list[str]:
     for j in informative(run.inputs[usable]):
         name = model.mapping.inputs[j]
         for i, target in enumerate(model.mapping.outputs):
-            small = np.std(error[usable, i]) <= LEAST_ERROR * np.std(run.output[usable, i])
-            if small or _has_path(model, run, j, i):
+            if _has_path(model, run, j, i):
+                told += _read_backwards(model, run, j, i)
+                continue
+            if np.std(error[usable, i]) <= LEAST_ERROR * np.std(run.output[usable, i]):
                 continue
             share = _share(error[:, i], run.inputs, j, usable)
             if share > 0.0:
@@ -202,6 +225,19 @@ def _acts_at_once(model: AbstractModel, run: FreeRun) -> list[str]:
                     f"input_delays from 0, feedthrough: true), or it is fed back from {target}."
                 )
     return told
+
+
+def _read_backwards(model: AbstractModel, run: FreeRun, j: int, i: int) -> list[str]:
+    """Whether a model that lets inputs act at once, unasked, may have learnt the controller and not the plant."""
+    share = _share(run.output[:, i], run.inputs, j, run.usable) if model.structure.acts_at_once else 0.0
+    if share < NEARLY_ALL:
+        return []
+    name, target = model.mapping.inputs[j], model.mapping.outputs[i]
+    return [
+        f"{100 * share:.0f} % of what is new in {target} moves with {name} of the same sample, and the model takes {name}"
+        f" to act at once. Where {name} is set by a controller that reads {target}, that is the controller read "
+        f"backwards and no plant: fit a structure whose inputs act from lag 1 on (NARX input_delays: 1, ARX nk: 1)."
+    ]
 
 
 def _still(column: NDArray[np.float64]) -> bool:

@@ -41,6 +41,9 @@ class AbstractStructure(ABC):
     several_outputs: bool = False
     """Whether one model has all outputs of a mapping; where it is false, each output gets a model of its own."""
 
+    acts_at_once: bool = False
+    """Whether inputs may act within their sample without being asked to: no field of it says so."""
+
     learns_start: bool = False
     """Whether where a record begins is fitted with the parameters, so that a run from its start need not be at rest."""
 

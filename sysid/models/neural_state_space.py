@@ -52,6 +52,7 @@ class NeuralStateSpace(AbstractStructure):
     activation: Activation = PLAIN
     output: str = "plain"
 
+    acts_at_once = True
     kind = "NSS"
     learns_start = True
 

@@ -127,3 +127,28 @@ def test_a_transfer_function_without_effect_still_leaves_the_state_in_which_it_b
     (case,) = next(iter(sysid.compare(traces, fit).evaluations.values())).cases.values()
     assert case.free_run.max_abs_error < 1e-9
     assert not fit.model.recursion.B.any()
+
+
+def test_a_controller_read_backwards_is_told() -> None:
+    rng = np.random.default_rng(2)
+    y, u, x = np.zeros(N), np.zeros(N), 0.0
+    for k in range(N):
+        y[k] = x + 0.05 * rng.standard_normal()
+        u[k] = -3.0 * y[k]
+        x = 0.9 * x + 0.1 * u[k]
+    fit = _fit(u, y, sysid.NeuralStateSpace(states=1, neurons=1))
+    (told,) = [note for note in fit.warnings if "of the same sample" in note]
+    assert told.startswith("100 % of what is new in y moves with u")
+    assert "controller" in told
+    plant = _fit(_u(), _y(_u(), dead=1), sysid.NeuralStateSpace(states=1, neurons=1))
+    assert not [note for note in plant.warnings if "of the same sample" in note]
+
+
+def test_samples_far_from_all_others_are_told_and_large_steps_are_not() -> None:
+    u = _u()
+    y = _y(u, dead=1)
+    y[[50, 120]] = 1e6
+    (told,) = [note for note in _fit(u, y, STRUCTURES[0]).warnings if "samples of y lie" in note]
+    assert told.startswith("2 of 240 samples of y lie up to ")
+    pulse = np.where(np.arange(N) % 100 < 3, 30.0, 0.0) + 0.01 * u  # 3 % of the samples are no faults
+    assert not [note for note in _fit(pulse, _y(pulse, dead=1), STRUCTURES[0]).warnings if "samples of" in note]
