@@ -77,9 +77,9 @@ def _far_off(name: str, column: NDArray[np.float64]) -> list[str]:
     if not far.any() or high == low:
         return []
     return [
-        f"{int(far.sum())} of {len(column)} samples of {name} lie up to {float(away.max() / (high - low)):.3g} times the "
-        "range of all others away from them, and squared errors see nothing else. If they are faults of the recording, "
-        "leave their cells empty and mask them (repairs: {nan: mask})."
+        f"{int(far.sum())} of {len(column)} samples of {name} lie up to {float(away.max() / (high - low)):.3g} times "
+        "the range of all others away from them, and squared errors see nothing else. If they are faults of the "
+        "recording, leave their cells empty and mask them (repairs: {nan: mask})."
     ]
 
 
@@ -234,9 +234,9 @@ def _read_backwards(model: AbstractModel, run: FreeRun, j: int, i: int) -> list[
         return []
     name, target = model.mapping.inputs[j], model.mapping.outputs[i]
     return [
-        f"{100 * share:.0f} % of what is new in {target} moves with {name} of the same sample, and the model takes {name}"
-        f" to act at once. Where {name} is set by a controller that reads {target}, that is the controller read "
-        f"backwards and no plant: fit a structure whose inputs act from lag 1 on (NARX input_delays: 1, ARX nk: 1)."
+        f"{100 * share:.0f} % of what is new in {target} moves with {name} of the same sample, and the model takes "
+        f"{name} to act at once. Where {name} is set by a controller that reads {target}, that is the controller read "
+        "backwards and no plant: fit a structure whose inputs act from lag 1 on (NARX input_delays: 1, ARX nk: 1)."
     ]
 
 

@@ -201,7 +201,10 @@ def _names_rows(names: RawColumn, time: RawColumn) -> bool:
     if len(pairs) < max(0.9 * known.sum(), 2):
         return False
     again = len(np.unique(pairs[:, 0])) <= _LONG_SHARE * len(pairs)
-    return again or float(np.mean(np.diff(codes) != 0)) >= _CHANGE_SHARE
+    # One signal after the other: time steps back where the next begins, and nowhere else.
+    changes, back = np.flatnonzero(np.diff(codes)), np.flatnonzero(np.diff(time.values) < 0.0)
+    blocks = len(changes) == len(names.words.texts) - 1 and np.array_equal(changes, back)
+    return again or blocks or float(np.mean(np.diff(codes) != 0)) >= _CHANGE_SHARE
 
 
 def _follows(units: RawColumn, names: RawColumn) -> bool:

@@ -19,6 +19,7 @@ from sysid.ingest.headers import is_unit, split_reference
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.restarts import finer_than_clock, records_by_clock
+from sysid.ingest.second_clocks import without_second_clocks
 from sysid.ingest.table import RawColumn, RawTable, is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert, is_pressure
@@ -226,7 +227,8 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
                 step, needs, timing = finer[0], {}, None
                 time, told = TimeOptions(step=step), f"guessed: {finer[1]}"
     others = tuple(replace(_column(column), problem=_other(column, len(table))) for column in table.others)
-    columns = tuple(_column(column) for column in table.columns if column.name != clock) + others
+    told_apart = without_second_clocks(table, clock).columns
+    columns = tuple(_column(column) for column in told_apart if column.name != clock) + others
     channels = [column for column in columns if not column.problem and not column.aside]
     needed = {
         "ragged": repairs.ragged,

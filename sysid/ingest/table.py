@@ -250,7 +250,7 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
     Returns:
         Its name, or ``None`` if no column is plainly one.
     """
-    named = [column for column in columns if _is_called_time(column.name)]
+    named = [column for column in columns if is_called_time(column.name)]
     # A capital T may be a temperature: only where nothing else is called time, and it rises.
     plain = [column for column in named if re.split(r"[/.]", column.name.strip())[-1] != "T"]
     found = next(iter(plain), None) or next((column for column in named if _may_be_clock(column)), None)
@@ -267,7 +267,19 @@ def _may_be_clock(column: RawColumn) -> bool:
     return not len(rises) or bool(rises.mean() > 0.9)
 
 
-def _is_called_time(name: str) -> bool:
+def is_called_time(name: str) -> bool:
+    """Whether a column is called time, by itself or in whatever group it stands.
+
+    Args:
+        name: Its name without the unit.
+
+    Returns:
+        Whether it is.
+
+    Example:
+        >>> is_called_time("rig/Time"), is_called_time("t_ms"), is_called_time("temperature")
+        (True, True, False)
+    """
     whole = name.casefold().strip()
     # In whatever group it stands: "rig/time", "run{2}.t".
     for plain in (whole, re.split(r"[/.]", whole)[-1]):

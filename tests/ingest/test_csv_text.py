@@ -181,3 +181,30 @@ def test_a_packed_file_is_told_to_be_unpacked(write: Write) -> None:
     path.write_bytes(gzip.compress(b"t,u\n0,1\n1,2\n"))
     with pytest.raises(ReaderError, match=r"(?s)packed with gzip.*unpack"):
         read_table(path)
+
+
+ROWS = "".join(f"{k / 10},{k % 3},{k * k}\n" for k in range(5, 20))
+HEADERS = {
+    "words in the first cells": ("t,u,y\n" + "".join(f"{k / 10},{k % 3},warmup\n" for k in range(5)), ["t", "u", "y"]),
+    "limits in the first cells": ("t,u,y\n" + "".join(f"{k / 10},{k % 3},<0.5\n" for k in range(5)), ["t", "u", "y"]),
+    "a title with numbers": ("Test 12, 2024, Rig 3\nt,u,y\n", ["t", "u", "y"]),
+    "titles over names": ("Engine,Engine,Pump\nt,u,y\n", ["t", "u", "y"]),
+    "titles over names that come again": (",Inlet,Outlet\nt,p,p\n", ["t", "Inlet p", "Outlet p"]),
+    "a line of units": ("load,pump,level\nt,V,m\n", ["load", "pump", "level"]),
+}
+
+
+@pytest.mark.parametrize("case", HEADERS)
+def test_the_header_is_the_line_of_names(write: Write, case: str) -> None:
+    head, names = HEADERS[case]
+    # Tonnes need not rise from row to row, as time does.
+    rows = ROWS if names[0] == "t" else "".join(reversed(ROWS.splitlines(keepends=True)))
+    table = read_table(write("run.csv", head + rows))
+    assert list(table.names) == names
+    assert len(table) == 15 + head.count("\n0.")
+
+
+def test_signals_that_stand_one_after_the_other_are_a_long_table(write: Write) -> None:
+    rows = "".join(f"{k / 10},y,{k * k}\n" for k in range(10))
+    finding = inspect_file(write("run.csv", "time,name,value\n0.0,u,1\n0.5,u,3\n" + rows))
+    assert [(column.name, column.maximum) for column in finding.columns] == [("u", 3.0), ("y", 81.0)]

@@ -75,3 +75,13 @@ def test_units_of_cf_and_time_since_a_date(tmp_path: Path) -> None:
     table = read_table(tmp_path / "run.nc")
     assert (table.find("t").unit, table.find("q").unit) == ("min", "kg * m**-3 * s**-1")
     assert "t: minutes since 2000-01-01 00:00" in table.notes
+
+
+def test_a_stand_in_of_fewer_digits_than_the_values_is_missing(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["time"], file["u"] = TIME, np.where(np.arange(len(VOLT)) == 1, 1e20, VOLT)
+        file["u"].attrs["missing_value"] = np.float32(1e20)
+    missing = np.isnan(read_table(tmp_path / "run.h5").find("u").values)
+    assert np.flatnonzero(missing).tolist() == [1]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
 from sysid.errors import ReaderError, shortened
@@ -26,6 +27,7 @@ from sysid.ingest.readers.csv_cells import (
     suffix_of,
     trimmed,
 )
+from sysid.ingest.table import is_called_time
 
 SEPARATORS = ("\t", ";", ",", "|", BLANKS)
 """What may stand between cells; the earlier one wins where two fit."""
@@ -267,18 +269,22 @@ def _first(split: _Split, options: FileOptions) -> int:
     first = fitting[0]
     if options.header and first == 0 and len(split.rows) > 1:
         return 1
-    while first > 1 and _is_spoilt(split, first - 1):
-        first -= 1
-    return first
+    top = first
+    while top > 0 and _is_spoilt(split, top - 1):
+        top -= 1
+    # Below a row of words only: what else stands above the numbers may have numbers in it, too.
+    return top if 0 < top < first and _numbers_in(split, top - 1) == 0 else first
 
 
 def _is_spoilt(split: _Split, index: int) -> bool:
-    """Whether a row that does not fit is one of numbers with a bad cell, below a row of words."""
-    rows = [trimmed(row.cells, split.width) for row in split.rows[index - 1 : index + 1]]
-    if any(len(cells) != split.width for cells in rows):
-        return False
-    above, here = (sum(kind_of(cell) in DATA for cell in cells) for cells in rows)
-    return above == 0 and 2 * here >= sum(kind in DATA for kind in split.kinds)
+    """Whether a row that does not fit is one of numbers with a bad cell."""
+    return 2 * _numbers_in(split, index) >= sum(kind in DATA for kind in split.kinds)
+
+
+def _numbers_in(split: _Split, index: int) -> int:
+    """How many cells of a row are data; -1 for a row of another width."""
+    cells = trimmed(split.rows[index].cells, split.width)
+    return sum(kind_of(cell) in DATA for cell in cells) if len(cells) == split.width else -1
 
 
 def _suffixes(split: _Split, first: int) -> tuple[str, ...]:
@@ -322,7 +328,10 @@ def _header(split: _Split, first: int, comments: list[tuple[int, str]], options:
         cells = _to_width(row, split)
         repeats = cells is not None and len({cell.strip() for cell in cells if cell.strip()}) < sum(map(_filled, cells))
         upper = _to_width(above[-2], split) if repeats and len(above) > 1 else None
-        if upper is not None:  # a line of types or of numbers of channels below the names
+        grouped = None if upper is None or cells is None else _in_groups(upper, cells)
+        if grouped is not None:
+            row, cells = above[-2], grouped
+        elif upper is not None:  # a line of types or of numbers of channels below the names
             row, cells = above[-2], upper
         if cells is not None:
             found.names, found.line = [re.sub(r"^(?:%|//|!|;|\*)+\s*(?=\S)", "", cells[0]), *cells[1:]], row.line
@@ -350,6 +359,20 @@ def _header(split: _Split, first: int, comments: list[tuple[int, str]], options:
     return found
 
 
+def _in_groups(upper: list[str], cells: list[str]) -> list[str] | None:
+    """Names that come again under a title for some columns each, with their title: ``Inlet p``, ``Outlet p``."""
+    if sum(map(_filled, upper)) >= sum(map(_filled, cells)):
+        return None
+    titles, title = [], ""
+    for above in upper:
+        title = above.strip() or title
+        titles.append(title)
+    again = {cell.strip() for cell in cells if _filled(cell) and sum(c.strip() == cell.strip() for c in cells) > 1}
+    found = [f"{t} {c.strip()}".strip() if c.strip() in again else c for t, c in zip(titles, cells, strict=True)]
+    named = [name for name in found if _filled(name)]
+    return found if len(set(named)) == len(named) else None
+
+
 def _filled(cell: str) -> bool:
     return bool(cell.strip())
 
@@ -359,7 +382,18 @@ def _is_units(above: list[Row], split: _Split) -> bool:
     if units is None or names is None or not is_units(units):
         return False
     # Short names are units too (t, u, V): without brackets it is the line above that must look like names.
+    if any(is_called_time(cell) for cell in units[:1]) and not any(map(is_called_time, names)) and _rises(split):
+        return False
     return sum(map(_filled, names)) >= sum(map(_filled, units)) and not any(kind_of(cell) in DATA for cell in names[:1])
+
+
+def _rises(split: _Split) -> bool:
+    """Whether the first column goes up from row to row, as time does."""
+    try:
+        values = [float(row.cells[0].replace(",", ".")) for row in filter(split.fits, split.rows[:100])]
+    except ValueError:
+        return False
+    return len(values) > 2 and all(after > before for before, after in pairwise(values))
 
 
 def _units_above(above: list[Row], split: _Split) -> bool:

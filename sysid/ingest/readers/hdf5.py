@@ -236,7 +236,7 @@ def _unpacked(name: str, array: NDArray[Any], attributes: Mapping[str, Any], not
         return array
     missing = np.zeros(array.shape, dtype=np.bool_)
     for value in stand_ins:
-        missing |= array == np.asarray(value).astype(array.dtype)
+        missing |= _stands_for(array, np.asarray(value))
     if bounds is not None:
         missing |= (array < bounds[0]) | (array > bounds[1])
     values = array.astype(np.float64)
@@ -247,6 +247,14 @@ def _unpacked(name: str, array: NDArray[Any], attributes: Mapping[str, Any], not
     if missing.any():
         values[missing] = np.nan
     return values
+
+
+def _stands_for(array: NDArray[Any], value: NDArray[Any]) -> NDArray[np.bool_]:
+    """Where a stand-in is; one of the attributes may have fewer digits than the values: 1e20 is 1.00000002e20 then."""
+    if array.dtype.kind != "f" or value.dtype.kind != "f":
+        return np.asarray(array == value.astype(array.dtype))
+    fewest = max(np.finfo(array.dtype).eps, np.finfo(value.dtype).eps)
+    return np.asarray((np.abs(array - value.astype(np.float64)) <= fewest * abs(float(value))) | (array == value))
 
 
 def _valid(attributes: Mapping[str, Any]) -> tuple[float, float] | None:

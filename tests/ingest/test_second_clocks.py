@@ -1,0 +1,40 @@
+"""Further clocks and counters beside the time column are no channels, nor is what stands behind one of another pace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.ingest.second_clocks import without_second_clocks
+from sysid.ingest.table import RawColumn, RawTable
+
+T = np.arange(20) * 0.1
+Y = np.sin(T)
+
+
+def a_table(*columns: tuple[str, np.ndarray, str | None]) -> RawTable:
+    made = tuple(RawColumn(name=name, values=values, unit=unit) for name, values, unit in columns)
+    return RawTable(source=Path("rig.csv"), reader="csv", columns=made, time=made[0].name)
+
+
+SECOND = {
+    "the same": (("t2", T, None), "the time again, as in t"),
+    "in another unit": (("t_ms", 1000 * T, None), "the time again, as in t"),
+    "in a unit that is said": (("y.time", 1000 * T, "ms"), "the time again, as in t"),
+    "from another origin": (("timestamp", 1.7e9 + T, None), "the time again, as in t"),
+    "ahead": (("Time y", T + 5.0, None), "a second clock, 5 ahead of t"),
+    "a counter": (("frame", np.arange(20.0), None), "counts the rows"),
+    "of another pace": (("t_y", 2.5 * T, None), "a clock of another pace than t"),
+    "a ramp": (("u", 2.5 * T, None), ""),
+    "a temperature": (("t_oil", 20.0 + Y, None), ""),
+}
+
+
+@pytest.mark.parametrize("case", SECOND)
+def test_what_goes_like_a_clock_is_no_channel(case: str) -> None:
+    column, said = SECOND[case]
+    first, second, behind = without_second_clocks(a_table(("t", T, None), column, ("y", Y, None)), "t").columns
+    assert (first.aside, second.aside) == ("", said)
+    assert bool(behind.aside) is (case == "of another pace")
