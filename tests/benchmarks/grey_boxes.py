@@ -2,10 +2,12 @@
 
     [SYSID_DATA=<folder>] python -m tests.benchmarks grey_boxes [--seeds=20] [--only=coverage,time,tanks]
     python -m tests.benchmarks grey_boxes --only=profile [--seeds=20] [--systems="two tanks,DC motor"]
+    python -m tests.benchmarks grey_boxes --only=cases [--seeds=20]
 
 Coverage: each system is run at known parameters, with white noise of 2 % of the output's range; the fit starts at
 parameters that are off by up to 40 %; how often the 95 % interval of a parameter holds the true one is counted over
-parameters and seeds; with ``profile``, which is no default, from the curvature and by profile likelihood side by side.
+parameters and seeds; with ``profile``, which is no default, from the curvature and by profile likelihood side by side,
+and with ``cases`` of a parameter that differs by case.
 Time: two tanks, beside ``scipy.optimize.least_squares`` over ``solve_ivp`` (RK45, held inputs,
 finite differences), both from the same start to the same cost. Tanks: ``cascaded_tanks/dataBenchmark.csv`` (4TU
 10.4121/12960104): equations are tried on the first part of the estimation record and chosen by the rest of it, then
@@ -27,9 +29,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import scipy
 
+from sysid.errors import TraceError
 from sysid.estimation import FitResult, Training
 from sysid.estimation.grey_box.fit import fit_grey_box
-from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Scaling, Start, StartKind
+from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Scaling, Start, StartKind, beginning
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 from tests.benchmarks._public import checked
@@ -145,6 +148,49 @@ def profiles(seeds: int, systems: list[str]) -> None:
             )
             share = 100.0 * inside[row].sum() / (seeds * len(true))
             found(f"{name}: true parameters within 95 % intervals by {kind}", share, "%", note=note)
+
+
+def cases(seeds: int) -> None:
+    """Two tanks of three records, the pump's gain of each its own; and a fourth that was not fitted."""
+    system, names = SYSTEMS["two tanks"], ("day1", "day2", "day3", "day4")
+    held, counted, off, expected, refused = [0, 0], 0, [], [], 0
+    for seed in range(seeds):
+        rng = np.random.default_rng([seed, 46])
+        gains = dict(zip(names, 0.04 * rng.uniform(0.8, 1.2, len(names)), strict=True))
+        records = [
+            replace(record(replace(system, true=system.true | {"k4": gain}), rng), name=name)
+            for name, gain in gains.items()
+        ]  # fmt: skip
+        given: dict[str, Any] = {name: {"start": value, "low": 0.0} for name, value in system.true.items()}
+        given["k4"]["per"] = "case"
+        given["k1"] = {"start": system.true["k1"], "fixed": True}  # from which the gain can hardly be told apart
+        grey = GreyBox(
+            equations=system.equations, parameters=given, initial=dict(system.begin), intervals="profile"
+        )  # fmt: skip
+        fit = fit_grey_box(records[:3], MAPPING, grey, Training(starts=2), start=ESTIMATED)
+        assert fit.uncertainty is not None
+        true = np.array([system.true["k2"], *(gains[name] for name in names[:3])])
+        assert fit.uncertainty.profile is not None
+        order = [fit.uncertainty.names.index("k2"), *(fit.uncertainty.names.index(f"k4 of {n}") for n in names[:3])]
+        for kind, ends in enumerate((fit.uncertainty.interval(0.95)[order], fit.uncertainty.profile[order])):
+            held[kind] += int(np.count_nonzero((ends[:, 0] <= true) & (true <= ends[:, 1])))
+        counted += len(true)
+        model = fit.model
+        assert isinstance(model, GreyBoxModel)
+        try:
+            begun = beginning(model, records[3].columns(["u"]), records[3]["y"], ESTIMATED, case="day4")
+        except TraceError:
+            refused += 1
+            continue
+        off.append(begun.history.constants[0] / gains["day4"] - 1.0)
+        expected.append(float(np.mean(list(model.by_case["k4"].values()))) / gains["day4"] - 1.0)
+    for inside, kind in zip(held, ("the curvature", "profile likelihood"), strict=True):
+        found(f"two tanks, gain by case: true parameters within 95 % intervals by {kind}", 100.0 * inside / counted,
+              "%", note=f"{counted} intervals of {seeds} fits")  # fmt: skip
+    found("two tanks, gain of a case that was not fitted from 50 samples: root mean square off",
+          100.0 * float(np.sqrt(np.mean(np.square(off)))), "%",
+          note=f"{refused} of {seeds} refused; the mean of the fitted cases would be "
+          f"{100.0 * float(np.sqrt(np.mean(np.square(expected)))):.1f} % off")  # fmt: skip
 
 
 def coverage(seeds: int) -> None:
@@ -285,6 +331,8 @@ def main() -> None:
     asked = given.get("only", "coverage,time,tanks").split(",")
     if "coverage" in asked:
         coverage(int(given.get("seeds", 20)))
+    if "cases" in asked:
+        cases(int(given.get("seeds", 20)))
     if "profile" in asked:
         profiles(int(given.get("seeds", 20)), given.get("systems", "two tanks").split(","))
     if "time" in asked:
