@@ -81,7 +81,7 @@ FITS = [
     pytest.param(NARX, {"seed": 7, "loop": "open", "max_iterations": 8}, EVERYWHERE, id="NARX one step ahead"),
     pytest.param(NARX, {"seed": 7, "max_iterations": 30, "starts": 3}, EVERYWHERE, id="NARX of several starts"),
     pytest.param(
-        NARX | {"gated": True}, {"seed": 7, "max_iterations": 12, "pretraining": 300, "starts": 4, "ensemble": 2},
+        NARX | {"gated": True}, {"seed": 7, "max_iterations": 6, "pretraining": 60, "starts": 3, "ensemble": 2},
         EVERYWHERE, id="NARX gated, an ensemble",
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
