@@ -432,6 +432,25 @@ class TraceSet:
         parts = [[t.name, self.roles[t.name].value, t.digest] for t in self.traces]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
+    @property
+    def shared(self) -> tuple[tuple[str, str], ...]:
+        """Cases that are only scored and have samples of one that is fitted, with the name of that one.
+
+        Found where both have the same values at the same times, be it by a copy or by two cuts of one record.
+        """
+        fitted = self.with_role(Role.ESTIMATION)
+        scored = self.with_role(Role.VALIDATION, Role.TEST)
+        pairs = ((one, next((other for other in fitted if _share_samples(one, other)), None)) for one in scored)
+        return tuple((one.name, other.name) for one, other in pairs if other is not None)
+
     def with_role(self, *roles: Role) -> tuple[Trace, ...]:
         """The traces that have one of these roles, in order."""
         return tuple(trace for trace in self.traces if self.roles[trace.name] in roles)
+
+
+def _share_samples(one: Trace, other: Trace) -> bool:
+    """Whether two records have the same values where their times overlap, and these are no constants."""
+    later = round((other.start_time - one.start_time) / one.sample_time)
+    mine, theirs = one.values[max(later, 0) :], other.values[max(-later, 0) :]
+    n = min(len(mine), len(theirs))
+    return n > 1 and np.array_equal(mine[:n], theirs[:n]) and bool((np.ptp(mine[:n], axis=0) > 0.0).any())

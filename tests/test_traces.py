@@ -64,3 +64,18 @@ def test_traces_are_shown_in_a_line_however_long_they_are() -> None:
     known = TraceSet(name="rig", traces=tuple(traces), roles={"a": Role.ESTIMATION})
     assert repr(known) == "<TraceSet rig: 1 estimation, 1 validation; 4,000 samples of 0.1 s; u [V]>"
     assert repr(traces[0]) == "<Trace a: 2,000 samples of 0.1 s; u [V]>"
+
+
+@pytest.mark.parametrize(("start", "shares"), [(0, True), (30, True), (50, False)])
+def test_a_case_that_has_samples_of_a_fitted_one_is_known(start: int, shares: bool) -> None:
+    values = np.random.default_rng(0).standard_normal((80, 1))
+
+    def cut(name: str, a: int, b: int) -> Trace:
+        return Trace(
+            name=name, sample_time=0.1, channels=TRACE.channels, values=values[a:b].copy(), start_time=round(0.1 * a, 9)
+        )
+
+    other = Trace(name="other", sample_time=0.1, channels=TRACE.channels, values=-values)
+    roles = {"fitted": Role.ESTIMATION, "again": Role.VALIDATION, "other": Role.TEST}
+    traces = TraceSet(name="rig", traces=(cut("fitted", 0, 50), cut("again", start, 80), other), roles=roles)
+    assert traces.shared == ((("again", "fitted"),) if shares else ())

@@ -13,6 +13,7 @@ from sysid.reporting.numbers import number, quantity, seconds, times
 from sysid.reporting.parts import Tile, Verdict
 from sysid.reporting.results import CaseRecord, FitRecord, Results
 from sysid.reporting.worst_instants import Instant
+from sysid.traces import Role
 from sysid.units import squared
 
 
@@ -180,6 +181,7 @@ def _warnings(results: Results, best: FitRecord | None) -> tuple[str, ...]:
                 "No case is unseen here: all of them took part in the choice, as in the sweep that is repeated. What "
                 "is called unseen below was not fitted to."
             )
+        found += _seen_again(best)
         if best.status in Status.__members__ and not Status[best.status].usable:
             found.append(f"{best.name}: {best.status_sentence}")
         found += [
@@ -193,6 +195,17 @@ def _warnings(results: Results, best: FitRecord | None) -> tuple[str, ...]:
         if diverging and not results.chosen(fit):
             found.append(f"{fit.name}: the free run diverges on {', '.join(diverging)}.")
     return tuple(found)
+
+
+def _seen_again(best: FitRecord) -> list[str]:
+    """Cases that are called unseen and whose figures are those of a fitted one to the last digit: the same record."""
+    known = {(c.n_samples, c.free_run.mse): name for name, c in best.cases.items() if c.role is Role.ESTIMATION}
+    cases = ((name, known.get((case.n_samples, case.free_run.mse))) for name, case in scored_cases(best).items())
+    return [
+        f"{name} has the very figures of {twin}, which was fitted: it is the same record, and tests nothing."
+        for name, twin in cases
+        if twin is not None and best.cases[name].free_run.mse > 0.0
+    ]
 
 
 def _overtaken(results: Results, best: FitRecord) -> list[str]:

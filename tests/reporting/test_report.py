@@ -297,6 +297,13 @@ def _only_estimation(document: dict[str, Any]) -> None:
         fit["cases"] = {name: case for name, case in fit["cases"].items() if case["role"] == "estimation"}
 
 
+def _seen_again(document: dict[str, Any]) -> None:
+    for fit in document["fits"]:
+        seen = next(case for case in fit["cases"].values() if case["role"] == "estimation")
+        unseen = next(case for case in fit["cases"].values() if case["role"] == "validation")
+        unseen["free_run"], unseen["n_samples"] = dict(seen["free_run"]), seen["n_samples"]
+
+
 def _all_diverge(document: dict[str, Any]) -> None:
     for fit in document["fits"]:
         for case in fit["cases"].values():
@@ -328,6 +335,7 @@ def _two_mappings(document: dict[str, Any]) -> None:
     [
         pytest.param(_no_best, "No fit was chosen.", id="no-fit-was-chosen"),
         pytest.param(_only_estimation, "There is no validation or test case", id="no-validation-case"),
+        pytest.param(_seen_again, "it is the same record, and tests nothing", id="a-record-is-seen-again"),
         pytest.param(_all_diverge, "The free run diverges on every one of the 4 cases", id="everything-diverges"),
         pytest.param(_bad_export, "bundle/step.onnx differs from its model by more than", id="export-not-finite"),
         pytest.param(

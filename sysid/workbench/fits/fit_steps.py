@@ -364,7 +364,10 @@ def _loaded(data: Data) -> events.DataLoaded:
 
 def _cases(data: Data) -> str:
     cases = f"{len(data.traces)} cases of {data.traces.name}"
-    return f"{cases}, {len(data.selection)} to choose by" if data.selection else cases
+    cases = f"{cases}, {len(data.selection)} to choose by" if data.selection else cases
+    return "; ".join(
+        [cases, *(f"{name} has samples of {other}, which is fitted" for name, other in data.traces.shared)]
+    )
 
 
 def _amount(fit: FitConfig, data: Data) -> dict[str, Any]:
