@@ -17,12 +17,14 @@ from sysid.api.comparison import compare
 from sysid.api.saving import save
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.estimation import FitResult
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.grey_box.again import profile_again
 from sysid.estimation.grey_box.by_case import for_case
 from sysid.estimation.grey_box.profile import Profile
 from sysid.ingest.arrays import inputs_of
 from sysid.ingest.frames import as_array
-from sysid.models import Cascade, History, Start
+from sysid.models import BuiltModel, Cascade, History, Start
+from sysid.models.curve_values import curve_values
 from sysid.models.form import unheeded
 from sysid.traces import Role, TraceSet
 from sysid.validation.residuals import ResidualAnalysis, analyse_residuals
@@ -162,6 +164,32 @@ class Fit(FitResult):
             A figure of matplotlib's, to restyle, show or save.
         """
         return compare(traces or self.traces, self, start=self.start).plot()
+
+    def plot_curves(self, traces: TraceSet | None = None) -> Figure:
+        """The static curves of a block-oriented model, over what the records range over, and where these lie.
+
+        Args:
+            traces: The cases; the estimation traces by default.
+
+        Returns:
+            A figure of matplotlib's.
+
+        Raises:
+            ConfigError: If the model has no such curves.
+        """
+        from sysid.reporting.figures.curves_figure import curves_figure
+
+        if not isinstance(self.model, BuiltModel):
+            raise ConfigError(
+                "the model has no static curves",
+                where="structure",
+                expected="a HammersteinWiener or WienerHammerstein model with a curve",
+                got=self.model.structure.label,
+                remedy="plot its free run in place of them: fit.plot()",
+            )
+        records = tuple(traces) if traces is not None else self.traces.with_role(Role.ESTIMATION)
+        runs = [Experiment.for_model(trace, self.model, self.start) for trace in records]
+        return curves_figure(curve_values(self.model, [(run.inputs, run.history) for run in runs]))
 
     def save(self, folder: str | Path, *, formats: tuple[str, ...] | None = None) -> Bundle:
         """Write it as files that run elsewhere; see :func:`sysid.save`."""

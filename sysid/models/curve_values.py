@@ -1,0 +1,104 @@
+"""The static curves of a block-oriented model, as its free run goes over them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
+from sysid.models.built_model import BuiltModel
+from sysid.models.curves import NONE, Text, quoted
+from sysid.models.grey_box import lowered
+from sysid.models.history import History
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CurveValues:
+    """What one curve is given and what it makes of it, sample by sample.
+
+    Args:
+        title: Which curve.
+        before: What it is given, with its unit.
+        behind: What it gives, with its unit.
+        x: Shape ``(n_samples,)``.
+        y: Shape ``(n_samples,)``.
+    """
+
+    title: str
+    before: str
+    behind: str
+    x: Array
+    y: Array
+
+
+def curve_values(model: BuiltModel, records: Sequence[tuple[Array, History]]) -> tuple[CurveValues, ...]:
+    """The curves of a Hammerstein-Wiener or Wiener-Hammerstein model over some records.
+
+    Args:
+        model: The model.
+        records: Inputs of each, shape ``(n_samples, n_inputs)``, and what stands before.
+
+    Returns:
+        One for each curve, inputs first. What lies between curve and block has no unit and is scaled.
+
+    Raises:
+        ConfigError: If the model has no curves.
+    """
+    structure, mapping = model.structure, model.mapping
+    text = Text(taken=frozenset((*mapping.inputs, *mapping.outputs)))
+    wanted: list[tuple[str, str, str, str, str]] = []
+    if isinstance(structure, HammersteinWiener):
+        n = len(mapping.inputs)
+        each = zip(mapping.inputs, model.input_units, structure.curves(n), structure.lags(n), strict=True)
+        for j, (name, unit, curve, lag) in enumerate(each, start=1):
+            tag = f"f{j}" if n > 1 else "f"
+            read = quoted(name) + (f"[k-{lag - 1}]" if lag > 1 else "")
+            behind = text.name(f"{tag}_in" if curve.given else f"{tag}_out")
+            if curve.kind != NONE:
+                wanted.append((f"{name}: {curve}", f"{name} [{unit}]", "into the block, scaled", read, behind))
+        if structure.output.kind != NONE:
+            x = text.name("unbent" if structure.output.given else "inside")
+            label = "out of the block" + (f" [{model.output_unit}]" if structure.output.given else ", scaled")
+            y = model.grey.equations.splitlines()[-1].partition(" = ")[2]
+            title = f"{mapping.output}: {structure.output}"
+            wanted.append((title, label, f"{mapping.output} [{model.output_unit}]", x, y))
+    elif isinstance(structure, WienerHammerstein):
+        x, y = text.name("between"), text.name("bent")
+        title = f"between the blocks: {structure.curve}"
+        wanted.append((title, "out of the first block, scaled", "into the second, scaled", x, y))
+    if not wanted:
+        raise ConfigError(
+            "the model has no static curves",
+            where="structure",
+            expected="a HammersteinWiener or WienerHammerstein model with a curve",
+            got=structure.label,
+            remedy="plot its free run in place of them: fit.plot()",
+        )
+    return tuple(
+        CurveValues(title=title, before=before, behind=behind, x=_run(model, x, records), y=_run(model, y, records))
+        for title, before, behind, x, y in wanted
+    )
+
+
+def _run(model: BuiltModel, expression: str, records: Sequence[tuple[Array, History]]) -> Array:
+    """What an expression of the equations is over some records, one after the other."""
+    mapping = model.mapping
+    *lines, last = model.grey.equations.splitlines()
+    kept = Text(taken=frozenset((*mapping.inputs, *mapping.outputs))).name("whole")  # so that all parameters are read
+    right, own = last.partition(" = ")[2], model
+    if expression != right:
+        lines += [f"{kept} = {right}", f"{quoted(mapping.output)} = {expression}"]
+        grey = replace(model.grey, equations="\n".join(lines))
+        low = lowered(grey, mapping.inputs, mapping.outputs, model.sample_time)
+        # Networks that are run are the first: only that of the last line may be gone, and its weights with it.
+        theta = model.theta[: len(grey.free) + low.n_weights]
+        own = replace(model, grey=grey, theta=theta, norms=model.norms[: len(low.norms)])
+    form, cut = model.recursion, own.recursion
+    runs = [cut.run(cut.given(u, history.inputs), np.array(form.state(history))) for u, history in records]
+    return np.concatenate(runs)[:, 0]
