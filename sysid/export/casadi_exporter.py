@@ -80,8 +80,8 @@ class _Step:
     """
 
     def __init__(self, surrogate: Surrogate, u: Sequence[Any], state: Sequence[Any]) -> None:
-        self.surrogate, self.state = surrogate, list(state)
-        self.known: list[Any] = list(u)
+        self.surrogate, self.state, self.given = surrogate, list(state), list(u)
+        self.known: list[Any] = [one + _lost(one) for one in u]
         self.after: list[Any] = []
         self.raised: dict[Flag, list[Any]] = {flag: [] for flag in Flag}
 
@@ -123,8 +123,7 @@ class _Step:
 
     def flags(self) -> Any:
         """The sum of the bits that are raised."""
-        inputs = list(zip(self.surrogate.inputs, self.known, strict=False))
-        for port, value in inputs:
+        for port, value in zip(self.surrogate.inputs, self.given, strict=True):
             if port.range is not None:
                 self.raised[Flag.OUTSIDE_RANGE] += [value < port.low, value > port.high]
         self.raised[Flag.NOT_A_NUMBER] = [_choice(value <= np.inf, 0, 1) for value in self.known]
@@ -141,6 +140,25 @@ def _choice(condition: Any, one: Any, other: Any) -> Any:
     import casadi
 
     return casadi.if_else(condition, one, other)
+
+
+def _lost(value: Any) -> Any:
+    """Nothing, but not a number where a value is infinite or none."""
+    import casadi
+
+    return _choice(casadi.fabs(value) < np.inf, 0, np.nan)
+
+
+def _product(table: NDArray[np.float64], x: Any) -> Any:
+    """A matrix times a column; CasADi leaves out what is times zero, which loses what is not a number."""
+    import casadi
+
+    left_out = np.asarray(table) == 0.0
+    total = casadi.mtimes(table, x)
+    if not left_out.any():
+        return total
+    lost = [_lost(one) if own.any() else 0.0 for own, one in zip(left_out.T, casadi.vertsplit(x), strict=True)]
+    return total + casadi.vertcat(*(sum(one for one, out in zip(lost, row, strict=True) if out) for row in left_out))
 
 
 def _within(value: Any, low: float, high: float) -> Any:
@@ -162,13 +180,13 @@ def _lagged(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tuple[l
     form, layout = stage.lagged
     known = [*scaled, *past]
     x = casadi.vertcat(*(known[layout.column(channel, lag)] for channel, own in enumerate(form.lags) for lag in own))
-    total = casadi.mtimes(form.linear, x) + form.constant if x.numel() else casadi.SX(form.constant)
+    total = _product(form.linear, x) + form.constant if x.numel() else casadi.SX(form.constant)
     if form.neurons:
-        hidden = _active(stage, casadi.mtimes(form.hidden_weights, x) + form.hidden_bias)
+        hidden = _active(stage, _product(form.hidden_weights, x) + form.hidden_bias)
         readout = form.readout
         if form.gated:
-            hidden, readout = hidden * (casadi.mtimes(form.gates, x) + form.readout[0]), np.ones_like(form.readout)
-        total += casadi.mtimes(readout, hidden)
+            hidden, readout = hidden * (_product(form.gates, x) + form.readout[0]), np.ones_like(form.readout)
+        total += _product(readout, hidden)
 
     def following(outputs: Sequence[Any]) -> list[Any]:
         together = [*scaled, *outputs, *past]
@@ -185,10 +203,10 @@ def _space(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tuple[li
     z = casadi.vertcat(*past, *scaled)
 
     def summed(table: NDArray[np.float64], constant: NDArray[np.float64], neurons: Neurons) -> Any:
-        total = casadi.mtimes(table, z) + constant
+        total = _product(table, z) + constant
         if len(neurons):
-            hidden = _active(stage, casadi.mtimes(neurons.weights, z) + neurons.bias)
-            total += casadi.mtimes(neurons.readout, hidden)
+            hidden = _active(stage, _product(neurons.weights, z) + neurons.bias)
+            total += _product(neurons.readout, hidden)
         return total
 
     outputs = casadi.vertsplit(summed(form.readout, form.constant, form.output_neurons))

@@ -25,7 +25,7 @@ class Flag(enum.IntFlag):
     AT_BOUND = 2
     """An output, or what it is computed from, is held at one of its bounds: it is wrong."""
     NOT_A_NUMBER = 4
-    """An input or an output is not a number: set the state anew before relying on what follows."""
+    """An input is infinite or not a number, or an output is none: set the state anew before relying on what follows."""
     AT_LIMIT = 8
     """An output is held at a limit that was declared for it, such as a pressure that cannot be below atmosphere."""
     IN_DOUBT = 16
@@ -35,7 +35,7 @@ class Flag(enum.IntFlag):
 MEANING = {
     Flag.OUTSIDE_RANGE: "an input is outside its declared range; the accuracy is unknown",
     Flag.AT_BOUND: "an output is held at one of its bounds; it is wrong",
-    Flag.NOT_A_NUMBER: "an input or an output is not a number; set the state anew",
+    Flag.NOT_A_NUMBER: "an input is infinite or not a number, or an output is none; set the state anew",
     Flag.AT_LIMIT: "an output is held at a limit that was declared for it",
     Flag.IN_DOUBT: "the models of the committee disagree; the answer may be wrong",
 }
@@ -57,7 +57,7 @@ def expected_flags(
     """
     low, high = (np.array([getattr(port, side) for port in surrogate.inputs]) for side in ("low", "high"))
     outside = ((inputs < low) | (inputs > high)).any(axis=1)
-    lost = np.isnan(inputs).any(axis=1) | np.isnan(computed).any(axis=1)
+    lost = ~np.isfinite(inputs).all(axis=1) | np.isnan(computed).any(axis=1)
     n_inputs = inputs.shape[1]
     bound, limited, doubted = (np.zeros(len(inputs), dtype=bool) for _ in range(3))
     for stage in surrogate.stages:

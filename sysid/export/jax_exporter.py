@@ -167,8 +167,10 @@ class _Step:
     """
 
     def __init__(self, surrogate: Surrogate, u: Sequence[Any], state: Any) -> None:
-        self.surrogate, self.state = surrogate, state
-        self.known: list[Any] = list(u)
+        import jax.numpy as jnp
+
+        self.surrogate, self.state, self.given = surrogate, state, list(u)
+        self.known: list[Any] = [jnp.where(jnp.isinf(one), np.nan, one) for one in u]
         self.after: list[Any] = []
         self.raised: dict[Flag, list[Any]] = {flag: [] for flag in Flag}
 
@@ -215,7 +217,7 @@ class _Step:
         """The sum of the bits that are raised."""
         import jax.numpy as jnp
 
-        for port, value in zip(self.surrogate.inputs, self.known, strict=False):
+        for port, value in zip(self.surrogate.inputs, self.given, strict=True):
             if port.range is not None:
                 self.raised[Flag.OUTSIDE_RANGE] += [value < port.low, value > port.high]
         self.raised[Flag.NOT_A_NUMBER] = [jnp.isnan(value) for value in self.known]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.export.onnx_equations import stepped, terms_of
 from sysid.export.onnx_nodes import Nodes
+from sysid.export.onnx_products import exact_parts, over, parts_of, product, row_by_row
 from sysid.export.wide_blocks import Block, OwnLimit
 from sysid.export.wide_form import Group, WideForm, columns_of, readings_of
 
@@ -92,20 +93,6 @@ def _pasts(nodes: Nodes, form: WideForm, memory: str) -> dict[int, str]:
     return dict(zip(rows, names, strict=True))
 
 
-def _product(nodes: Nodes, table: NDArray[np.float64], value: str, name: str) -> str:
-    """A table, its constants last, times a value."""
-    sides = [nodes.numbers(f"{name}_weights", table[:, :-1]), value, nodes.numbers(f"{name}_constant", table[:, -1:])]
-    return nodes.add("Gemm", sides, name)
-
-
-def _over(table: NDArray[np.float64], selection: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A table over terms as one over readings; infinite constants stay what they are."""
-    finite = np.isfinite(table[:, -1])
-    product = np.where(np.isfinite(table), table, 0.0) @ selection
-    product[~finite, -1] = table[~finite, -1]
-    return np.asarray(product)
-
-
 def _group(nodes: Nodes, form: WideForm, group: Group, pieces: Sequence[str], memory: str) -> _Made:
     """The nodes of a group."""
     tables = _tables(form, group)
@@ -115,13 +102,11 @@ def _group(nodes: Nodes, form: WideForm, group: Group, pieces: Sequence[str], me
         return _constant(nodes, form, group, memory)
     z = join(nodes, pieces, "readings")
     if form.keeps and not np.array_equal(selection, np.eye(len(selection), width + 1)):
-        z = _product(nodes, selection[:-1], z, "terms")
+        alone = form.exact and tables.keys() & {"upper", "lower"}
+        z = (row_by_row if alone else product)(nodes, selection[:-1], z, "terms")
     elif not form.keeps:
-        tables = {name: _over(table, selection) for name, table in tables.items()}
-    whole = _product(nodes, np.concatenate(list(tables.values())), z, "sums")
-    parts = dict(
-        zip(tables, nodes.cut(whole, {f"{name}_part": len(table) for name, table in tables.items()}), strict=True)
-    )
+        tables = {name: over(table, selection) for name, table in tables.items()}
+    parts = exact_parts(nodes, tables, z) if form.exact else parts_of(nodes, tables, z)
     total = parts["linear"]
     if "hidden" in parts:
         hidden = group.neuron.onnx(nodes, parts["hidden"], "hidden")
@@ -150,7 +135,8 @@ def _equations(nodes: Nodes, form: WideForm, group: Group, pieces: Sequence[str]
     for name in ("upper", "lower"):
         table = group.stacked(name)
         if np.isfinite(table[:, -1]).any() or table[:, :-1].any():
-            parts[name] = _product(nodes, table, join(nodes, terms, f"{name}_terms"), name)
+            times = row_by_row if form.exact else product
+            parts[name] = times(nodes, table, join(nodes, terms, f"{name}_terms"), name)
     held, raw = _held(nodes, form, group, step.total, parts)
     return _Made(held=held, raw=raw, total=step.total, change=step.change, last=step.last)
 
@@ -363,7 +349,7 @@ def _newest(nodes: Nodes, form: WideForm, held: str, row: dict[int, int], count:
     table = np.zeros((len(lines), count + 1))
     for i, line in enumerate(lines):
         table[i, rows[i]], table[i, -1] = line.slope, line.shift
-    return _product(nodes, table, held, "newest")
+    return product(nodes, table, held, "newest")
 
 
 def _remainders(nodes: Nodes, form: WideForm, made: Sequence[_Made]) -> list[str]:

@@ -56,6 +56,20 @@ def _channels(ports: tuple[Port, ...]) -> str:
     return ", ".join(f"{port.name} [{port.unit}]" for port in ports)
 
 
+def known_inputs(nodes: Nodes, given: str) -> str:
+    """The inputs, with what is infinite as not a number: nothing times it is none, and adds nothing to all others.
+
+    Args:
+        nodes: The graph.
+        given: The inputs in units.
+
+    Returns:
+        The name.
+    """
+    nothing = nodes.add("Mul", [given, nodes.numbers("nothing_of", 0.0)], "u_nothing")
+    return nodes.add("Add", [given, nothing], "u_known")
+
+
 def scaled_inputs(nodes: Nodes, form: WideForm, u: str) -> tuple[str, dict[tuple[int, float, float, int], int]]:
     """Inputs in the numbers of everybody who reads them, and the row of each.
 
@@ -334,24 +348,25 @@ def _used(
     return [values[value] for value in used], [(used.index(value), row) for value, row in places]
 
 
-def flags_of(nodes: Nodes, surrogate: Surrogate, u: str, units: Units) -> str:
+def flags_of(nodes: Nodes, surrogate: Surrogate, inputs: tuple[str, str], units: Units) -> str:
     """The flags of every sample, one row.
 
     Args:
         nodes: The graph.
         surrogate: The whole.
-        u: The inputs in units.
+        inputs: The inputs in units, as they came and as they are known.
         units: What comes out, and why flags are raised.
 
     Returns:
         The name.
     """
     ports, n = surrogate.inputs, len(surrogate.inputs)
+    given, u = inputs
     causes: list[tuple[str, Sequence[Flag]]] = []  # rows of causes, and the flag that each raises
     for operator, side in (("Less", "low"), ("Greater", "high")):
         limits = [getattr(port, side) for port in ports]
         if np.isfinite(limits).any():
-            name = nodes.add(operator, [u, nodes.column(f"declared_{side}", limits)], f"u_{operator}".lower())
+            name = nodes.add(operator, [given, nodes.column(f"declared_{side}", limits)], f"u_{operator}".lower())
             causes.append((name, [Flag.OUTSIDE_RANGE] * n))
     rows, bounds = units.counts
     causes += [(units.at_bound, [Flag.AT_BOUND] * bounds), (units.at_limit, units.limit_flags)]

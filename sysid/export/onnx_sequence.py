@@ -14,7 +14,7 @@ from onnx import helper
 from sysid.export.onnx_blocks import in_blocks
 from sysid.export.onnx_core import Step, join, step_core
 from sysid.export.onnx_nodes import TO_END, Nodes
-from sysid.export.onnx_outputs import flags_of, in_units, reader, scaled_inputs, state_after
+from sysid.export.onnx_outputs import flags_of, in_units, known_inputs, reader, scaled_inputs, state_after
 from sysid.export.onnx_step import whole_or_exact
 from sysid.export.surrogate import Surrogate
 from sysid.export.wide_form import WideForm
@@ -35,7 +35,8 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         The ``GraphProto``.
     """
     nodes, form = Nodes(dtype, trailing=2), WideForm.of(surrogate, dtype)
-    u = nodes.add("Transpose", ["u"], "u_rows", perm=[2, 0, 1])
+    given = nodes.add("Transpose", ["u"], "u_rows", perm=[2, 0, 1])
+    u = known_inputs(nodes, given)
     state = nodes.add("Transpose", ["state"], "state_rows_before", perm=[1, 0])
     scaled, rows = scaled_inputs(nodes, form, u)
     depth = max((line.length for line in form.input_lines), default=0)
@@ -54,7 +55,7 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     nodes.add("Transpose", [units.outputs], "y", perm=[1, 2, 0])
     tails = [_tail(nodes, form, history, rows, depth)] if depth else []
     nodes.add("Transpose", [state_after(nodes, form, made.memory, tails)], "state_out", perm=[1, 0])
-    nodes.add("Transpose", [flags_of(nodes, surrogate, u, units)], "flags", perm=[1, 2, 0])
+    nodes.add("Transpose", [flags_of(nodes, surrogate, (given, u), units)], "flags", perm=[1, 2, 0])
     return in_blocks(surrogate, nodes)
 
 

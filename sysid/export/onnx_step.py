@@ -11,7 +11,7 @@ from onnx import helper
 
 from sysid.export.onnx_core import Step, step_core
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.onnx_outputs import ends, flags_of, in_units, reader, scaled_inputs, state_after
+from sysid.export.onnx_outputs import ends, flags_of, in_units, known_inputs, reader, scaled_inputs, state_after
 from sysid.export.surrogate import Surrogate
 from sysid.export.wide_form import WideForm
 
@@ -30,7 +30,8 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         The ``GraphProto``.
     """
     nodes, form = Nodes(dtype), WideForm.of(surrogate, dtype)
-    u, state = (nodes.add("Transpose", [name], f"{name}_rows", perm=[1, 0]) for name in ("u", "state"))
+    given, state = (nodes.add("Transpose", [name], f"{name}_rows", perm=[1, 0]) for name in ("u", "state"))
+    u = known_inputs(nodes, given)
     scaled, rows = scaled_inputs(nodes, form, u)
     x = _terms(nodes, form, scaled, rows, state) if form.inputs else u
     memory = nodes.rows(state, form.memory, surrogate.state_length(dtype), "memory")
@@ -43,7 +44,7 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     nodes.add("Transpose", [units.outputs], "y", perm=[1, 0])
     after = state_after(nodes, form, made.memory, _tails(nodes, form, scaled, rows, state))
     nodes.add("Transpose", [after], "state_out", perm=[1, 0])
-    nodes.add("Transpose", [flags_of(nodes, surrogate, u, units)], "flags", perm=[1, 0])
+    nodes.add("Transpose", [flags_of(nodes, surrogate, (given, u), units)], "flags", perm=[1, 0])
     return nodes.graph("step", *ends(nodes, surrogate, ["batch"]))
 
 

@@ -23,6 +23,7 @@ from sysid.export.layout import DelayLine, EquationState, HiddenState
 from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
 from sysid.models import AbstractModel, Cascade
 from sysid.models.form import unheeded
+from sysid.models.history import known_inputs
 from sysid.models.wiring import Wiring
 from sysid.names import c_identifier, distinct, written_side
 from sysid.traces import Trace
@@ -210,7 +211,7 @@ class Surrogate:
         Returns:
             Shape ``(n_channels,)``, in units.
         """
-        values = dict(zip((port.name for port in self.inputs), map(float, first), strict=True))
+        values = dict(zip((port.name for port in self.inputs), map(float, known_inputs(first)), strict=True))
         return np.array([values[p.level] if isinstance(p.level, str) else p.level for p in self.channels])
 
     def at_rest(self, inputs: NDArray[np.float64], computed: NDArray[np.float64] | None = None) -> NDArray[np.float64]:

@@ -281,7 +281,8 @@ class SurrogateStep(nn.Module):
         Returns:
             Outputs in their units, shape ``(batch, n_outputs)``, the next state, and the flags, shape ``(batch, 1)``.
         """
-        known = u
+        # What is infinite is read as not a number; nothing is added to all others, nor to their derivatives.
+        known = u + 0.0 * u
         states: list[Tensor] = []
         held: list[Tensor] = []
         limited: list[Tensor] = []

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.models.ends import Ends, check_record
 from sysid.models.form import AbstractForm
-from sysid.models.history import History, Start
+from sysid.models.history import History, Start, known_inputs
 from sysid.models.lags import Lagged
 from sysid.models.mapping import Mapping
 from sysid.models.ratio import Ratio
@@ -391,7 +391,8 @@ class AbstractModel(ABC):
         """Free run: the model is fed its own past output.
 
         Args:
-            inputs: Shape ``(n_samples, n_inputs)``, in the mapping's order and units.
+            inputs: Shape ``(n_samples, n_inputs)``, in the mapping's order and units. One that is infinite is read as
+                one that is not a number: the output is not a number for as long as it is remembered.
             history: Samples before the first; by default at rest: inputs held at their first sample, output
                 at ``rest_output``.
 
@@ -401,7 +402,7 @@ class AbstractModel(ABC):
         Raises:
             TraceError: If the number of inputs is not the mapping's.
         """
-        return self.recursion.simulate(inputs, history or self._rest(inputs))
+        return self.recursion.simulate(known_inputs(inputs), history or self._rest(inputs))
 
     def predict(
         self,
@@ -434,7 +435,7 @@ class AbstractModel(ABC):
                 got=repr(steps),
                 remedy="1 is the next sample; simulate() is the free run, which starts from no measured output",
             )
-        return self.recursion.predict(inputs, output, history or self._rest(inputs), steps)
+        return self.recursion.predict(known_inputs(inputs), output, history or self._rest(inputs), steps)
 
     def _rest(self, inputs: NDArray[np.float64]) -> History:
         return History.at_rest(inputs=np.asarray(inputs, dtype=np.float64)[0], output=self.resting)

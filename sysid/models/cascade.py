@@ -18,6 +18,7 @@ from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
+from sysid.models.history import known_inputs
 from sysid.models.wiring import Member, Wiring
 from sysid.traces import Trace
 
@@ -294,7 +295,7 @@ class Cascade:
             axes: How many axes they must have.
 
         Returns:
-            The inputs as float64.
+            The inputs as float64; what is infinite is not a number.
 
         Raises:
             TraceError: If the shape is not the cascade's.
@@ -307,7 +308,7 @@ class Cascade:
                 got=f"shape {inputs.shape}",
                 remedy="give one column per input, in the order of cascade.inputs",
             )
-        return inputs
+        return known_inputs(inputs)
 
     def empty(self, *shape: int) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
         """Room for a run: values of all channels, and what held the outputs.

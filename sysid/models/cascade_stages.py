@@ -73,7 +73,9 @@ class ModelStage:
         sources = [self.channels.index(name) for name in self.model.mapping.inputs]
         columns = [self.channels.index(name) for name in self.model.mapping.outputs]
         resting = levels[columns] if self.model.structure.several_outputs else float(levels[columns[0]])
-        output = self.model.simulate(values[:, sources], History.at_rest(inputs=levels[sources], output=resting))
+        output = self.model.recursion.simulate(
+            values[:, sources], History.at_rest(inputs=levels[sources], output=resting)
+        )
         for j, (column, limit) in enumerate(zip(columns, self.limits, strict=True)):
             values[:, column] = output.reshape(len(values), -1)[:, j]
             self._hold(values, column, limit, held[:, j])

@@ -42,7 +42,7 @@ class History:
     constants: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        inputs = np.array(self.inputs, dtype=np.float64, ndmin=2)
+        inputs = known_inputs(np.array(self.inputs, dtype=np.float64, ndmin=2))
         output = np.array(self.output, dtype=np.float64, ndmin=1)
         if inputs.ndim != 2 or output.ndim not in {1, 2} or len(inputs) != len(output) or len(output) == 0:
             raise TraceError(
@@ -87,6 +87,26 @@ class History:
         inputs = np.concatenate([np.repeat(self.inputs[:1], missing, axis=0), self.inputs])[-n_past:]
         output = np.concatenate([np.repeat(self.output[:1], missing, axis=0), self.output])[-n_past:]
         return inputs, output
+
+
+def known_inputs(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inputs with what is infinite as not a number: a free run answers neither, and says so the same way.
+
+    Without it a network saturates and gives a number that looks like an answer, a linear model loses its output some
+    samples later, and every exported format does one or the other by how it sums.
+
+    Args:
+        inputs: Any shape.
+
+    Returns:
+        The same array where all of it is finite.
+
+    Example:
+        >>> known_inputs(np.array([1.0, np.inf, np.nan])).tolist()
+        [1.0, nan, nan]
+    """
+    inputs = np.asarray(inputs, dtype=np.float64)
+    return np.where(np.isinf(inputs), np.nan, inputs) if np.isinf(inputs).any() else inputs
 
 
 class StartKind(enum.Enum):

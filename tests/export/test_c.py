@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.export import EXPORTERS
+from sysid.export import EXPORTERS, Surrogate
 from sysid.export.compiler import CompilerError, build_library
 from sysid.export.incremental_form import IncrementalForm
 from sysid.export.lagged_form import LaggedForm
 from sysid.models import NARX
+from tests.export.grey_boxes import GREY_BOXES
 
 STRICT = ["-O2", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror"]
 RECEIVERS = {
@@ -72,7 +73,7 @@ def can_compile(command, folder):
 @pytest.fixture(scope="module")
 def sources(models, declared, cascade, circle, tmp_path_factory):
     """Folder and name of the C files of every model, of a cascade, and of models in a circle."""
-    found, wired = {}, {"cascade": cascade, "circle": circle}
+    found, wired = {}, {"cascade": cascade, "circle": circle, "equations": Surrogate.of(GREY_BOXES["stiff"]())}
     for name, surrogate in {**{name: declared(build()) for name, build in models.items()}, **wired}.items():
         folder = tmp_path_factory.mktemp("c")
         EXPORTERS["c"].write(surrogate, folder)
@@ -98,6 +99,30 @@ def test_no_compiler_has_a_word_to_say(sources, receiver, real, tmp_path):
             text=True,
             check=False,
         )
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+ANALYSES = {
+    # GCC 12 takes the width of a vector's element for its number of elements, which is told to it.
+    "gcc -fanalyzer": ["gcc", "-std=c99", "-O1", "-fanalyzer", "-Werror", "-Wno-analyzer-shift-count-overflow", "-c"],
+    "cppcheck": ["cppcheck", "--std=c99", "--enable=warning,performance,portability", "--inconclusive", "--quiet",
+                 "--error-exitcode=1", "--suppress=missingIncludeSystem"],
+}  # fmt: skip
+"""What looks for mistakes without running the source."""
+
+
+@pytest.mark.parametrize("macro", ["", "FLOAT"], ids=["double", "float"])
+@pytest.mark.parametrize("tool", ANALYSES)
+def test_static_analysis_finds_nothing(sources, tool, macro, tmp_path):
+    command = ANALYSES[tool]
+    if not shutil.which(command[0]):
+        pytest.skip(f"this machine has no {command[0]}")
+    for key in ("NARX, gates of tanh", "cascade", "circle") if tool == "cppcheck" else ("NARX, gates of tanh",):
+        surrogate, folder = sources[key]
+        name = surrogate.identifier
+        flags = ["-D__GNUC__=12"] if tool == "cppcheck" else ["-o", tmp_path / "out.o"]
+        flags += [f"-D{name.upper()}_{macro}"] if macro else []
+        done = subprocess.run([*command, *flags, f"{name}.c"], cwd=folder, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr) == (0, "")
 
 

@@ -75,14 +75,20 @@ def test_several_cars_run_as_if_alone(exported, inputs, past):
         assert largest_difference(together.output[:, i, 0], model.simulate(u, history)) <= exported.tolerance
 
 
-def test_an_input_that_is_not_a_number_gives_what_the_model_gives(exported, inputs, past):
+def test_an_input_that_is_infinite_or_no_number_gives_what_the_model_gives(exported, inputs, past):
+    """A car for each: outputs that are none from the same sample on, others as ever, and the same flags."""
     model, history = exported.model, past(exported.model)
-    u = inputs(30, len(model.mapping.inputs))
-    u[10] = np.nan
-    run = exported.run(u[:, np.newaxis], exported.layout.from_history(history)[np.newaxis])
-    expected = model.simulate(u, history)
-    assert np.isnan(expected).any() == any(model.recursion.lags.inputs)
-    np.testing.assert_array_equal(np.isnan(run.output[:, 0, 0]), np.isnan(expected))
+    values = (np.nan, np.inf, -np.inf)
+    u = np.stack([inputs(30, len(model.mapping.inputs))] * len(values), axis=1)
+    u[10] = np.array(values)[:, np.newaxis]
+    run = exported.run(u, np.stack([exported.layout.from_history(history)] * len(values)))
+    for i in range(len(values)):
+        expected = model.simulate(u[:, i], history)
+        assert np.isnan(expected).any() == any(model.recursion.lags.inputs)
+        assert largest_difference(run.output[:, i, 0], expected) <= exported.tolerance
+        flags = expected_flags(exported.surrogate, u[:, i], expected[:, np.newaxis])
+        np.testing.assert_array_equal(run.flags[:, i], flags)
+        assert flags[10] & Flag.NOT_A_NUMBER
 
 
 def test_flags_say_what_is_outside_held_or_lost(exported, inputs, past):
@@ -137,10 +143,14 @@ def test_models_wired_run_as_one(wired, opened, inputs, tmp_path):
     states = np.stack([surrogate.at_rest(u[0, i]) for i in range(3)])
     run = exported.run(u, states)
     assert run.output.shape == (200, 3, len(surrogate.outputs))
-    for i in range(3):
-        expected = surrogate.simulate(u[:, i])
-        assert largest_difference(run.output[:, i], expected) <= row.tolerance
-        np.testing.assert_array_equal(run.flags[:, i], expected_flags(surrogate, u[:, i], surrogate.compute(u[:, i])))
+    lost = u[:20].copy()
+    lost[5, 0, 0], lost[5, 1, -1], lost[5, 2, 0] = np.nan, np.inf, -np.inf
+    for fed, found in ((u, run), (lost, exported.run(lost, states))):
+        for i in range(3):
+            expected = surrogate.simulate(fed[:, i])
+            assert largest_difference(found.output[:, i], expected) <= row.tolerance
+            flags = expected_flags(surrogate, fed[:, i], surrogate.compute(fed[:, i]))
+            np.testing.assert_array_equal(found.flags[:, i], flags)
     half = exported.run(u[:90], states)
     rest = exported.run(u[90:], half.state)
     np.testing.assert_array_equal(np.concatenate([half.output, rest.output]), run.output)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import zipfile
 
 import fmpy
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
@@ -132,6 +134,25 @@ def test_description_has_units_start_values_and_meaning(fmu, surrogate):
     assert base.factor == pytest.approx(6894.757, rel=1e-6)
     assert float(description.defaultExperiment.stepSize) == 0.1
     assert "1: an input is outside its declared range" in variables["flags"].description
+
+
+def test_what_it_cannot_is_said_and_refused(fmu, slave):
+    """An output hangs on no input of the same moment: what a step gave stays until the next one."""
+    description = fmpy.read_model_description(fmu)
+    assert {one.dependencies is not None and len(one.dependencies) for one in description.outputs} == {0}
+    fmi2 = isinstance(slave, FMU2Slave)
+    with zipfile.ZipFile(fmu) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    claims = re.findall(r'(provides\w+)="(\w+)"', text)
+    names = (
+        ["providesDirectionalDerivative"] if fmi2 else ["providesDirectionalDerivatives", "providesAdjointDerivatives"]
+    )
+    assert claims == [(name, "false") for name in names]
+    with pytest.raises(FMICallException):
+        slave.getDirectionalDerivative(slave.outputs[:1], slave.inputs[:1], [1.0])
+    before = slave.get(slave.outputs)
+    slave.set(slave.inputs, [1.0] * len(slave.inputs))
+    assert list(slave.get(slave.outputs)) == list(before)
 
 
 def test_state_can_be_kept_set_stored_and_read(slave, surrogate, inputs):

@@ -163,7 +163,9 @@ class Table:
     def _at_rest(self, inputs: NDArray[np.float64], moved: dict[str, float]) -> NDArray[np.float64]:
         """All at its declared level, but for outputs that stand elsewhere."""
         about, start = self.about, self.about["initialisation"]
-        first = {channel["name"]: value for channel, value in zip(about["inputs"], inputs[0], strict=True)}
+        first = {
+            channel["name"]: value for channel, value in zip(about["inputs"], inputs[0] + 0.0 * inputs[0], strict=True)
+        }
         rest = {name: first.get(level, level) for name, level in start["levels"].items()} | moved
         heeded = set()
         state = np.zeros(about["state"]["size"])
