@@ -434,12 +434,12 @@ class TraceSet:
 
     @property
     def shared(self) -> tuple[tuple[str, str], ...]:
-        """Cases that are only scored and have samples of one that is fitted, with the name of that one.
+        """Cases that choose or are scored and have samples of one that is fitted, with the name of that one.
 
         Found where both have the same values at the same times, be it by a copy or by two cuts of one record.
         """
         fitted = self.with_role(Role.ESTIMATION)
-        scored = self.with_role(Role.VALIDATION, Role.TEST)
+        scored = self.with_role(Role.SELECTION, Role.VALIDATION, Role.TEST)
         pairs = ((one, next((other for other in fitted if _share_samples(one, other)), None)) for one in scored)
         return tuple((one.name, other.name) for one, other in pairs if other is not None)
 

@@ -76,6 +76,6 @@ def test_a_case_that_has_samples_of_a_fitted_one_is_known(start: int, shares: bo
         )
 
     other = Trace(name="other", sample_time=0.1, channels=TRACE.channels, values=-values)
-    roles = {"fitted": Role.ESTIMATION, "again": Role.VALIDATION, "other": Role.TEST}
+    roles = {"fitted": Role.ESTIMATION, "again": Role.SELECTION, "other": Role.TEST}
     traces = TraceSet(name="rig", traces=(cut("fitted", 0, 50), cut("again", start, 80), other), roles=roles)
     assert traces.shared == ((("again", "fitted"),) if shares else ())
