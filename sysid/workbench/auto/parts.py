@@ -25,6 +25,8 @@ FEWEST = 20
 """Usable samples of a part without which nothing can be chosen."""
 SEARCHED = 40_000
 """Samples that are fitted while structures are tried; of a longer record the chosen structure alone sees all."""
+FEW = 4
+"""Whole traces from which on trials see some of them, and not the beginning of all."""
 END = 0.25
 """Share of each trace that an order search chooses on."""
 SEARCH = {"max_iterations": 200}
@@ -56,11 +58,18 @@ class Parts:
         folds: Ways to part them: what a trial is worth is the geometric mean over all.
         told: How they were parted, one sentence each.
         partial: Whether the chosen structure has to be fitted once more, to all there is.
+        cut: Whether that is for the record's length alone: a network is then trained on from where its trial had ended.
     """
 
     folds: tuple[Fold, ...]
     told: tuple[str, ...]
     partial: bool
+    cut: bool = False
+
+    @property
+    def trained_on(self) -> bool:
+        """Whether a chosen network goes on from where its trial had ended: no part of the record was held out of it."""
+        return self.cut or not self.partial
 
     @property
     def training(self) -> dict[str, Any]:
@@ -69,7 +78,7 @@ class Parts:
         Declared selection traces choose between its starts too. Parts that are held out do not, nor do they stop it
         early, as the last fit, to all of the record, has none: what is tried is what is done then.
         """
-        if not self.partial:
+        if self.trained_on:
             return {**SEARCH, "starts": 4}
         return {**SEARCH, "starts": 1 if len(self.folds) > 1 else 2, "choose_by": "evidence"}
 
@@ -104,11 +113,22 @@ def part(data: Data, start: Start) -> Parts:
             remedy="record for longer, or fit a structure of few parameters with sysid orders or sysid run",
         )
     sentences, total = [told], max(sum(map(len, fitted)) for fitted, _ in pairs)
+    cut = total > SEARCHED and bool(data.selection)
     if total > SEARCHED:
         share, partial = SEARCHED / total, True
-        pairs = [([_piece(one, 0, math.ceil(share * len(one))) for one in fitted], rest) for fitted, rest in pairs]
-        sentences.append(f"Trials saw the first {share:.0%} of what is fitted, and what was chosen all of it.")
-    return Parts(folds=tuple(_fold(data, *pair) for pair in pairs), told=tuple(sentences), partial=partial)
+        seen = [_seen(fitted, share) for fitted, _ in pairs]
+        pairs = [(some, rest) for (some, _), (_, rest) in zip(seen, pairs, strict=True)]
+        sentences.append(f"Trials saw {seen[0][1]} of what is fitted, and what was chosen all of it.")
+    return Parts(folds=tuple(_fold(data, *pair) for pair in pairs), told=tuple(sentences), partial=partial, cut=cut)
+
+
+def _seen(fitted: Sequence[Trace], share: float) -> tuple[list[Trace], str]:
+    """A share of what is fitted, and which: whole traces where there are many, else the beginning of each."""
+    whole = int(share * len(fitted))
+    if whole < FEW:
+        return [_piece(one, 0, math.ceil(share * len(one))) for one in fitted], f"the first {share:.0%}"
+    places = np.linspace(0, len(fitted) - 1, whole).round().astype(int)
+    return [fitted[k] for k in places], f"{whole} of the {len(fitted)} traces"
 
 
 def ends_held_out(traces: Sequence[Trace]) -> tuple[tuple[Trace, ...], tuple[Trace, ...]]:

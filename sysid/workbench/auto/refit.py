@@ -23,9 +23,8 @@ BETTER, KEPT = (
     "The fit that was chosen is kept: its structure fitted once more, to all of the record, is no better.",
 )
 FURTHER, ENOUGH = (
-    "Trained on from where its trial had ended: the selection traces bear it out.",
-    "The fit that was chosen is kept: trained on from where its trial had ended, it is no better on the selection "
-    "traces.",
+    "Trained on, with all that is fitted, from where its trial had ended.",
+    "The fit that was chosen is kept: trained on from where its trial had ended, it is no better.",
 )
 """What is said where the last fit is taken, and where it is not."""
 
@@ -44,7 +43,7 @@ def trains_on(structure: AbstractStructure) -> bool:
 
 
 def refitted(
-    work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult, partial: bool
+    work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult, further: bool
 ) -> FitResult:
     """Fit the chosen structure once more: to all estimation traces, or on from where its trial had ended.
 
@@ -54,15 +53,16 @@ def refitted(
         config: The pipeline, as of the model's outputs.
         data: All traces.
         chosen: The fit that was chosen.
-        partial: Whether it saw a part of the estimation traces, the others choosing; else it is trained on from where
-            it is, and the selection traces say whether that was for the better.
+        further: Whether it is trained on from where it is, and selection traces, where there are some, say whether that
+            was for the better; else it is fitted anew, and all estimation traces do.
 
     Returns:
         The new fit, or the chosen one where that does better.
     """
     watch = work.watch(getattr(fit.training_options(config.seed), "max_time_s", math.inf))
-    again = steps.fit_traces(fit, config, data, None if partial else chosen, watch)
-    judging, taken, left = (data.estimation, BETTER, KEPT) if partial else (data.selection, FURTHER, ENOUGH)
+    again = steps.fit_traces(fit, config, data, chosen if further else None, watch)
+    judging = (data.selection if further else ()) or data.estimation
+    taken, left = (FURTHER, ENOUGH) if further else (BETTER, KEPT)
     ours, theirs = (_error(one, judging, config) for one in (again, chosen))
     better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs))
     found = again if better else chosen

@@ -228,11 +228,12 @@ class _AutoSteps:
         loaded = run.do(self._loading())
         found = run.do(self._searching(run, loaded)).value
         fits = [self._fit(name, found) for name in found.shown]
-        pipeline, given, partly = self._pipeline(fits), dict[str, GivenFit](), found.parts.partial
+        pipeline, given, parts = self._pipeline(fits), dict[str, GivenFit](), found.parts
         for fit in fits:
             for model, made in zip(models_of(fit, pipeline.config), found.fits[fit.name], strict=True):
-                last = partly or trains_on(model.fit.structure)
-                given[model.fit.name] = _again(model, made, loaded.value, partly=partly) if last else made
+                further = parts.trained_on and trains_on(model.fit.structure)
+                last = parts.partial or further
+                given[model.fit.name] = _again(model, made, loaded.value, further=further) if last else made
         choice = steps.Choice(name=FOUND, chosen_by=found.record.chosen_by)
         results = FitSteps(pipeline=pipeline, given=given, chosen=choice, page=self.auto.page).run(run, loaded)
         ready = events.SweepReady(
@@ -294,21 +295,21 @@ class _AutoSteps:
         """A trial as a fit of a pipeline; one that is fitted once more has more starts, and a share of the time."""
         options = dict[str, Any](found.training[name])
         structure: Mapping[str, Any] = found.shown[name].structure
-        if found.parts.partial and "starts" in options:
-            options |= LAST
-        elif trains_on(structure_from_dict(structure)):
+        if found.parts.trained_on and trains_on(structure_from_dict(structure)):
             options |= FURTHER
+        elif found.parts.partial and "starts" in options:
+            options |= LAST
         if "max_time_s" in options and self.config.wall_s is not None:
             options["max_time_s"] = round(REFIT * self.config.wall_s, 3)
         return FitConfig.model_validate({"name": name, "structure": dict(structure), "training": options or None})
 
 
-def _again(model: FitModel, made: GivenFit, data: Data, *, partly: bool) -> GivenFit:
+def _again(model: FitModel, made: GivenFit, data: Data, *, further: bool) -> GivenFit:
     """A model that was chosen on parts of the record, or after few iterations, fitted once more."""
-    how = "again" if partly else "further"
+    how = "further" if further else "again"
     key = digest(strict({"chosen": made.key, how: steps.fit_key(model.fit, model.config, data, None)}))
-    return GivenFit(key=key, make=partial(_make_again, model, data, made, partly))
+    return GivenFit(key=key, make=partial(_make_again, model, data, made, further))
 
 
-def _make_again(model: FitModel, data: Data, made: GivenFit, partly: bool, work: Work) -> FitResult:
-    return refitted(work, model.fit, model.config, data, chosen=made.make(work), partial=partly)
+def _make_again(model: FitModel, data: Data, made: GivenFit, further: bool, work: Work) -> FitResult:
+    return refitted(work, model.fit, model.config, data, chosen=made.make(work), further=further)

@@ -147,7 +147,7 @@ class Search:
             tell=lambda event: self.run.tell(_progress(event, plan)),
         )
         trials = Trials.of(driver)
-        again = AGAIN if self.parts.partial else 0
+        again = 0 if self.parts.trained_on else AGAIN
         budget = Budget(
             wall_s=self.config.wall_s,
             iterations=self.config.iterations,

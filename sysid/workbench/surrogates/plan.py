@@ -12,6 +12,7 @@ from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish, proposed
 from sysid.references.design import Counts, Design, drawn
 from sysid.references.runs import ReferenceRuns
+from sysid.workbench.auto.parts import SEARCHED
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import check, yaml_text
@@ -22,8 +23,9 @@ SEARCHING, LONGEST, ELSE = 0.5, 0.75, 0.1
 """Share of the time in which a model is looked for, at least and at most, and what export and report take."""
 PROOF = 1000
 """New experiments of the proof where there is time for them."""
-FEWEST, MOST = 8, 60
-"""Experiments that are fitted."""
+FEWEST, ENOUGH, MOST = 8, 12, 60
+"""Experiments that are fitted: at least, where they are long, and at most. More samples than a search looks at would
+make its trials slow; rounds of growth add what is missing."""
 
 
 def written(fmu: Path, wish: Wish, folder: Path, *, minutes: float, workers: int, seed: int) -> tuple[Path, list[str]]:
@@ -86,7 +88,7 @@ def _text(
 
 
 def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, workers: int) -> Counts:
-    """How many experiments there is time for.
+    """How many experiments there is time for, in which they can be searched too.
 
     Args:
         reference: Run once to see.
@@ -101,7 +103,8 @@ def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, wo
     with ReferenceRuns(config=reference, workers=1) as runs:
         (one,) = runs.run([case])
     each = one.wall_s if np.isfinite(one.wall_s) else reference.time_limit
-    count = int(np.clip(RUNNING * 60.0 * minutes * workers / max(each, 1e-3) / 1.5, FEWEST, MOST))
+    most = int(np.clip(SEARCHED * reference.sample_time / design.duration, ENOUGH, MOST))
+    count = int(np.clip(RUNNING * 60.0 * minutes * workers / max(each, 1e-3) / 1.5, FEWEST, most))
     return Counts(estimation=count, selection=max(3, count // 4), test=max(3, count // 4))
 
 

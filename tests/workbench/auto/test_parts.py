@@ -79,7 +79,11 @@ def test_a_long_record_is_searched_by_a_part_and_fitted_whole() -> None:
     declared = {Role.SELECTION: record("b", 100, seed=1)}
     longer = part(data(record("a", 2 * SEARCHED), others=declared), STARTS[0])
     assert len(longer.folds[0].fitted.traces[0]) == SEARCHED
-    assert longer.partial
+    many = part(data(*(record(name, SEARCHED // 4) for name in "cdefghij"), others=declared), STARTS[0])
+    assert many.folds[0].fitted.names == ("c", "e", "h", "j")
+    assert {len(one) for one in many.folds[0].fitted} == {SEARCHED // 4}
+    assert "4 of the 8 traces" in many.told[-1]
+    assert (longer.partial, longer.cut, long.cut) == (True, True, False)
 
 
 def test_too_short_a_record_says_what_to_do() -> None:
