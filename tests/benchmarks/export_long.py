@@ -3,8 +3,8 @@
     python -m tests.benchmarks export_long
 
 One NARX 4/4/20 with random weights, inputs held for 50 samples each, in ten calls that hand the state on; and a linear
-model whose inputs stop, so that its state decays until numbers are denormal. Other formats are not run for so long here.
-Processor time.
+model whose inputs stop, so that its state decays until numbers are denormal. Other formats are not run for so long
+here. Processor time.
 """
 
 from __future__ import annotations
