@@ -88,7 +88,8 @@ def main() -> None:
             seconds = (time.process_time() - began) / seeds
             note = f"median error {100.0 * np.median(errors):.2f} %, {seconds:.1f} s of processor time each; {missed}"
             title = f"{kind} with {name}: found of {seeds}"
-            found(title, float(np.count_nonzero(errors < FOUND)), "", target=float(seeds), note=note.rstrip("; "))
+            count = float(np.count_nonzero(errors < FOUND))
+            found(title, count, target=float(seeds), at_least=True, note=note.rstrip("; "))
 
 
 if __name__ == "__main__":
