@@ -30,7 +30,7 @@ def hammerstein_wiener(
     scaling = begun.scaling
     inputs = _inputs(text, structure.curves(len(mapping.inputs)), mapping, begun, structure.lags(len(mapping.inputs)))
     integrates = begun.integrates
-    linear = write_block(text, block, inputs, "g", drifts=integrates)
+    linear = write_block(text, block, inputs, "g", fed=begun.constant(block) if integrates else None)
     level = "" if integrates else f" + {text.estimated('level', begun.level)}"
     inside = text.define("inside", f"{linear}{level}")
     in_units = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}"
@@ -54,8 +54,8 @@ def wiener_hammerstein(
     n = len(mapping.inputs)
     inputs = _inputs(text, (Curve(kind=NONE),) * n, mapping, begun, structure.lags(n))
     before, behind = blocks
-    drifts = begun.integrates
-    between = text.define("between", write_block(text, before, inputs, "g1", known=True, drifts=drifts))
+    drift = 0.0 if begun.integrates else None
+    between = text.define("between", write_block(text, before, inputs, "g1", known=True, fed=drift))
     bent = text.define("bent", text.curve(structure.curve, between, "f"))
     level = text.estimated("level", begun.level)
     linear = write_block(text, behind, [(bent, True)], "g2")
@@ -89,7 +89,7 @@ def _inputs(
 
 
 def write_block(
-    text: Text, block: Block, inputs: Sequence[Input], tag: str, *, known: bool = False, drifts: bool = False
+    text: Text, block: Block, inputs: Sequence[Input], tag: str, *, known: bool = False, fed: float | None = None
 ) -> str:
     """Write a block; what its output is.
 
@@ -99,7 +99,7 @@ def write_block(
         inputs: What it reads.
         tag: Part of the names of its states and parameters.
         known: Whether its largest gain has a prior, as wide as it is large.
-        drifts: Whether it is fed a constant beside its inputs, which an integrator makes a slope of.
+        fed: The constant that its last state is fed at first, of which an integrator makes a slope; ``None`` for none.
 
     Returns:
         The expression.
@@ -118,8 +118,8 @@ def write_block(
                 wanted = f"{tag}_b{at + i + 1}" + (f"_{j + 1}" if len(inputs) > 1 else "")
                 prior = largest if abs(gain) == largest > 0.0 else None
                 terms.append(f"{text.estimated(wanted, gain, prior=prior)}*{read}")
-            if drifts and at + i == block.states - 1:
-                terms.append(text.estimated(f"{tag}_drift", 0.0))
+            if fed is not None and at + i == block.states - 1:
+                terms.append(text.estimated(f"{tag}_drift", fed))
             text.lines.append(f"{states[at + i]}[k+1] = {' + '.join(term for term in terms if term)}")
         at += len(section)
     direct = [

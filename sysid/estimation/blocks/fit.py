@@ -9,13 +9,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.estimation.blocks.equations import hammerstein_wiener, wiener_hammerstein
-from sysid.estimation.blocks.linear_start import LinearStart, linear_start, parted, shifted, whole
+from sysid.estimation.blocks.linear_start import LinearStart, integrating_start, linear_start, parted, shifted, whole
 from sysid.estimation.grey_box.fit import built_template, fit_equations
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.result import FitResult
-from sysid.models import BuiltModel, HammersteinWiener, Mapping, Start, WienerHammerstein
+from sysid.models import BuiltModel, GreyBox, HammersteinWiener, Mapping, Start, WienerHammerstein
 from sysid.models.block_oriented import BlockStructure
 from sysid.traces import Trace
 
@@ -64,14 +65,20 @@ def fit_hammerstein_wiener(
     begun = _begun(
         traces, mapping, structure, structure.states, start=start, rest_output=rest_output, rectified=rectified
     )
-    direct = [lag == 0 for lag in structure.lags(len(mapping.inputs))]
-    grey, curved = hammerstein_wiener(structure, mapping, begun, whole(begun, direct=direct))
+    lags, ways = structure.lags(len(mapping.inputs)), [begun]
+    if begun.integrates and not rectified:
+        late = shifted(traces, mapping, lags)
+        ways.insert(
+            0, integrating_start(late, mapping, structure.states, start=start or Start(), scaling=begun.scaling)
+        )
+    direct = [lag == 0 for lag in lags]
+    (grey, curved), *others = [hammerstein_wiener(structure, mapping, one, whole(one, direct=direct)) for one in ways]
     template, experiments = built_template(
         traces, mapping, grey, built_of=structure, start=start or Start(), rest_output=rest_output
     )
     found = fit_equations(
         template, experiments, (training or Training()).with_starts(STARTS), (traces, selection, start or Start()),
-        scattered=curved, began=began, vet=vet, on_progress=on_progress,
+        others=_starts_of([one for one, _ in others]), scattered=curved, began=began, vet=vet, on_progress=on_progress,
     )  # fmt: skip
     return with_equations(found)
 
@@ -107,12 +114,16 @@ def fit_wiener_hammerstein(
     template, experiments = built_template(
         traces, mapping, greys[0], built_of=structure, start=start or Start(), rest_output=rest_output
     )
-    others = [np.array([one.start for one in grey.free]) for grey in greys[1:]]
     found = fit_equations(
         template, experiments, training, (traces, selection, start or Start()),
-        others=others, scattered=frozenset(), began=began, vet=vet, on_progress=on_progress,
+        others=_starts_of(greys[1:]), scattered=frozenset(), began=began, vet=vet, on_progress=on_progress,
     )  # fmt: skip
     return with_equations(found)
+
+
+def _starts_of(greys: Sequence[GreyBox]) -> list[NDArray[np.float64]]:
+    """Where the parameters of the same equations begin otherwise."""
+    return [np.array([one.start for one in grey.free]) for grey in greys]
 
 
 def with_equations(found: FitResult) -> FitResult:

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.blocks.sections import Block, Poles, block_of, responses, samples_for, sections_of
+from sysid.estimation.blocks.sections import INTEGRATOR, Block, Poles, block_of, responses, samples_for, sections_of
 from sysid.estimation.networks.neural_state_space import fit_neural_state_space
 from sysid.estimation.networks.training import Training
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
@@ -36,6 +36,8 @@ class LinearStart:
         response: Impulse response to each input, lag 0 first, shape ``(n_samples, n_inputs)``.
         level: What the output has where the inputs are 0.
         samples: Of the longest record.
+        slope: What the output of a plant that integrates gains in a sample where the inputs are 0; ``None`` where it
+            has a level.
     """
 
     scaling: Scaling
@@ -43,6 +45,14 @@ class LinearStart:
     response: Array
     level: float
     samples: int
+    slope: float | None = None
+
+    def constant(self, block: Block) -> float:
+        """What a block of these poles is fed beside its inputs, at its last state."""
+        if self.slope is None:
+            return self.level * block.stillness
+        others = np.prod(1.0 - self.poles[self.poles != INTEGRATOR])
+        return self.slope * float(np.real(others))
 
     @property
     def integrates(self) -> bool:
@@ -102,6 +112,38 @@ def linear_start(
     return LinearStart(
         scaling=model.scaling, poles=poles, response=response, level=float(level), samples=max(map(len, traces))
     )
+
+
+def integrating_start(
+    traces: Sequence[Trace], mapping: Mapping, states: int, *, start: Start, scaling: Scaling
+) -> LinearStart:
+    """The linear model of least error with a pole of 1: that of the output's steps, summed up.
+
+    The free run's own error says little of the other poles of a plant that integrates: the slow one takes it all.
+
+    Args:
+        traces: As for :func:`linear_start`.
+        mapping: Which channels go in, which comes out.
+        states: Number of states, the integrator among them.
+        start: What stands before each trace.
+        scaling: Of the output itself.
+
+    Returns:
+        The start.
+    """
+    stepped = []
+    for trace in traces:
+        values, at = trace.values.copy(), [channel.name for channel in trace.channels].index(mapping.output)
+        values[1:, at], values[0, at] = np.diff(trace.values[:, at]), 0.0
+        stepped.append(replace(trace, values=values))
+    steps = linear_start(stepped, mapping, max(states - 1, 1), start=start, rest_output=0.0, output="plain")
+    ratio = steps.scaling.output_scale / scaling.output_scale
+    poles = steps.poles if states > 1 else np.zeros(0, dtype=np.complex128)
+    return LinearStart(
+        scaling=scaling, poles=np.append(INTEGRATOR, poles), response=np.cumsum(steps.response, axis=0) * ratio,
+        level=0.0, samples=steps.samples,
+        slope=(steps.level + steps.scaling.output_offset / steps.scaling.output_scale) * ratio,
+    )  # fmt: skip
 
 
 def whole(begun: LinearStart, *, direct: Sequence[bool]) -> Block:

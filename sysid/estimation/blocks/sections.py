@@ -7,6 +7,7 @@ numbers as a transfer function, and poles close to 1 move little where one of th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Poles = NDArray[np.complex128]
 
-LARGEST_POLE = 0.9999
-"""Poles of a start lie inside this radius."""
+LARGEST_POLE, INTEGRATOR = 0.9999, 1.0
+"""Poles of a start lie inside this radius, but for that of an integrator, which is 1 exactly."""
 RESPONSE = (50, 2_000)
 """Samples of an impulse response, at least and at most: five time constants of the slowest pole between."""
 
@@ -41,6 +42,11 @@ class Block:
     def states(self) -> int:
         """Number of states."""
         return len(self.gains)
+
+    @property
+    def stillness(self) -> float:
+        """What has to go into the last state at every sample for an output of 1; 0 where a pole is 1."""
+        return math.prod(1.0 - one[0] if len(one) == 1 else 1.0 + sum(one) for one in self.sections)
 
     def filtered(self, w: Array) -> Array:
         """Its output over some inputs, from 0.
@@ -76,7 +82,9 @@ def sections_of(poles: Poles) -> tuple[tuple[float, ...], ...]:
         ((-1.0, 0.5), (-1.3, 0.4))
     """
     size = np.abs(poles)
-    inside = np.where(size > LARGEST_POLE, poles * LARGEST_POLE / np.maximum(size, 1e-12), poles)
+    inside = np.where(
+        (size > LARGEST_POLE) & (poles != INTEGRATOR), poles * LARGEST_POLE / np.maximum(size, 1e-12), poles
+    )
     pairs = [p for p in inside if p.imag > 0.0]
     real = sorted(float(p.real) for p in inside if p.imag == 0.0)
     found: list[tuple[float, ...]] = [(float(-2.0 * p.real), float(p.real**2 + p.imag**2)) for p in pairs]

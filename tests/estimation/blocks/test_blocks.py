@@ -255,6 +255,22 @@ def test_an_output_that_never_changes_is_a_constant_and_no_power_of_itself() -> 
     assert fit.model.equations == "y = 0.3 + 0"
 
 
+def test_a_plant_that_integrates_behind_a_valve_and_a_lag_is_found() -> None:
+    """Its slow pole takes all that the free run's error says of a linear model: steps of the output say the rest."""
+
+    def tank(u: np.ndarray) -> np.ndarray:
+        flow = lfilter((0.0, 0.2), (1.0, -0.8), np.clip(u, -0.3, 0.6))
+        return np.asarray(lfilter((0.0, 0.1), (1.0, -1.0), flow))
+
+    u = steps(1)
+    y = tank(u)
+    y = y + 0.01 * np.std(y) * np.random.default_rng(0).standard_normal(len(u))
+    structure = HammersteinWiener(states=2, input="saturation")
+    fit = fit_hammerstein_wiener([a_trace(u, y)], MAPPING, structure, Training(starts=1, max_iterations=60))
+    assert error(fit, tank) < 0.05  # its pole is estimated, and sums up what is wrong with it
+    assert fit.status.usable
+
+
 def test_a_curve_with_more_pieces_than_the_record_shows_is_told_in_one_sentence() -> None:
     u = steps(1)
     y = first_order(u, 0.8, 0.0)
