@@ -82,6 +82,7 @@ def test_base_code_needs_no_extra(tmp_path):
         "sysid.export.onnx_equations onnx",
         "sysid.export.onnx_nodes onnx",
         "sysid.export.onnx_outputs onnx",
+        "sysid.export.onnx_products onnx",
         "sysid.export.onnx_sequence onnx",
         "sysid.export.onnx_step onnx",
         "sysid.export.torch_equations torch",
