@@ -22,7 +22,7 @@ BETTER, KEPT = (
     "Fitted once more, to all of the record, after it was chosen on a part of it.",
     "The fit that was chosen is kept: its structure fitted once more, to all of the record, is no better.",
 )
-FURTHER, ENOUGH = (
+GONE_ON, ENOUGH = (
     "Trained on, with all that is fitted, from where its trial had ended.",
     "The fit that was chosen is kept: trained on from where its trial had ended, it is no better.",
 )
@@ -62,7 +62,7 @@ def refitted(
     watch = work.watch(getattr(fit.training_options(config.seed), "max_time_s", math.inf))
     again = steps.fit_traces(fit, config, data, chosen if further else None, watch)
     judging = (data.selection if further else ()) or data.estimation
-    taken, left = (FURTHER, ENOUGH) if further else (BETTER, KEPT)
+    taken, left = (GONE_ON, ENOUGH) if further else (BETTER, KEPT)
     ours, theirs = (_error(one, judging, config) for one in (again, chosen))
     better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs))
     found = again if better else chosen

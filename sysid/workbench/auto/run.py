@@ -297,6 +297,10 @@ class _AutoSteps:
         structure: Mapping[str, Any] = found.shown[name].structure
         if found.parts.trained_on and trains_on(structure_from_dict(structure)):
             options |= FURTHER
+            if self.config.iterations is not None:
+                options["max_iterations"] = min(
+                    FURTHER["max_iterations"], max(1, round(REFIT * self.config.iterations))
+                )
         elif found.parts.partial and "starts" in options:
             options |= LAST
         if "max_time_s" in options and self.config.wall_s is not None:

@@ -16,7 +16,7 @@ from sysid.ingest import write_csv
 from sysid.reporting.results import read_results
 from sysid.traces import Role
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.refit import ENOUGH, FURTHER
+from sysid.workbench.auto.refit import ENOUGH, GONE_ON
 from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto
 from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.cli import run_cli
@@ -89,7 +89,7 @@ def test_where_selection_traces_chose_it_is_trained_on_and_they_say_whether_for_
     found = searched(tmp_path, known, iterations=200)
     best, tried_with = found.results.fits[0], found.record.winning
     assert tried_with is not None
-    assert any(note in {FURTHER, ENOUGH} for note in best.notes)
+    assert any(note in {GONE_ON, ENOUGH} for note in best.notes)
     assert best.cases["b"].free_run.mse <= tried_with.selection_free_run_mse
 
 
