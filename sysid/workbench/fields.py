@@ -39,7 +39,7 @@ _ELSEWHERE = {
     **dict.fromkeys(("ssest", "n4sid", "idss", "statespace", "state space"), "LinearStateSpace"),
     **dict.fromkeys(("nlarx", "idnlarx", "narxnet", "nnarx"), "NARX"),
     **dict.fromkeys(("nlhw", "idnlhw", "hammerstein", "wiener", "hw"), "HammersteinWiener"),
-    **dict.fromkeys(("greyest", "nlgreyest", "idgrey", "idnlgrey", "graybox", "grey box"), "GreyBox"),
+    **dict.fromkeys(("greyest", "nlgreyest", "idgrey", "idnlgrey", "graybox", "grey box", "equations"), "GreyBox"),
     **dict.fromkeys(("idneuralstatespace", "nlssest"), "NeuralStateSpace"),
     **dict.fromkeys(("frols", "polynomial"), "PolynomialNARX"),
     **dict.fromkeys(("ar", "fir", "idpoly", "impulseest"), "ARX"),
