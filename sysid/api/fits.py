@@ -189,7 +189,8 @@ class Fit(FitResult):
             )
         records = tuple(traces) if traces is not None else self.traces.with_role(Role.ESTIMATION)
         runs = [Experiment.for_model(trace, self.model, self.start) for trace in records]
-        return curves_figure(curve_values(self.model, [(run.inputs, run.history) for run in runs]))
+        curves = curve_values(self.model, [(run.inputs, run.history) for run in runs])
+        return curves_figure([curve.drawn() for curve in curves])
 
     def save(self, folder: str | Path, *, formats: tuple[str, ...] | None = None) -> Bundle:
         """Write it as files that run elsewhere; see :func:`sysid.save`."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.models.base import AbstractModel
 from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
 from sysid.models.built_model import BuiltModel
 from sysid.models.curves import NONE, Text, quoted
@@ -16,6 +18,9 @@ from sysid.models.grey_box import lowered
 from sysid.models.history import History
 
 Array = NDArray[np.float64]
+POINTS: Final = 400
+BINS: Final = 40
+"""Points of a curve that a picture shows, and bars that say where samples lie."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,6 +41,46 @@ class CurveValues:
     x: Array
     y: Array
 
+    def drawn(self) -> CurvePoints:
+        """What a picture of it needs, however long the record is."""
+        x, first = np.unique(self.x, return_index=True)
+        some = np.unique(np.linspace(0, len(x) - 1, min(POINTS, len(x))).astype(int))
+        counts, edges = np.histogram(self.x, bins=BINS)
+        return CurvePoints(
+            title=self.title, before=self.before, behind=self.behind,
+            x=x[some], y=self.y[first][some], edges=edges, counts=counts.astype(np.float64),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CurvePoints:
+    """A curve as it is drawn and stored: some of its points, and how many samples lie where.
+
+    Args:
+        title: Which curve.
+        before: What it is given, with its unit.
+        behind: What it gives, with its unit.
+        x: Rising, shape ``(n_points,)``.
+        y: Shape ``(n_points,)``.
+        edges: Of the parts of its range, shape ``(n_bins + 1,)``.
+        counts: Samples in each part, shape ``(n_bins,)``.
+    """
+
+    title: str
+    before: str
+    behind: str
+    x: Array
+    y: Array
+    edges: Array
+    counts: Array
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {
+            "title": self.title, "before": self.before, "behind": self.behind,
+            **{name: getattr(self, name).tolist() for name in ("x", "y", "edges", "counts")},
+        }  # fmt: skip
+
 
 def curve_values(model: BuiltModel, records: Sequence[tuple[Array, History]]) -> tuple[CurveValues, ...]:
     """The curves of a Hammerstein-Wiener or Wiener-Hammerstein model over some records.
@@ -50,6 +95,28 @@ def curve_values(model: BuiltModel, records: Sequence[tuple[Array, History]]) ->
     Raises:
         ConfigError: If the model has no curves.
     """
+    wanted = _wanted(model)
+    if not wanted:
+        raise ConfigError(
+            "the model has no static curves",
+            where="structure",
+            expected="a HammersteinWiener or WienerHammerstein model with a curve",
+            got=model.structure.label,
+            remedy="plot its free run in place of them: fit.plot()",
+        )
+    return tuple(
+        CurveValues(title=title, before=before, behind=behind, x=_run(model, x, records), y=_run(model, y, records))
+        for title, before, behind, x, y in wanted
+    )
+
+
+def has_curves(model: AbstractModel) -> bool:
+    """Whether a model has static curves that can be drawn."""
+    return isinstance(model, BuiltModel) and bool(_wanted(model))
+
+
+def _wanted(model: BuiltModel) -> list[tuple[str, str, str, str, str]]:
+    """Title, what stands before and behind, and the two as expressions of the equations, of each curve."""
     structure, mapping = model.structure, model.mapping
     text = Text(taken=frozenset((*mapping.inputs, *mapping.outputs)))
     wanted: list[tuple[str, str, str, str, str]] = []
@@ -72,18 +139,7 @@ def curve_values(model: BuiltModel, records: Sequence[tuple[Array, History]]) ->
         x, y = text.name("between"), text.name("bent")
         title = f"between the blocks: {structure.curve}"
         wanted.append((title, "out of the first block, scaled", "into the second, scaled", x, y))
-    if not wanted:
-        raise ConfigError(
-            "the model has no static curves",
-            where="structure",
-            expected="a HammersteinWiener or WienerHammerstein model with a curve",
-            got=structure.label,
-            remedy="plot its free run in place of them: fit.plot()",
-        )
-    return tuple(
-        CurveValues(title=title, before=before, behind=behind, x=_run(model, x, records), y=_run(model, y, records))
-        for title, before, behind, x, y in wanted
-    )
+    return wanted
 
 
 def _run(model: BuiltModel, expression: str, records: Sequence[tuple[Array, History]]) -> Array:

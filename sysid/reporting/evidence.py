@@ -8,12 +8,14 @@ from sysid.bounded_text import read_json
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import ESTIMATORS
+from sysid.reporting.curves import read_curves
+from sysid.reporting.figures.curves_figure import curves_figure
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.linear_view import linear_views
 from sysid.reporting.modes_table import modes_table
 from sysid.reporting.parameter_table import parameter_tables
-from sysid.reporting.parts import Part, Section, identifier, picture
+from sysid.reporting.parts import Part, Picture, Section, identifier, picture
 from sysid.reporting.residuals import GroupRecord, read_residuals
 from sysid.reporting.results import FitRecord, LinearityRecord, Results
 from sysid.reporting.tables import Cell, Table, figure_cell
@@ -40,6 +42,9 @@ def evidence_sections(folder: Path, results: Results) -> list[Section]:
     tables = [table for fit in results.fits if not _linear(fit) for table in _parameters(folder, fit)]
     if tables:
         sections.append(Section(anchor="parameters", title="Parameters", parts=tuple(tables)))
+    shown = [part for fit in results.fits for part in _curves(folder, fit)]
+    if shown:
+        sections.append(Section(anchor="curves", title="Static curves", parts=tuple(shown)))
     parts = [part for fit in results.fits if _linear(fit) for part in _responses(folder, fit)]
     if parts:
         sections.append(Section(anchor="frequency-response", title="Frequency response", parts=tuple(parts)))
@@ -167,6 +172,17 @@ def _parameters(folder: Path, fit: FitRecord) -> list[Table]:
         return []
     stored = _read_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
     return [] if stored is None else parameter_tables(fit, stored)
+
+
+def _curves(folder: Path, fit: FitRecord) -> list[Picture]:
+    curves = read_curves(folder / "fits" / fit.slug)
+    if not curves:
+        return []
+    caption = (
+        f"{fit.name}, {fit.label}: its static curves over what the estimation records range over, and below how many "
+        "samples lie where. Beyond the samples a curve is a guess."
+    )
+    return [picture(curves_figure(curves), f"Static curves of {fit.name}", caption, f"curves-{identifier(fit.slug)}")]
 
 
 def _read_fit(path: Path) -> FitResult | None:

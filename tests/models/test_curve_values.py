@@ -63,9 +63,13 @@ def test_a_curve_between_two_blocks_has_its_picture() -> None:
     (only,) = curve_values(model, [RECORD, RECORD])
     assert len(only.x) == 2 * len(U)
     np.testing.assert_allclose(only.y, only.x + model.parameters["f_c2"] * only.x**2, atol=1e-12)
-    panel, counts = curves_figure([only]).axes
+    drawn = only.drawn()
+    panel, counts = curves_figure([drawn]).axes
     assert panel.get_ylabel() == "into the second, scaled"
-    assert sum(bar.get_height() for bar in counts.patches) == 2 * len(U)  # type: ignore[attr-defined]
+    assert drawn.counts.sum() == 2 * len(U)
+    np.testing.assert_array_equal(counts.patches[0].get_data().values, drawn.counts)  # type: ignore[attr-defined]
+    assert np.all(np.diff(drawn.x) > 0.0)
+    np.testing.assert_allclose(drawn.y, drawn.x + model.parameters["f_c2"] * drawn.x**2, atol=1e-12)
 
 
 def test_a_block_without_curves_has_none_to_show() -> None:

@@ -14,7 +14,9 @@ from scipy import signal
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, fit_arx
 from sysid.models import ARX, Mapping
+from sysid.models.curve_values import CurvePoints
 from sysid.reporting import read_results, write_report
+from sysid.reporting.curves import read_curves
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
@@ -23,6 +25,7 @@ from sysid.reporting.residuals import read_residuals
 from sysid.reporting.tables import Table
 from sysid.traces import Trace
 from sysid.validation import analyse_residuals
+from sysid.workbench.fits.record import write_curves
 from tests.estimation.linear_systems import steps, trace_of
 
 LINEARITY = {
@@ -109,11 +112,28 @@ def test_they_are_on_the_page_escaped_and_listed(run: Path) -> None:
     assert "Linear is not enough &lt;here&gt;." in page
 
 
+def test_static_curves_are_shown_with_what_they_stand_for(run: Path) -> None:
+    x = np.linspace(-1.0, 1.0, 9)
+    curve = CurvePoints(
+        title="u: saturation", before="u [V]", behind="into the block, scaled",
+        x=x, y=np.clip(x, -0.5, 0.5), edges=np.array([-1.0, 0.0, 1.0]), counts=np.array([5.0, 4.0]),
+    )  # fmt: skip
+    write_curves(run / "fits" / "arx", {"curves": [curve.to_dict()]})
+    (section,) = [one for one in evidence_sections(run, read_results(run)) if one.anchor == "curves"]
+    (shown,) = section.parts
+    assert isinstance(shown, Picture)
+    assert "Beyond the samples a curve is a guess." in shown.caption
+    (read,) = read_curves(run / "fits" / "arx")
+    assert read.to_dict() == curve.to_dict()
+    write_curves(run / "fits" / "arx", None)  # another structure came in its place
+    assert read_curves(run / "fits" / "arx") == []
+
+
 def test_a_run_that_stored_none_has_none(run_folder: Path) -> None:
     assert evidence_sections(run_folder, read_results(run_folder)) == []
 
 
-@pytest.mark.parametrize("name", ["fit.json", "residuals.json"])
+@pytest.mark.parametrize("name", ["fit.json", "residuals.json", "curves.json"])
 @pytest.mark.parametrize("content", ["", "[]", '{"groups": 1, "model": 2}'], ids=["empty", "a list", "wrong types"])
 def test_damage_is_refused_with_the_file(run: Path, name: str, content: str) -> None:
     (run / "fits" / "arx" / name).write_text(content)

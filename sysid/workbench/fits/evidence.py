@@ -1,4 +1,4 @@
-"""What a run says of its fits beyond their figures: what residuals are left, and whether a linear model is enough."""
+"""What a run says of its fits beyond their figures: residuals, static curves, and whether a linear model is enough."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any, Final
 from sysid.errors import TraceError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import estimator_of
+from sysid.estimation.experiment import Experiment
+from sysid.models.built_model import BuiltModel
+from sysid.models.curve_values import curve_values, has_curves
 from sysid.traces import Role
 from sysid.validation import Linearity, analyse_residuals, judge_linearity
 from sysid.workbench.fits.config import PipelineConfig
@@ -44,6 +47,24 @@ def residuals(fit: FitResult, data: Data, config: PipelineConfig) -> dict[str, A
             # A short trace or a model that diverges one step ahead is a finding; the run goes on.
             groups[name]["reason"] = str(error)
     return {"groups": groups}
+
+
+def curves(fit: FitResult, data: Data, config: PipelineConfig) -> dict[str, Any] | None:
+    """The static curves of a block-oriented model over the records that it was fitted to.
+
+    Args:
+        fit: The fit.
+        data: The traces.
+        config: The pipeline, as of one output.
+
+    Returns:
+        The contents of ``curves.json``; ``None`` for a model without curves.
+    """
+    if not (isinstance(fit.model, BuiltModel) and has_curves(fit.model)):
+        return None
+    runs = [Experiment.for_model(trace, fit.model, config.start) for trace in data.traces.with_role(Role.ESTIMATION)]
+    found = curve_values(fit.model, [(run.inputs, run.history) for run in runs])
+    return {"curves": [curve.drawn().to_dict() for curve in found]}
 
 
 def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:

@@ -20,7 +20,7 @@ from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data, load_data, unmade_data
 from sysid.workbench.fits.estimates import how_long
-from sysid.workbench.fits.evidence import residuals
+from sysid.workbench.fits.evidence import curves, residuals
 from sysid.workbench.fits.orders import orders_key, said, search
 from sysid.workbench.fits.outputs import FitModel, FitOutput, models_of
 from sysid.workbench.fits.record import (
@@ -29,6 +29,7 @@ from sysid.workbench.fits.record import (
     read_fit,
     read_scores,
     results_document,
+    write_curves,
     write_fit,
     write_residuals,
     write_scores,
@@ -237,11 +238,12 @@ class FitSteps:
 
     @staticmethod
     def _score(made: Done[FitResult], loaded: Done[Data], output: FitOutput, folder: Path) -> Step[steps.Scores]:
-        fit, config, found = output.fit, output.config, list[dict[str, Any]]()
+        fit, config, written = output.fit, output.config, list[Path]()
 
         def make(_: Work) -> steps.Scores:
             scores = steps.score(made.value, loaded.value, config)
-            found.append(residuals(made.value, loaded.value, config))
+            written[:] = write_residuals(folder, residuals(made.value, loaded.value, config))
+            written.extend(write_curves(folder, curves(made.value, loaded.value, config)))
             return scores
 
         return Step(
@@ -252,7 +254,7 @@ class FitSteps:
             # A fit that was made again may differ from the stored one by what its key does not know: a time limit, or
             # Ctrl-C. Its figures are made again with it.
             of=made,
-            write=lambda scores: write_scores(folder, scores) + write_residuals(folder, found[-1]),
+            write=lambda scores: write_scores(folder, scores) + written,
             read=lambda _: read_scores(folder),
             outcome=_worst,
             typical=SCORING_TIME,

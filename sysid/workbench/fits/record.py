@@ -12,6 +12,7 @@ import numpy as np
 
 from sysid.estimation import CascadeFit, FitResult, Posterior, Status
 from sysid.models import Mapping as Mapped
+from sysid.reporting.curves import CURVES_FILE
 from sysid.reporting.records import SCHEMA_VERSION
 from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import Role
@@ -92,6 +93,24 @@ def write_residuals(folder: Path, residuals: Mapping[str, Any]) -> list[Path]:
     """
     write_json(folder / "residuals.json", residuals)
     return [folder / "residuals.json"]
+
+
+def write_curves(folder: Path, curves: Mapping[str, Any] | None) -> list[Path]:
+    """Store what :func:`sysid.workbench.fits.evidence.curves` found.
+
+    Args:
+        folder: The fit's folder.
+        curves: JSON values; ``None`` for a model without curves.
+
+    Returns:
+        The files written.
+    """
+    file = folder / CURVES_FILE
+    if curves is None:
+        file.unlink(missing_ok=True)  # of a structure that stood here before
+        return []
+    write_json(file, curves)
+    return [file]
 
 
 def read_scores(folder: Path) -> Scores:

@@ -182,7 +182,7 @@ def scores_key(fit: str, structure: AbstractStructure, data: Data, config: Pipel
     Returns:
         64 hexadecimal digits.
     """
-    here = ("steps:score", "evidence:residuals", "record:write_scores")
+    here = ("steps:score", "evidence:residuals", "evidence:curves", "record:write_scores")
     # What fits a structure names the class of its models, whose methods are run.
     made_by = [f"sysid.workbench.fits.{one}" for one in here]
     code = code_digest(*made_by, *estimator_of(structure).runs, without=CONFIGURATION)
@@ -191,7 +191,7 @@ def scores_key(fit: str, structure: AbstractStructure, data: Data, config: Pipel
         "traces": data.traces.digest,
         "selection": [trace.digest for trace in data.selection],
         # Scores of a release that kept less are made again.
-        "kept": ["figures", "signals", "residuals", "intervals"],
+        "kept": ["figures", "signals", "residuals", "intervals", "curves"],
         "code": code,
     }
     return digest(terms | _common(config))
