@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import types
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -320,7 +321,11 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
         what, expected, got = f"unknown field {loc[-1]!r}", f"one of {', '.join(known)}", str(loc[-1])
         remedy = f"did you mean {near[0]}?" if near else "remove it, or use one of the fields that are known"
     elif first["type"] == "missing":
-        what, expected, got = f"the field {loc[-1]!r} is missing", f"a value for {loc[-1]}", "nothing"
+        what, expected, got = (
+            f"the field {loc[-1]!r} is missing",
+            _names_at(model, loc, f"a value for {loc[-1]}"),
+            "nothing",
+        )
         remedy = f"add {loc[-1]}: ..."
     elif first["type"] == "value_error":
         cause = first.get("ctx", {}).get("error")
@@ -335,6 +340,8 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
             shortened(first["input"]),
         )
         expected, remedy = _CHANGES.get(first["type"], (expected, remedy))
+        if expected == _NAMES:
+            expected = _names_at(model, loc, _NAMES)
         if first["type"] in {"enum", "literal_error"}:
             remedy = _choice(str(first["input"]), str(first.get("ctx", {}).get("expected", "")))
     if others:
@@ -343,9 +350,11 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
 
 
 _LIST = ("a list", "write a list: [..., ...], or one entry a line with - before it")
+_NAMES = "names with values"
+_UNIONS = (typing.Union, types.UnionType)
 _CHANGES: dict[str, tuple[str, str]] = {
     **dict.fromkeys(("tuple_type", "list_type"), _LIST),
-    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), ("names with values", "write {name: value}")),
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), (_NAMES, "write {name: value}")),
     "string_type": ("text", "write it in quotes"),
     "bool_type": ("true or false", "write true or false"),
     "bool_parsing": ("true or false", "write true or false"),
@@ -425,18 +434,31 @@ def path_text(loc: Sequence[str | int]) -> str:
     return text.removeprefix(".") or "(top level)"
 
 
+def _names_at(model: type[BaseModel], loc: Sequence[str | int], otherwise: str) -> str:
+    """Which names a mapping at a location may have; some other words where that is not known."""
+    annotation = _annotation_at(model, loc)
+    alone = all(typing.get_origin(one) is None for one in (typing.get_args(annotation) or (annotation,)))
+    known = _fields_at(model, loc) if alone and typing.get_origin(annotation) in (None, *_UNIONS) else []
+    return f"{_NAMES}, of {', '.join(known)}" if known else otherwise
+
+
 def _fields_at(model: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
     """Names of the fields of the model that stands at a location inside another."""
+    found = _model_in(_annotation_at(model, loc))
+    return [] if found is None else list(found.model_fields)
+
+
+def _annotation_at(model: type[BaseModel], loc: Sequence[str | int]) -> Any:
+    """The type of what stands at a location inside a model; ``None`` where that is not known."""
     current: Any = model
     for part in loc:
         current = _model_in(current)
         if current is None:
-            return []
+            return None
         # An index, or a key of a free mapping, stays at the model that the container holds.
         if isinstance(part, str) and part in current.model_fields:
             current = current.model_fields[part].annotation
-    current = _model_in(current)
-    return [] if current is None else list(current.model_fields)
+    return current
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

@@ -185,3 +185,32 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
         file.truncate(2**30)
     with pytest.raises(ConfigError, match="larger than 4 MB"):
         read_yaml(path)
+
+
+class _Inner(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    reader: str
+    grid: int = 1
+
+
+class _Outer(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    source: _Inner | None
+    rows: tuple[_Inner, ...]
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        ({"source": "csv", "rows": []}, "names with values, of reader, grid"),
+        ({"source": [1], "rows": []}, "names with values, of reader, grid"),
+        ({"rows": []}, "names with values, of reader, grid"),
+        ({"source": None}, "a value for rows"),
+        ({"source": None, "rows": 3}, "a list"),
+    ],
+    ids=["a word", "a list", "missing", "a missing list", "a number for a list"],
+)
+def test_what_stands_in_place_of_names_is_told_the_names(data: dict[str, object], expected: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        check(_Outer, data, where="x")
+    assert refused.value.expected == expected
