@@ -358,7 +358,8 @@ def _table(columns: Mapping[str, NDArray[Any]], *, name: str) -> RawTable:
         numbers = array.astype("timedelta64[ns]").astype(np.int64) / 1e9 if array.dtype.kind == "m" else array
         unit = "s" if array.dtype.kind == "m" else header.unit
         column = array_column(header.name, np.atleast_1d(numbers), where=name, unit=unit, reference=header.reference)
-        problem = column.problem and (not_numbers(key, np.atleast_1d(array), where=name) or column.problem)
+        # Who has a frame knows the types of its columns: text in it is no number by accident, as it is in a file.
+        problem = not_numbers(key, np.atleast_1d(array), where=name) or column.problem
         raw.append(replace(column, problem=problem))
     if not any(len(column.values) for column in raw):
         raise _no_samples(name)

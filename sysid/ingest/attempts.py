@@ -18,6 +18,7 @@ from sysid.ingest.reading import read_table
 from sysid.ingest.table import RawColumn, RawTable
 from sysid.ingest.words import PAIRS, TRUTH, known_states
 
+_OF_TEXT = frozenset({"csv", "excel"})
 _LONG_SHARE = 0.6
 _CHANGE_SHARE = 0.5
 _FEW_TEXTS = 3
@@ -122,7 +123,7 @@ def _missing(table: RawTable) -> dict[str, Any] | None:
         few = len(column.strange) <= _FEW_TEXTS
         if column.strange and all(usually_missing(text) or (few and _is_remark(text)) for text in column.strange):
             found |= dict.fromkeys(column.strange)
-        elif table.reader == "csv" and column.problem is None and column.name != table.time:
+        elif table.reader in _OF_TEXT and column.problem is None and column.name != table.time:
             found |= dict.fromkeys(_marks(column.values))
     return {"missing": tuple(found)} if found else None
 
@@ -223,7 +224,7 @@ def _zone(table: RawTable) -> dict[str, Any] | None:
 
 def _packed(table: RawTable) -> dict[str, Any] | None:
     """Numbers that are the digits of a date and a time: 20240312235958."""
-    if table.reader != "csv" or table.settings.get("calendar"):
+    if table.reader not in _OF_TEXT or table.settings.get("calendar"):
         return None
     for column in table.columns:
         known = column.values[np.isfinite(column.values)]

@@ -11,6 +11,7 @@ from sysid.units import Reference, plain_unit
 _INDEX = re.compile(r"^.*?(?:\S\[\s*\d*\s*\]|\[\s*(?!1\s*\])\d*\s*\])\s*$", re.DOTALL)
 _BRACKETS = re.compile(r"^(?P<name>.*?\S)\s*\[(?P<unit>[^\[\]]*)\]\s*$", re.DOTALL)
 _PARENTHESES = re.compile(r"^(?P<name>.*?\S)\s*\((?P<unit>[^()]*(?:\([ag]\))?)\)\s*$", re.DOTALL)
+_SPOKEN = re.compile(r"^(?P<name>.*?\S)(?:\s+(?P<mark>/|in)|,)\s+(?P<unit>\S+)$", re.DOTALL)
 _REFERENCE_WORD = re.compile(r"^(?P<unit>.*?\S)\s*(?:\b|\()(?P<word>gauge|absolute|abs|[ga](?=\)$))\)?$", re.IGNORECASE)
 _FUSED = {
     "barg": ("bar", Reference.GAUGE),
@@ -76,7 +77,8 @@ def parse_header(text: str) -> Header:
     """Take a column header apart.
 
     Square brackets always hold a unit, unless they hold an index, as in ``p[0]``; round ones do only
-    if the unit is known, since ``Test (1)`` or ``BP (wagon)`` are names. ``p [1]`` is a pure number.
+    if the unit is known, since ``Test (1)`` or ``BP (wagon)`` are names. ``p [1]`` is a pure number. ``p / bar`` (as
+    ISO 80000 writes it), ``p in bar`` and ``p, bar`` say a unit too, if it is one that cannot be taken for a name.
 
     Args:
         text: For example ``"BP [kPa]"``, ``"Tijd (s)"``, ``"BP [psi gauge]"``, ``"STP"``.
@@ -85,6 +87,8 @@ def parse_header(text: str) -> Header:
         Name, unit and reference.
 
     Example:
+        >>> parse_header("Druck / bar").unit, parse_header("Valve, open").unit
+        ('bar', None)
         >>> parse_header("BP [psi gauge]")
         Header(name='BP', unit='psi', reference=<Reference.GAUGE: 'gauge'>)
         >>> parse_header("Test (1)")
@@ -98,4 +102,14 @@ def parse_header(text: str) -> Header:
     if match and not match["unit"].strip().isdigit() and is_unit(match["unit"]):
         unit, reference = split_reference(match["unit"])
         return Header(name=match["name"].strip(), unit=unit, reference=reference)
+    match = _SPOKEN.match(text.strip())
+    if match and _is_spoken(match["unit"], match["mark"]):
+        unit, reference = split_reference(match["unit"])
+        return Header(name=match["name"].strip(), unit=unit, reference=reference)
     return Header(name=text.strip())
+
+
+def _is_spoken(unit: str, mark: str | None) -> bool:
+    """Whether a word behind a name is its unit: a single letter may be a name, too."""
+    letters = {"s", "h"} if mark != "/" else {"s", "h", "V", "A", "N", "W", "K", "m", "1", "%"}
+    return is_unit(unit) if len(unit) > 1 else unit in letters

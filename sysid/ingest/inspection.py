@@ -15,17 +15,19 @@ from sysid.ingest.assemble import stamps_in_seconds
 from sysid.ingest.attempts import Attempt, read_somehow
 from sysid.ingest.blanks import blanks_mean
 from sysid.ingest.clocks import clock_of
+from sysid.ingest.events import are_events
 from sysid.ingest.headers import is_unit, split_reference
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.restarts import finer_than_clock, records_by_clock
-from sysid.ingest.second_clocks import without_second_clocks
+from sysid.ingest.second_clocks import is_counter, without_second_clocks
 from sysid.ingest.table import RawColumn, RawTable, is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert, is_pressure
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
+_EMPTY_SHARE = 0.8  # of a column, above which its missing values are no reason to leave samples out
 _STEP_NAMES = frozenset({"ts", "dt", "sample_time", "sampling_time", "sampletime"})
 _UNITS_IN_NAMES = frozenset(
     {"bar", "mbar", "barg", "bara", "Pa", "hPa", "kPa", "MPa", "psi", "psig", "psia", "V", "mV", "A", "mA"}
@@ -136,7 +138,8 @@ class FileFinding:
             found += [self.time_told if self.table.time else "no time stamps"] if self.time_guessed else []
         else:
             found += [_count(len(timing.backward), "backward time stamp")] if len(timing.backward) else []
-            found += [_count(len(timing.duplicates), "duplicate time stamp")] if len(timing.duplicates) else []
+            after = ", as of events: the value after each counts" if self.needed.duplicates == "last" else ""
+            found += [_count(len(timing.duplicates), "duplicate time stamp") + after] if len(timing.duplicates) else []
             gaps = _count(len(timing.gaps), "gap")
             found += [f"{_count(timing.missing, 'sample')} missing in {gaps}"] if timing.missing else []
             found += [f"uneven time stamps, up to {timing.jitter:.3g} s off"] if self.needed.jitter else []
@@ -222,6 +225,8 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         timing = survey(known) if len(known) else None
         if timing is not None:
             step, needs = _needs(known, timing)
+            if needs.get("duplicates") and are_events(stamps, [c for c in table.columns if c.name != clock]):
+                needs["duplicates"] = "last"
             finer = None if unstamped else finer_than_clock(known, timing)
             if finer is not None:
                 step, needs, timing = finer[0], {}, None
@@ -398,7 +403,7 @@ def _finite(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _rising(columns: Sequence[RawColumn]) -> str | None:
     """A column that rises like a clock: nearly always, and by much the same step."""
-    for column in columns:
+    for column in sorted(columns, key=lambda column: is_counter(column.name)):  # a clock goes before a counter
         with np.errstate(invalid="ignore"):
             steps = np.diff(column.values)
         if column.problem is not None or not len(steps) or np.mean(steps > 0.0) < _RISING_SHARE:
@@ -449,9 +454,17 @@ def _column(column: RawColumn) -> ColumnFinding:
         maximum=float(finite.max()) if len(finite) else float("nan"),
         missing=len(column.values) - len(finite),
         problem=problem,
-        aside=column.aside,
+        aside=column.aside or _nearly_empty(column.values),
         said="" if in_file is not None or column.unit is None else column.unit,
     )
+
+
+def _nearly_empty(values: NDArray[np.float64]) -> str:
+    """Why a column is none of the record: nearly all of it is missing, and would mark the samples of all others."""
+    missing = len(values) - int(np.isfinite(values).sum())
+    if missing <= _EMPTY_SHARE * len(values) or blanks_mean(values) == "hold":
+        return ""
+    return f"{missing} of {len(values)} values are missing"
 
 
 def _count(number: int, what: str) -> str:

@@ -153,16 +153,16 @@ class FileOptions(Options):
         units: Unit of each column that has none in the file: one for all, or by channel.
         references: ``gauge`` or ``absolute``: one for all pressures, or by channel.
         separator: CSV: ``,``, ``;``, ``|``, a tab, or a blank, which stands for a run of blanks.
-        decimal: CSV: ``.`` or ``,``.
-        thousands: CSV: what separates groups of three digits. Equal to ``decimal``, the last one in a
+        decimal: CSV, and numbers typed as text in Excel: ``.`` or ``,``.
+        thousands: CSV, Excel: what separates groups of three digits. Equal to ``decimal``, the last one in a
             number is the decimal one (``1.003.000`` is 1003).
         comment: CSV: what a comment line begins with.
         encoding: CSV: for example ``utf-8``, ``cp1252``.
-        skip_lines: CSV: lines before the header.
-        header: CSV: whether there is a header line.
-        units_line: CSV: whether a line of units follows the header.
-        names: CSV: names of all columns, instead of the header's.
-        missing: CSV: texts that stand for a missing value, besides empty cells and ``nan``.
+        skip_lines: CSV, Excel: lines before the header.
+        header: CSV, Excel: whether there is a header line.
+        units_line: CSV, Excel: whether a line of units follows the header.
+        names: CSV, Excel: names of all columns, instead of the header's.
+        missing: CSV, Excel: texts that stand for a missing value, besides empty cells and ``nan``.
         states: Numbers that words stand for: ``{OFF: 0, ON: 1}`` for all columns, ``{valve: {shut: 0, open: 1}}`` for
             one. TRUE and FALSE are 1 and 0 by themselves.
         long: For a long table (time, signal, value): its columns of names and of values.
@@ -238,7 +238,8 @@ class RepairOptions(Options):
         ragged: ``drop`` the rows of a CSV that have too many or too few cells.
         stamps: ``drop`` the samples whose time stamp is empty.
         backward: ``sort`` the samples by time, or ``drop`` those that step back.
-        duplicates: ``drop`` all but the first sample of a time stamp, or ``average`` them.
+        duplicates: ``drop`` all but the first sample of a time stamp, keep the ``last`` (what a simulation has after an
+            event), or ``average`` them.
         gaps: Fill by ``linear`` or ``hold``; ``mask`` fills and marks the samples as not usable.
         nan: ``interpolate`` missing values, ``hold`` the value before (a blank means: as before), or ``mask`` their
             samples as not usable; one for all, or by channel.
@@ -249,7 +250,7 @@ class RepairOptions(Options):
     ragged: Literal["drop"] | None = None
     stamps: Literal["drop"] | None = None
     backward: Literal["sort", "drop"] | None = None
-    duplicates: Literal["drop", "average"] | None = None
+    duplicates: Literal["drop", "last", "average"] | None = None
     gaps: Literal["linear", "hold", "mask"] | None = None
     nan: NanRepair | dict[str, NanRepair] | None = None
     jitter: Literal["resample"] | None = None

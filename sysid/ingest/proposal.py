@@ -34,7 +34,8 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None) -> str:
             "the file has no column that can be a channel",
             where=finding.path,
             expected="at least one column of numbers beside time",
-            got=", ".join(f"{column.name}: {column.problem}" for column in finding.columns) or "time alone",
+            got=", ".join(f"{column.name}: {column.problem or column.aside}" for column in finding.columns)
+            or "time alone",
             remedy="choose another file, or read it with other options",
         )
     name = finding.path.stem

@@ -139,7 +139,7 @@ def duplicates(record: Record, repairs: RepairOptions) -> Record:
 
     Args:
         record: Samples whose stamps never fall.
-        repairs: ``duplicates: drop`` keeps the first, ``duplicates: average`` their mean.
+        repairs: ``duplicates: drop`` keeps the first, ``last`` the last, and ``average`` their mean.
 
     Returns:
         Samples whose stamps rise.
@@ -157,13 +157,15 @@ def duplicates(record: Record, repairs: RepairOptions) -> Record:
             where=record.where(first),
             expected=f"a time after {record.stamps[first]:g} s",
             got=f"{record.stamps[first]:g} s again",
-            remedy=_zone(record) or "ask for repairs: {duplicates: drop} or {duplicates: average}",
+            remedy=_zone(record) or "ask for repairs: {duplicates: drop}, {duplicates: last} or {duplicates: average}",
         )
     keep = np.ones(len(record.stamps), dtype=np.bool_)
     keep[bad] = False
     told = f"{len(bad)} duplicate time stamps, first at {record.at(first)}"
     if repairs.duplicates == "drop":
         return record.keep(keep, f"dropped: {told}")
+    if repairs.duplicates == "last":
+        return record.keep(np.append(keep[1:], True), f"the last one of each kept: {told}")
     group = np.cumsum(keep) - 1
     with np.errstate(invalid="ignore"):
         sums = np.column_stack([np.bincount(group, weights=column) for column in record.values.T])

@@ -30,6 +30,18 @@ _FACTORS = (1e-9, 1e-6, 1e-3, 60.0, 3600.0, 86_400.0)
 """Seconds of the units in which one time may be written twice."""
 
 
+def is_counter(name: str) -> bool:
+    """Whether a column is called a number of rows.
+
+    Args:
+        name: Its name.
+
+    Returns:
+        Whether it is.
+    """
+    return _COUNTER.fullmatch(name.strip()) is not None
+
+
 def without_second_clocks(table: RawTable, clock: str | None) -> RawTable:
     """A table whose further clocks and counters are no channels, nor what stands behind one of another pace.
 
@@ -58,12 +70,14 @@ def _said(column: RawColumn, first: RawColumn) -> str:
     """What a column is if it is a clock or a counter, else nothing."""
     called = is_called_time(column.name) or _NUMBERED.fullmatch(column.name.strip()) is not None
     timed = column.unit is not None and is_time_unit(column.unit)
-    counts = _COUNTER.fullmatch(column.name.strip()) is not None
+    counts = is_counter(column.name)
     if not (called or timed or counts) or not _is_even(column.values):
         return ""
     if counts:
         return "counts the rows" if bool((np.diff(column.values) == 1.0).all()) else ""
     mine, theirs = _in_seconds(column), _in_seconds(first)
+    if not float(np.median(np.diff(theirs))) > 0.0:
+        return ""
     pace = float(np.median(np.diff(mine)) / np.median(np.diff(theirs)))
     factor = 1.0 if timed and first.unit else min((1.0, *_FACTORS), key=lambda f: abs(np.log(pace * f)))
     ahead = factor * mine - theirs

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ReaderError, UnitError
 from sysid.ingest.headers import parse_header, split_reference
+from sysid.ingest.texts import meaning_of
 from sysid.ingest.words import Words
 from sysid.units import Reference, convert, plain_unit
 
@@ -334,8 +335,8 @@ def array_column(
 
     Args:
         name: Name without the unit.
-        array: One-dimensional; calendar time becomes seconds since its first value, whole numbers beyond float64 are
-            counted from the least of them.
+        array: One-dimensional; calendar time becomes seconds since its first value, durations seconds, texts what
+            they say, whole numbers beyond float64 are counted from the least of them.
         where: The file, for errors.
         unit: As found in the file; psig, barg and the like are taken apart.
         reference: As found in the file.
@@ -346,9 +347,21 @@ def array_column(
     """
     unit, found = split_reference(unit) if unit else (None, None)
     origin = 0
+    if array.dtype.kind in "USO" and (meaning := meaning_of(array, f"{where}, column {name}")) is not None:
+        return RawColumn(
+            name=name,
+            values=meaning.values,
+            unit=meaning.unit or unit or None,
+            reference=reference or found,
+            description=description,
+            problem=meaning.problem,
+            words=meaning.words,
+        )
     try:
         if array.dtype.kind == "M":
             array, unit = _seconds(array), "s"
+        if array.dtype.kind == "m":
+            array, unit = np.where(np.isnat(array), np.nan, array.astype("timedelta64[ns]").astype(np.int64) / 1e9), "s"
         if array.dtype.kind in "ui" and array.size and (span := _beyond_float64(array)) is not None:
             origin, array = span
         values, problem = _as_float64(array, where=f"{where}, column {name}"), None

@@ -22,6 +22,7 @@ from sysid.ingest.options import RepairOptions
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, TOUCHING, Kind, Row, kind_of, split_rows, trimmed
 from sysid.ingest.readers.csv_layout import Layout
 from sysid.ingest.readers.growing import Growing
+from sysid.ingest.readers.sheets import SheetText
 from sysid.ingest.readers.text_source import Block, TextFile
 from sysid.ingest.words import WordCollector
 
@@ -179,7 +180,7 @@ class Body:
         repairs: Whether ragged rows may be dropped.
     """
 
-    file: TextFile
+    file: TextFile | SheetText
     layout: Layout
     columns: list[AnyColumn]
     comment: str
@@ -209,7 +210,7 @@ class Body:
 
     def _reserve(self, first: Block) -> None:
         """Room for as many rows as the file seems to have, by the length of its first lines."""
-        expected = int(1.02 * self.file.path.stat().st_size * first.lines / max(len(first.data), 1)) + 64
+        expected = int(1.02 * self.file.size * first.lines / max(len(first.data), 1)) + 64
         self._lines = Growing(np.int32, expected)
         for column in self.columns:
             if isinstance(column, Numbers | Counts):
@@ -272,8 +273,9 @@ class Body:
         footer = self._footer(rows) if last else 0
         if footer:
             cut = rows[len(rows) - footer :]
-            shown = self.layout.separator.join(cut[0].cells).strip()[:60]
-            self.notes.append(f"{footer} lines after the numbers left out, the first, line {cut[0].line}: {shown!r}")
+            shown = self.layout.separator.join(cut[0].cells).replace("\t", " ").strip()[:60]
+            told = "1 line" if footer == 1 else f"{footer} lines"
+            self.notes.append(f"{told} after the numbers left out, the first, line {cut[0].line}: {shown!r}")
             rows = rows[: len(rows) - footer]
         ragged = [row for row in rows if len(row.cells) != width]
         if ragged and self.repairs.ragged is None:

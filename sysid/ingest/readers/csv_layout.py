@@ -133,7 +133,7 @@ def recognise(lines: Sequence[str], options: FileOptions, path: Path, *, whole: 
     above_header = [row for row in split.rows[:first] if header.line is None or row.line < header.line]
     preamble = [row for row in above_header if row.line != header.units_line]
     if preamble:
-        shown = split.separator.join(preamble[0].cells).strip()[:60]
+        shown = split.separator.join(preamble[0].cells).replace("\t", " ").strip()[:60]
         header.notes.append(f"{_lines(len(preamble))} before the header left out, the first: {shown!r}")
     return Layout(
         separator=split.separator,

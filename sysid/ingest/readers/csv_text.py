@@ -21,6 +21,7 @@ from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stam
 from sysid.ingest.readers.csv_cells import Kind, unit_text
 from sysid.ingest.readers.csv_layout import Layout, recognise
 from sysid.ingest.readers.reader import Reader
+from sysid.ingest.readers.sheets import SheetText
 from sysid.ingest.readers.text_source import TextFile, ZeroBytesError, encodings, not_text
 from sysid.ingest.table import RawColumn, RawTable, recognise_time
 from sysid.ingest.words import WordCollector, states_for
@@ -32,7 +33,7 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     problem: Exception = ValueError("it has no encoding")
     for encoding in tries:
         try:
-            return _read_as(TextFile(path=path, encoding=encoding), options, repairs)
+            return table_of_text(TextFile(path=path, encoding=encoding), options, repairs)
         except (UnicodeError, LookupError) as error:
             problem = error
         except ZeroBytesError as error:
@@ -41,7 +42,20 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     raise not_text(path, tries, problem)
 
 
-def _read_as(file: TextFile, options: FileOptions, repairs: RepairOptions) -> RawTable:
+def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: RepairOptions) -> RawTable:
+    """The table in a text.
+
+    Args:
+        file: The text.
+        options: How to read it.
+        repairs: Which repairs may be made.
+
+    Returns:
+        The table.
+
+    Raises:
+        ReaderError: If there is none in it.
+    """
     path = file.path
     lines, whole = file.head()
     layout = recognise(lines, options, path, whole=whole)

@@ -60,21 +60,21 @@ def joined_signals(signals: Sequence[Signal], path: Path) -> tuple[dict[str, Lea
     signals = _differently_named(signals)
     first = signals[0]
     if all(len(s.stamps) == len(first.stamps) and np.array_equal(s.stamps, first.stamps) for s in signals):
-        return {"time": Leaf(values=first.stamps, unit="s"), **{s.name: _leaf(s, s.values) for s in signals}}, []
+        return {"time": Leaf(values=first.stamps, unit="s"), **{s.name: as_leaf(s, s.values) for s in signals}}, []
     fastest = min(signals, key=lambda signal: (signal.step, -len(signal.stamps)))
     grid = fastest.stamps
     columns, notes = {"time": Leaf(values=grid, unit="s")}, []
     for signal in signals:
         if np.array_equal(signal.stamps, grid):
-            columns[signal.name] = _leaf(signal, signal.values)
+            columns[signal.name] = as_leaf(signal, signal.values)
             continue
         if signal.values.dtype.kind not in "buif":
-            columns[signal.name] = _leaf(signal, np.full(len(grid), "", dtype=np.str_))
+            columns[signal.name] = as_leaf(signal, np.full(len(grid), "", dtype=np.str_))
             continue
         values = _at(signal, grid)
         if not np.isfinite(values).any():
             raise _apart(signals, path)
-        columns[signal.name] = _leaf(signal, values)
+        columns[signal.name] = as_leaf(signal, values)
         how = "held" if signal.values.dtype.kind in "bui" else "interpolated"
         notes.append(
             f"{signal.name}: {how} from {signal.step:g} s onto the time stamps of {fastest.name}, {fastest.step:g} s"
@@ -97,7 +97,16 @@ def _differently_named(signals: Sequence[Signal]) -> list[Signal]:
     ]
 
 
-def _leaf(signal: Signal, values: NDArray[Any]) -> Leaf:
+def as_leaf(signal: Signal, values: NDArray[Any]) -> Leaf:
+    """A signal as a leaf of a tree.
+
+    Args:
+        signal: The signal.
+        values: Its values, at whatever stamps.
+
+    Returns:
+        The leaf.
+    """
     return Leaf(values=values, unit=signal.unit, description=signal.description)
 
 
@@ -113,6 +122,25 @@ def _at(signal: Signal, grid: NDArray[np.float64]) -> NDArray[np.float64]:
         values = np.interp(grid, stamps, samples)
     values[(grid < stamps[0] - fuzz) | (grid >= stamps[-1] + step - fuzz) & (grid > stamps[-1] + fuzz)] = np.nan
     return values
+
+
+def not_over_time(path: Path, over: str) -> ReaderError:
+    """The error for channels that are recorded over anything but time.
+
+    Args:
+        path: The file.
+        over: What they are recorded over.
+
+    Returns:
+        The error to raise.
+    """
+    return ReaderError(
+        f"the channels stand over {over}, not over time",
+        where=path,
+        expected="values at instants of time",
+        got=f"values over {over}",
+        remedy="export the record over time in the program that made it",
+    )
 
 
 def _apart(signals: Sequence[Signal], path: Path) -> ReaderError:

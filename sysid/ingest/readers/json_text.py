@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import ReaderError
+from sysid.ingest.calendar import is_calendar
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import too_large
 from sysid.ingest.readers.leaves import Leaf, number_of, step_in
@@ -98,9 +99,16 @@ def _mapping(node: Mapping[str, Any], depth: int) -> Any:
         names = [str(name) for name in node["columns"]]  # pandas, orient="split"
         if not all(isinstance(row, list) and len(row) == len(names) for row in data):
             raise ValueError("the rows of data are not as long as columns")
-        return {name: _vector([row[at] for row in data]) for at, name in enumerate(names)}
+        columns = {name: _vector([row[at] for row in data]) for at, name in enumerate(names)}
+        index = node.get("index")
+        return _with_index(index, columns) if isinstance(index, list) and len(index) == len(data) else columns
     if isinstance(data, list) and isinstance(node.get("schema"), Mapping):
         return _tree(data, depth + 1)  # pandas, orient="table"
+    series = list(node.values())
+    by_row = all(isinstance(part, Mapping) and _is_by_row(part) for part in series)
+    if series and by_row and len({tuple(part) for part in series}) == 1:  # pandas by default: by column and index
+        columns = {str(key): _vector(list(part.values())) for key, part in node.items()}
+        return _with_index(list(series[0]), columns)
     if _is_by_row(node):
         return _vector(list(node.values()))
     signal = _signal(node)
@@ -108,12 +116,20 @@ def _mapping(node: Mapping[str, Any], depth: int) -> Any:
 
 
 def _is_by_row(node: Mapping[str, Any]) -> bool:
-    """Whether the keys are row numbers: what pandas writes by default."""
+    """Whether the keys are row numbers, or stamps: what pandas writes by default."""
     return (
         len(node) > 1
-        and all(str(key).isdigit() for key in node)
+        and (all(str(key).isdigit() for key in node) or all(is_calendar(str(key)) for key in node))
         and not any(isinstance(value, list | Mapping) for value in node.values())
     )
+
+
+def _with_index(index: list[Any], columns: dict[str, Any]) -> dict[str, Any]:
+    """Columns behind their index, where it says more than the number of the row."""
+    if [str(item) for item in index] == [str(row) for row in range(len(index))]:
+        return columns
+    numbers = all(isinstance(item, int) or (isinstance(item, str) and item.isdigit()) for item in index)
+    return {"index": _vector([int(item) for item in index] if numbers else index), **columns}
 
 
 def _signal(node: Mapping[str, Any]) -> Leaf | None:
@@ -138,10 +154,29 @@ def _objects(items: list[Any], depth: int) -> Any:
     signals = [_signal(item) if isinstance(item.get("name"), str) else None for item in items]
     if all(signal is not None for signal in signals):
         return {item["name"]: signal for item, signal in zip(items, signals, strict=True)}
+    items = [_flat(item) for item in items] if _are_rows(items) else items
     names = list(dict.fromkeys(str(key) for item in items for key in item))
     if any(isinstance(value, list | Mapping) for item in items for value in item.values()):
         return [_tree(item, depth + 1) for item in items]
     return {name: _vector([item.get(name) for item in items]) for name in names}
+
+
+def _are_rows(items: list[Any]) -> bool:
+    """Whether objects in objects hold one value by each name, as messages do: a row each, and no records."""
+
+    def single(node: Any) -> bool:
+        return all(map(single, node.values())) if isinstance(node, Mapping) else not isinstance(node, list)
+
+    nested = any(isinstance(value, Mapping) for item in items for value in item.values())
+    return nested and len(items) > 1 and all(map(single, items))
+
+
+def _flat(item: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in item.items():
+        name = f"{prefix}{key}"
+        flat |= _flat(value, f"{name}.") if isinstance(value, Mapping) else {name: value}
+    return flat
 
 
 def _matrix(rows: list[list[Any]]) -> Any:
@@ -166,8 +201,9 @@ def _vector(items: list[Any]) -> Any:
             return np.array(items, dtype=np.str_)
     if known and all(isinstance(item, str) for item in known):
         stamps = _stamps(items)
-        return np.array([str(item) for item in items]) if stamps is None else stamps
-    return items
+        return np.array([item or "" for item in items]) if stamps is None else stamps
+    plain = all(isinstance(item, str | bool | int | float) for item in known)
+    return np.array(items, dtype=object) if len(known) > 1 and plain else items
 
 
 def _stamps(texts: list[Any]) -> Any:

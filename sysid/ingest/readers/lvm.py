@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 from sysid.ingest.numbers import NumberFormat
 from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.readers.joining import Signal, joined_signals
+from sysid.ingest.readers.joining import Signal, joined_signals, not_over_time
 from sysid.ingest.readers.leaves import Leaf
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
@@ -32,7 +32,7 @@ class _Segment:
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
-    text = path.read_bytes().decode(options.encoding or "utf-8-sig", errors="replace")
+    text = _decoded(path.read_bytes(), options.encoding)
     if not text.startswith(_MARK):
         raise damaged(path, "LabVIEW measurement", ValueError(f"it begins with {text[:20]!r}"))
     lines = text.splitlines()
@@ -57,6 +57,16 @@ READER = Reader(
     options=frozenset({"group", "encoding"}),
     is_mine=lambda head: head.removeprefix(b"\xef\xbb\xbf").startswith(_MARK.encode()),
 )
+
+
+def _decoded(raw: bytes, encoding: str | None) -> str:
+    """The file as text: LabVIEW writes in the code page of the system."""
+    for name in [encoding] if encoding else ["utf-8-sig", "cp1252"]:
+        try:
+            return raw.decode(name)
+        except UnicodeDecodeError:
+            continue
+    return raw.decode(encoding or "cp1252", errors="replace")
 
 
 def _separator(lines: list[str]) -> str:
@@ -87,6 +97,10 @@ def _segments(lines: list[str], at: int, separator: str) -> list[_Segment]:
         if first in {"channels", "samples", "date", "time", "y_unit_label", "x_dimension", "x0", "delta_x", "notes"}:
             header, at = _block(lines, at, separator)
             continue
+        if first == "***start_special***":  # blocks of add-ons, which are no numbers
+            ends = (i for i in range(at, len(lines)) if lines[i].casefold().startswith("***end_special***"))
+            at = next(ends, at) + 1
+            continue
         if first.startswith("***"):
             at += 1
             continue
@@ -105,6 +119,9 @@ def _segments(lines: list[str], at: int, separator: str) -> list[_Segment]:
 def _columns(
     segment: _Segment, about: dict[str, list[str]], numbers: NumberFormat, path: Path, notes: list[str]
 ) -> dict[str, Leaf]:
+    over = next((x for x in segment.header.get("x_dimension", []) if x and x.casefold() != "time"), None)
+    if over is not None:
+        raise not_over_time(path, over)
     style = (next(iter(about.get("x_columns", [])), "") or "One").casefold()
     names = [name for name in segment.names if name.casefold() != "comment"]
     width = max(len(row) for row in segment.rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -14,6 +15,9 @@ from sysid.errors import ConfigError, ReaderError
 from sysid.ingest.meaning import with_meaning
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.table import RawTable
+
+_IS_TABLE = re.compile(rb"(?m)^[ \t]*[-+]?[0-9][-+0-9.,eE]*[ \t;,]+[-+]?[0-9][-+0-9.,eE]*[ \t;,\r\n]")
+"""A line that begins with two numbers."""
 
 _COMMON = {"reader", "time", "columns", "units", "references", "rows", "states", "long"}
 
@@ -69,6 +73,10 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
     if by_suffix is not None and by_suffix.is_mine is not None and by_suffix.is_mine(head):
         return by_suffix
     by_content = next((reader for reader in readers if reader.is_mine is not None and reader.is_mine(head)), None)
+    if by_content is None and by_suffix is not None and by_suffix.is_mine is not None:
+        _check_no_markup(head, by_suffix, path)
+        if _IS_TABLE.search(_as_ascii(head)):  # programs give tables of text any name: "a.xls", "a.mat" of save -ascii
+            by_content = next((reader for reader in readers if reader.name == "csv"), None)
     if by_content is not None or by_suffix is not None:
         return by_content or by_suffix  # type: ignore[return-value]  # one of them is there
     raise ReaderError(
@@ -78,6 +86,24 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
         got=path.suffix or "a name without an ending",
         remedy="export the traces to one of these"
         + ("" if b"\0" in head else ", or, as it is text, name the reader (reader: csv)"),
+    )
+
+
+def _as_ascii(head: bytes) -> bytes:
+    """The text in the head of a file, without what UTF-16 puts between its letters; nothing if it is no text."""
+    plain = head[2:].replace(b"\0", b"") if head[:2] in {b"\xff\xfe", b"\xfe\xff"} else head
+    return b"" if b"\0" in plain else plain
+
+
+def _check_no_markup(head: bytes, reader: Reader, path: Path) -> None:
+    if not _as_ascii(head).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
+        return
+    raise ReaderError(
+        "the file is a web page or XML, whatever its name says",
+        where=path,
+        expected=f"the format {reader.name}",
+        got=_as_ascii(head)[:40].decode(errors="replace"),
+        remedy="open it in Excel or LibreOffice, which read such files, and save it as .xlsx or CSV",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +11,14 @@ import numpy as np
 from sysid.errors import ReaderError
 from sysid.extras import need
 from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.readers.joining import Signal, joined_signals
-from sysid.ingest.readers.leaves import Leaf
+from sysid.ingest.rates import said_step
+from sysid.ingest.readers.joining import Signal, joined_signals, not_over_time
+from sysid.ingest.readers.leaves import Leaf, refused
 from sysid.ingest.readers.reader import Reader, damaged, silent
 from sysid.ingest.readers.tree import table_of
-from sysid.ingest.table import RawTable
+from sysid.ingest.table import RawTable, is_called_time
+
+_NO_TIMES = {"frequency", "frequenz", "angle", "winkel", "order", "ordnung", "distance", "weg"}
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
@@ -26,10 +29,16 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
         with silent():
             file = TdmsFile.read(path)
             groups = {group.name: [channel for channel in group.channels() if len(channel)] for group in file.groups()}
+            steps = {group.name: _said(group.properties) or _said(file.properties) for group in file.groups()}
     except Exception as error:  # npTDMS raises ValueError, KeyError, struct.error ... on damaged files
         raise damaged(path, "TDMS", error) from error
     notes = ["the file breaks off in its last segment"] if file.file_status.incomplete_final_segment else []
-    tree = _tree({name: channels for name, channels in groups.items() if channels}, options.group, path, notes)
+    for channel in (channel for members in groups.values() for channel in members):
+        over = str(channel.properties.get("wf_xname", "")).strip()
+        if over.casefold() in _NO_TIMES or str(channel.properties.get("wf_xunit_string", "")).casefold() == "hz":
+            raise not_over_time(path, over or "frequency")
+    filled = {name: channels for name, channels in groups.items() if channels}
+    tree = _tree(filled, options.group, path, notes, steps)
     return table_of(tree, path=path, reader="tdms", options=options, separator="/", notes=notes)
 
 
@@ -42,7 +51,18 @@ READER = Reader(
 )
 
 
-def _tree(groups: dict[str, list[Any]], wanted: str | None, path: Path, notes: list[str]) -> dict[str, Any]:
+def _said(properties: Mapping[str, Any]) -> float | None:
+    """The sample time that properties say in words: ``Sample Rate = 10``."""
+    return said_step(f"{name}: {value}" for name, value in properties.items())
+
+
+def _tree(
+    groups: dict[str, list[Any]],
+    wanted: str | None,
+    path: Path,
+    notes: list[str],
+    steps: Mapping[str, float | None],
+) -> dict[str, Any]:
     if not groups:
         raise ReaderError(
             "the file holds no samples",
@@ -55,15 +75,16 @@ def _tree(groups: dict[str, list[Any]], wanted: str | None, path: Path, notes: l
     names = [channel.name for channel in channels]
     if wanted is None and len(groups) > 1 and len(set(names)) == len(names) and all(map(_has_clock, channels)):
         # Groups of other channels that one clock has stamped are one recording.
-        return _columns(channels, "", path, notes)
-    return {name: _columns(members, name, path, notes) for name, members in groups.items()}
+        return _columns(channels, "", path, notes, None)
+    return {name: _columns(members, name, path, notes, steps.get(name)) for name, members in groups.items()}
 
 
-def _columns(channels: Sequence[Any], group: str, path: Path, notes: list[str]) -> dict[str, Leaf]:
+def _columns(channels: Sequence[Any], group: str, path: Path, notes: list[str], step: float | None) -> dict[str, Leaf]:
     """The channels of a group: at their own time stamps joined on one grid, where they have any."""
-    timed = [channel for channel in channels if _has_clock(channel)]
-    own = {channel.name: _leaf(channel) for channel in channels}
-    if not timed or any(channel.name.casefold() == "time" for channel in channels):
+    own = {channel.name: _leaf(channel, path, step) for channel in channels}
+    timed = [channel for channel in channels if _has_clock(channel) and own[channel.name].problem is None]
+    # A channel of time says more than the step of a waveform, which is 1 where nobody set it.
+    if not timed or any(is_called_time(channel.name) for channel in channels):
         return own
     if len(timed) < len(channels) and len({len(channel) for channel in channels}) > 1:
         notes.append(f"{group}: channels without a clock beside others: put side by side as they stand")
@@ -74,7 +95,7 @@ def _columns(channels: Sequence[Any], group: str, path: Path, notes: list[str]) 
     signals = []
     for channel, start in zip(timed, starts, strict=True):
         late = 0.0 if start is None or first is None else float((start - first) / np.timedelta64(1, "ns")) / 1e9
-        signals.append(_signal(channel, group, late))
+        signals.append(_signal(channel, own[channel.name], group, late))
     joined, told = joined_signals(signals, path)
     notes.extend(told)
     return joined | {name: leaf for name, leaf in own.items() if name not in joined}
@@ -93,8 +114,8 @@ def _start(channel: Any) -> np.datetime64 | None:
         return None
 
 
-def _signal(channel: Any, group: str, late: float) -> Signal:
-    leaf, properties = _leaf(channel), channel.properties
+def _signal(channel: Any, leaf: Leaf, group: str, late: float) -> Signal:
+    properties = channel.properties
     begin = late + float(properties.get("wf_start_offset", 0.0))
     stamps = begin + float(properties["wf_increment"]) * np.arange(len(channel), dtype=np.float64)
     return Signal(
@@ -107,10 +128,15 @@ def _signal(channel: Any, group: str, late: float) -> Signal:
     )
 
 
-def _leaf(channel: Any) -> Leaf:
+def _leaf(channel: Any, path: Path, step: float | None) -> Leaf:
     properties = channel.properties
+    try:
+        values = np.asarray(channel[:])
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:  # of scales that are not whole
+        return refused(damaged(Path(f"{path}, channel {channel.name}"), "TDMS", error))
     return Leaf(
-        values=np.asarray(channel[:]),
+        values=values,
+        step=_said(properties) or step,
         unit=str(properties.get("unit_string") or properties.get("unit") or "") or None,
         description=str(properties.get("description") or ""),
     )

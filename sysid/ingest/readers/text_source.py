@@ -12,6 +12,9 @@ import numpy as np
 
 from sysid.errors import ReaderError
 
+HEAD_LINES = 400
+"""How many lines are looked at to tell how a file is laid out."""
+
 LONGEST_LINE = 1_000_000
 """Characters; a table of numbers of a thousand columns has some 20,000."""
 
@@ -21,7 +24,6 @@ _MINUS = "\N{MINUS SIGN}".encode()  # what a word processor or a locale makes of
 _COUNTED = 1 << 17
 _HEAD = 1 << 18
 _ASCII_INSIDE = {"utf-8", "utf-8-sig", "cp1252", "iso8859-1", "iso8859-15", "ascii"}
-_HEAD_LINES = 400
 _FEWEST_LINES = 8
 _PACKED = (
     (b"\x1f\x8b", "gzip"),
@@ -70,6 +72,11 @@ class TextFile:
     path: Path
     encoding: str
 
+    @property
+    def size(self) -> int:
+        """About how many bytes it has."""
+        return self.path.stat().st_size
+
     def head(self) -> tuple[list[str], bool]:
         """Its first lines, and whether these are all."""
         data, lines, whole = b"", 0, True
@@ -80,7 +87,7 @@ class TextFile:
                     whole = False
                     break
         texts = data.decode().split("\n")
-        return texts[:_HEAD_LINES], whole and len(texts) <= _HEAD_LINES
+        return texts[:HEAD_LINES], whole and len(texts) <= HEAD_LINES
 
     def blocks(self, *, skip: int = 0, size: int = _BLOCK) -> Generator[Block]:
         r"""Its lines, some millions of characters at a time.

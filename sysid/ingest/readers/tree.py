@@ -165,7 +165,15 @@ class _Walk:
                 return step
         return outer
 
-    def columns(self, node: Any, path: tuple[str, ...], step: float | None, *, whole: bool = False) -> Iterator[Found]:
+    def columns(
+        self,
+        node: Any,
+        path: tuple[str, ...],
+        step: float | None,
+        *,
+        whole: bool = False,
+        units: Mapping[str, str] | None = None,
+    ) -> Iterator[Found]:
         """Every column below a node, as it comes."""
         if len(path) > _DEEPEST:
             raise ReaderError(
@@ -178,13 +186,13 @@ class _Walk:
         if isinstance(node, list):
             for index, item in enumerate(node):
                 yield from self.columns(
-                    item, (*path[:-1], f"{path[-1] if path else ''}{{{index + 1}}}"), step, whole=whole
+                    item, (*path[:-1], f"{path[-1] if path else ''}{{{index + 1}}}"), step, whole=whole, units=units
                 )
             return
         if not isinstance(node, Mapping):
             return
         whole = whole or isinstance(node, Whole)
-        step, units = self.step_beside(node, step), _units_beside(node)
+        step, units = self.step_beside(node, step), {**(units or {}), **_units_beside(node)}
         leaves = {str(key): leaf for key, value in node.items() if (leaf := leaf_of(value)) is not None}
         cells = {str(key): parts for key, value in node.items() if (parts := _cell(value)) is not None}
         elements = [leaf for cell in cells.values() for _, leaf in cell]
@@ -198,7 +206,7 @@ class _Walk:
             elif name in leaves:
                 yield from self._leaf(name, leaves[name], path, step, whole=whole, lengths=lengths, units=units)
             elif isinstance(value, Mapping | list):
-                yield from self.columns(value, (*path, name), step, whole=whole)
+                yield from self.columns(value, (*path, name), step, whole=whole, units=units)
 
     def _leaf(
         self,
