@@ -35,6 +35,7 @@ from sysid.code_text import (
     is_said,
     is_script,
 )
+from sysid.kept_digests import kept_or_taken
 
 ROUNDS = 3
 """How many steps away it is seen that a name means another definition of the same words."""
@@ -79,14 +80,23 @@ def code_digest(*roots: Callable[..., Any] | str, without: tuple[str, ...] = (),
 
 @cache
 def _digest(addresses: tuple[str, ...], without: tuple[str, ...], files: tuple[str, ...]) -> str:
-    sha = hashlib.sha256("\n".join(_labels(addresses, without)).encode())
+    beside = b"".join(_contents(files))
+
+    def take() -> str:
+        return hashlib.sha256("\n".join(_labels(addresses, without)).encode() + beside).hexdigest()
+
+    if any(address.replace(":", ".").split(".")[0] != "sysid" for address in addresses):
+        return take()
+    return kept_or_taken(_home("sysid"), (addresses, without, hashlib.sha256(beside).hexdigest()), take)
+
+
+def _contents(files: Iterable[str]) -> Iterator[bytes]:
     for folder in files:
         top, _, rest = folder.partition("/")
         for file in sorted((_home(top) / rest).rglob("*")):
             if file.is_file() and file.suffix not in {".py", ".pyc"}:
-                sha.update(f"\n{file.name}\n".encode())
-                sha.update(file.read_bytes())
-    return sha.hexdigest()
+                yield f"\n{file.name}\n".encode()
+                yield file.read_bytes()
 
 
 def look_again() -> None:

@@ -188,6 +188,30 @@ def test_of_a_root_that_is_a_class_every_method_counts(plant: Callable[..., str]
     assert "plant.run:Tank.draw" not in reached("plant.run:Tank.step")
 
 
+def test_of_this_package_it_is_kept_and_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def keep(home: Path, what: object, take: Callable[[], str]) -> str:
+        asked.append((home, what))
+        return take()
+
+    look_again()
+    taken = code_digest("sysid.units:convert")
+    monkeypatch.setattr(module, "kept_or_taken", keep)
+    look_again()
+    assert code_digest("sysid.units:convert") == taken
+    without = code_digest("sysid.units:convert", without=("sysid.errors",))
+    files = code_digest("sysid.units:convert", files=("sysid/reporting/templates",))
+    assert len({taken, without, files}) == 3
+    assert {home for home, _ in asked} == {Path(sysid.__file__).parent}
+    assert len({repr(what) for _, what in asked}) == 3
+
+
+def test_of_another_package_none_is_kept(plant: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "kept_or_taken", lambda *_: pytest.fail("kept"))  # it may be written by anybody
+    assert plant()
+
+
 def test_templates_count_where_they_are_named(plant: Callable[..., str], tmp_path: Path) -> None:
     plant()
     (tmp_path / "plant" / "templates").mkdir()
@@ -274,7 +298,8 @@ def test_a_kernel_concerns_the_fits_that_run_it() -> None:
 
 
 @pytest.mark.parametrize("root", ["sysid.estimation:fit_narx", "sysid.export:export_bundle"])
-def test_it_is_quick(root: str) -> None:
+def test_it_is_quick(root: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "kept_or_taken", lambda _home, _asked, take: take())  # however often it is needed
     look_again()
     module._parsed.cache_clear()
     gc.collect()
