@@ -6,7 +6,7 @@ from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from dataclasses import fields as dataclass_fields
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,28 +145,15 @@ class LinearStateSpace(AbstractStructure):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LinearStateSpaceModel(InnovationModel):
-    """A fitted state space of one output.
-
-    Args:
-        orders: The structure.
-        system: The matrices, in scaled numbers, of inputs that come their dead times late.
-        scaling: Between units and scaled numbers.
-        mapping: Which channels go in, which comes out.
-        sample_time: Seconds.
-        input_units: Unit of each input.
-        output_unit: Unit of the output.
-        rest_output: Output at rest, in its unit.
-    """
+class _StateSpaceModel(InnovationModel):
+    """What a fitted state space is, of one output or of several."""
 
     orders: LinearStateSpace
     system: Innovations
-    scaling: Scaling
+    scaling: Scaling | VectorScaling
     mapping: Mapping
     sample_time: float
     input_units: tuple[str, ...]
-    output_unit: str
-    rest_output: float
 
     @property
     def structure(self) -> LinearStateSpace:
@@ -176,7 +163,7 @@ class LinearStateSpaceModel(InnovationModel):
     @property
     def n_parameters(self) -> int:
         """Parameters that tell systems apart, whatever the coordinates of the state."""
-        return self.orders.n_parameters(len(self.mapping.inputs))
+        return self.orders.n_parameters(len(self.mapping.inputs), len(self.mapping.outputs))
 
     @cached_property
     def recursion(self) -> StateSpace:
@@ -193,7 +180,7 @@ class LinearStateSpaceModel(InnovationModel):
         """Every entry of its matrices, in scaled numbers, as :attr:`Innovations.entries`."""
         return self.system.entries
 
-    def with_theta(self, theta: NDArray[np.float64]) -> LinearStateSpaceModel:
+    def with_theta(self, theta: NDArray[np.float64]) -> Self:
         """The same model with other numbers, in the order of :attr:`vector`."""
         return replace(self, system=self.system.at(theta))
 
@@ -207,6 +194,62 @@ class LinearStateSpaceModel(InnovationModel):
         """Magnitude of the largest pole."""
         return self.system.radius
 
+    def continuous(self) -> ContinuousStateSpace:
+        """The continuous system whose samples it is; see :func:`continuous_form`."""
+        return continuous_form(self)
+
+    @property
+    def matrices(self) -> Matrices:
+        """The state space in the channels' units."""
+        gain, scale = np.atleast_1d(self.scaling.output_scale)[:, np.newaxis], np.array(self.scaling.input_scale)
+        return self.lowered.A, self.lowered.B / scale, gain * self.lowered.C, gain * self.lowered.D / scale
+
+    @property
+    def kalman_gain(self) -> NDArray[np.float64]:
+        """``K`` from innovations in the outputs' units, for the state of :attr:`matrices`."""
+        return np.asarray(self.lowered.K / np.array(self.scaling.output_scale))
+
+    def _fields(self) -> dict[str, Any]:
+        """What :meth:`_read` takes, as JSON values."""
+        return {
+            "structure": self.orders.to_dict(),
+            "mapping": str(self.mapping),
+            "sample_time": self.sample_time,
+            "input_units": list(self.input_units),
+            "scaling": self.scaling.to_dict(),
+            "system": self.system.to_dict(),
+        }
+
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        """The parts that models of one and of several outputs store alike."""
+        return {
+            "system": Innovations.from_dict(fields["system"]),
+            "mapping": Mapping.parse(fields["mapping"]),
+            "input_units": tuple(fields["input_units"]),
+            "sample_time": fields["sample_time"],
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearStateSpaceModel(_StateSpaceModel):
+    """A fitted state space of one output.
+
+    Args:
+        orders: The structure.
+        system: The matrices, in scaled numbers, of inputs that come their dead times late.
+        scaling: Between units and scaled numbers.
+        mapping: Which channels go in, which comes out.
+        sample_time: Seconds.
+        input_units: Unit of each input.
+        output_unit: Unit of the output.
+        rest_output: Output at rest, in its unit.
+    """
+
+    scaling: Scaling
+    output_unit: str
+    rest_output: float
+
     def ratio(self, j: int) -> Ratio:
         """From one input to the output, in ``1/z``; all inputs share the denominator."""
         F, numerators, _ = polynomials(self.system)
@@ -217,10 +260,6 @@ class LinearStateSpaceModel(InnovationModel):
             B=gain * numerators[0, j, first:], F=F, delay=first + late, discrete=True,
             of_numerator=f"B({self.mapping.inputs[j]}, ", of_denominator="F(",
         )  # fmt: skip
-
-    def continuous(self) -> ContinuousStateSpace:
-        """The continuous system whose samples it is; see :func:`continuous_form`."""
-        return continuous_form(self)
 
     def to_control(self, *, continuous: bool = False, pade_order: int = 3) -> Any:
         """The model as an object of python-control, from deviations of the inputs to deviations of the output.
@@ -245,29 +284,9 @@ class LinearStateSpaceModel(InnovationModel):
         ratios = [in_powers_of_z(gain * row, F) for gain, row in zip(gains, rows, strict=True)]
         return transfer_function(ratios, self.mapping, self.sample_time)
 
-    @property
-    def matrices(self) -> Matrices:
-        """The state space in the channels' units."""
-        gain, scale = self.scaling.output_scale, np.array(self.scaling.input_scale)
-        return self.lowered.A, self.lowered.B / scale, gain * self.lowered.C, gain * self.lowered.D / scale
-
-    @property
-    def kalman_gain(self) -> NDArray[np.float64]:
-        """``K`` from the innovation in the output's unit, for the state of :attr:`matrices`; shape ``(states, 1)``."""
-        return np.asarray(self.lowered.K / self.scaling.output_scale)
-
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""
-        return {
-            "structure": self.orders.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
-            "output_unit": self.output_unit,
-            "rest_output": self.rest_output,
-            "scaling": self.scaling.to_dict(),
-            "system": self.system.to_dict(),
-        }
+        return self._fields() | {"output_unit": self.output_unit, "rest_output": self.rest_output}
 
     @classmethod
     def from_dict(cls, fields: Dict[str, Any]) -> LinearStateSpaceModel:
@@ -275,11 +294,10 @@ class LinearStateSpaceModel(InnovationModel):
         orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
         return cls(
             orders=LinearStateSpace(**orders),
-            system=Innovations.from_dict(fields["system"]),
             scaling=Scaling.from_dict(fields["scaling"]),
-            mapping=Mapping.parse(fields["mapping"]),
-            input_units=tuple(fields["input_units"]),
-            **{key: fields[key] for key in ("sample_time", "output_unit", "rest_output")},
+            output_unit=fields["output_unit"],
+            rest_output=fields["rest_output"],
+            **cls._read(fields),
         )
 
 
@@ -299,7 +317,7 @@ class VectorStateSpace(LinearStateSpace):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
+class VectorStateSpaceModel(_StateSpaceModel, SeveralOutputs):
     """A fitted state space of several outputs.
 
     Args:
@@ -314,52 +332,9 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
     """
 
     orders: VectorStateSpace
-    system: Innovations
     scaling: VectorScaling
-    mapping: Mapping
-    sample_time: float
-    input_units: tuple[str, ...]
     output_units: tuple[str, ...]
     rest_outputs: tuple[float, ...]
-
-    @property
-    def structure(self) -> VectorStateSpace:
-        """The number of states."""
-        return self.orders
-
-    @property
-    def n_parameters(self) -> int:
-        """Parameters that tell systems apart, whatever the coordinates of the state."""
-        return self.orders.n_parameters(len(self.mapping.inputs), len(self.mapping.outputs))
-
-    @cached_property
-    def recursion(self) -> StateSpace:
-        """The form that is run."""
-        return StateSpace.of(self.lowered, self.scaling, noise=self.orders.noise)
-
-    @cached_property
-    def lowered(self) -> Innovations:
-        """The system with the dead times among its states."""
-        return self.system.behind(self.orders.shifts(len(self.mapping.inputs)))
-
-    @property
-    def vector(self) -> NDArray[np.float64]:
-        """Every entry of its matrices, in scaled numbers, as :attr:`Innovations.entries`."""
-        return self.system.entries
-
-    def with_theta(self, theta: NDArray[np.float64]) -> VectorStateSpaceModel:
-        """The same model with other numbers, in the order of :attr:`vector`."""
-        return replace(self, system=self.system.at(theta))
-
-    @property
-    def poles(self) -> NDArray[np.complex128]:
-        """Poles in the z plane, shape ``(states,)``."""
-        return self.system.poles()
-
-    @property
-    def pole_radius(self) -> float:
-        """Magnitude of the largest pole."""
-        return self.system.radius
 
     @property
     def ratios(self) -> dict[tuple[int, int], Ratio]:
@@ -376,10 +351,6 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
             for j, name in enumerate(self.mapping.inputs)
         }  # fmt: skip
 
-    def continuous(self) -> ContinuousStateSpace:
-        """The continuous system whose samples it is; see :func:`continuous_form`."""
-        return continuous_form(self)
-
     def to_control(self, *, continuous: bool = False, pade_order: int = 3) -> Any:
         """The model as a ``control.StateSpace`` in the channels' units, from deviations to deviations.
 
@@ -395,46 +366,24 @@ class VectorStateSpaceModel(InnovationModel, SeveralOutputs):
         """
         return self.continuous().to_control(pade_order=pade_order) if continuous else state_space(self)
 
-    @property
-    def matrices(self) -> Matrices:
-        """The state space in the channels' units."""
-        gain, scale = np.array(self.scaling.output_scale)[:, np.newaxis], np.array(self.scaling.input_scale)
-        return self.lowered.A, self.lowered.B / scale, gain * self.lowered.C, gain * self.lowered.D / scale
-
-    @property
-    def kalman_gain(self) -> NDArray[np.float64]:
-        """``K`` from innovations in the outputs' units, for the state of :attr:`matrices`."""
-        return np.asarray(self.lowered.K / np.array(self.scaling.output_scale))
-
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""
-        return {
-            "structure": self.orders.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
-            "output_units": list(self.output_units),
-            "rest_outputs": list(self.rest_outputs),
-            "scaling": self.scaling.to_dict(),
-            "system": self.system.to_dict(),
-        }
+        return self._fields() | {"output_units": list(self.output_units), "rest_outputs": list(self.rest_outputs)}
 
     @classmethod
     def from_dict(cls, fields: Dict[str, Any]) -> VectorStateSpaceModel:
         """The model that :meth:`to_dict` wrote."""
         orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        names = ("input_units", "output_units", "rest_outputs")
         return cls(
             orders=VectorStateSpace(**orders),
-            system=Innovations.from_dict(fields["system"]),
             scaling=VectorScaling.from_dict(fields["scaling"]),
-            mapping=Mapping.parse(fields["mapping"]),
-            sample_time=fields["sample_time"],
-            **{name: tuple(fields[name]) for name in names},
+            output_units=tuple(fields["output_units"]),
+            rest_outputs=tuple(fields["rest_outputs"]),
+            **cls._read(fields),
         )
 
 
-def continuous_form(model: LinearStateSpaceModel | VectorStateSpaceModel) -> ContinuousStateSpace:
+def continuous_form(model: _StateSpaceModel) -> ContinuousStateSpace:
     """The continuous system that gives a model's samples when its inputs are held between them, as ``d2c`` by zoh.
 
     Args:
