@@ -25,6 +25,7 @@
 ``ring``            the last minute of a pressure
 ``brake_computer``  the state machine at the head of a two-way end-of-train device
 ``tail_unit``       its valve, telemetry and self-test; trains braked from both ends
+``bench``           that self-test on a volume with leaks, and both ends beside one
 ``annotate``        states of the brake along any trace; errors and weights by state
 ``cycles``          what a driver does with the handle on a hilly line
 ``stop_cycles``     what the deceleration controller does with it

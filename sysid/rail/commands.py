@@ -1,4 +1,4 @@
-"""``sysid rail``: what a line does to a train, and automatic operation by a track card, as tables and pictures.
+"""``sysid rail``: what a line does to a train, automatic operation by a track card, the end of a train on its bench.
 
 Named in the entry-point group ``sysid.commands``, so that no other room knows of it.
 """
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 app = typer.Typer(
-    no_args_is_help=True, rich_markup_mode="rich", help="Trains: terrain and handling, automatic operation."
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    help="Trains: terrain and handling, automatic operation, end of train.",
 )
 
 Out = Annotated[Path | None, typer.Option(help="Folder for the table (.csv) and the picture (.svg).")]
@@ -176,6 +178,50 @@ def drive(
             ("speed [km/h]", 3.6 * run.speed), ("limit [km/h]", np.where(np.isfinite(limits), 3.6 * limits, np.nan)),
             ("notch", columns["notch"]), ("elevation [m]", line.elevation(run.position)),
         ])  # fmt: skip
+
+
+@app.command(epilog="Example: sysid rail eot --pairs 75 --handle 0 --leak 1")
+def eot(
+    *,
+    pairs: Annotated[int, typer.Option(help="Wagon pairs of the train.")] = 50,
+    handle: Annotated[float, typer.Option(help="Where the handle goes in psi; 0 is the emergency.")] = 84.2,
+    seconds: Annotated[float, typer.Option(help="How long the train is looked at.")] = 150.0,
+    leak: Annotated[float, typer.Option(help="Self-test: what the closed device loses in psi a minute.")] = 0.0,
+    valve_leak: Annotated[float, typer.Option(help="Self-test: what its supply valve loses beside that.")] = 0.0,
+    out: Out = None,
+    dry_run: DryRun = False,
+) -> None:
+    """The end-of-train device on its bench: the self-test, then an application from both ends of a train."""
+    from sysid.airbrake.consist import Consist
+    from sysid.rail.end_of_train.bench import LeakingBench, from_both_ends
+    from sysid.rail.end_of_train.tail_unit import self_test
+
+    consist, bench = Consist(pairs=pairs), LeakingBench(leak=leak, valve_leak=valve_leak)
+    outcome = self_test(bench)
+    typer.echo(f"self-test, leaks of {leak:g} and {valve_leak:g} psi a minute: {outcome.value}")
+    for at, done, psi in bench.readings:
+        typer.echo(f"{at:6.1f} s  {psi:6.2f} psi  {done}")
+    typer.echo(f"{consist.vehicles} vehicles, handle to {handle:g} psi after 5 s, {seconds:g} s")
+    if dry_run:
+        typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/eot.csv and .svg" if out else ""))
+        return
+    found = from_both_ends(consist, handle, seconds=seconds)
+    for message, answer in found.log[:1]:
+        typer.echo(f"{message.order.name.lower()} ordered at {message.time:.1f} s: {answer.value}")
+    typer.echo(f"valve open from {found.opened:.1f} s, for {found.open_for:.1f} s in all; {len(found.log)} orders")
+    places = {"first": consist.valve_nodes[0], "middle": consist.valve_nodes[pairs // 2], "last": consist.vehicles}
+    for name, values, took in (("both ends", found.both, found.braked[0]), ("one end", found.one, found.braked[1])):
+        held = ", ".join(f"{place} {values[-1, node - 1]:.1f}" for place, node in places.items())
+        typer.echo(f"{name:<9} cylinders at nine tenths after {took:5.1f} s; at the end {held} psi")
+    if out is not None:
+        columns = {"time_s": found.time} | {
+            f"{place}_{ends}_psi": values[:, node - 1]
+            for ends, values in (("both", found.both), ("one", found.one))
+            for place, node in places.items()
+        }
+        _write(out, "eot", columns)
+        shown = [(name.replace("_", " "), values) for name, values in columns.items() if name != "time_s"]
+        _picture(out / "eot.svg", found.time, "time [s]", shown)
 
 
 def _line(path: Path, section: str | None) -> Any:

@@ -57,7 +57,17 @@ def test_a_table_and_a_picture_are_written(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "terrain.svg").read_text(encoding="utf-8").startswith("<?xml")
 
 
-@pytest.mark.parametrize("words", [["terrain", CREST, TRAIN], DRIVE], ids=["terrain", "drive"])
+EOT = ["eot", "--pairs", "2", "--seconds", "20"]
+
+
+def test_the_end_of_a_train_is_written_with_its_times(tmp_path: Path) -> None:
+    run([*EOT, "--out", str(tmp_path)])
+    rows = np.genfromtxt(tmp_path / "eot.csv", delimiter=",", names=True)
+    assert rows["last_both_psi"][-1] == pytest.approx(rows["last_one_psi"][-1], abs=0.1)
+    assert (tmp_path / "eot.svg").is_file()
+
+
+@pytest.mark.parametrize("words", [["terrain", CREST, TRAIN], DRIVE, EOT], ids=["terrain", "drive", "eot"])
 def test_a_dry_run_does_nothing(words: list[str], tmp_path: Path) -> None:
     assert "nothing is done" in run([*words, "--dry-run", "--out", str(tmp_path / "out")])
     assert not (tmp_path / "out").exists()
