@@ -1,4 +1,4 @@
-"""``sysid rail``: what a line does to a train, automatic operation by a track card, the end of a train on its bench.
+"""``sysid rail``: terrain, automatic operation by a track card, the end of a train, and stops that teach.
 
 Named in the entry-point group ``sysid.commands``, so that no other room knows of it.
 """
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
-    help="Trains: terrain and handling, automatic operation, end of train.",
+    help="Trains: terrain and handling, automatic operation, end of train, stops.",
 )
 
 Out = Annotated[Path | None, typer.Option(help="Folder for the table (.csv) and the picture (.svg).")]
@@ -222,6 +222,58 @@ def eot(
         _write(out, "eot", columns)
         shown = [(name.replace("_", " "), values) for name, values in columns.items() if name != "time_s"]
         _picture(out / "eot.svg", found.time, "time [s]", shown)
+
+
+@app.command(epilog="Example: sysid rail stops --friction 0.7 --grade -0.01")
+def stops(
+    *,
+    friction: Annotated[float, typer.Option(help="Of the vehicle's shoes, 1 being nominal.")] = 1.0,
+    grade: Annotated[float, typer.Option(help="Rise over run.")] = 0.0,
+    count: Annotated[int, typer.Option(help="How many stops.")] = 5,
+    trace: Annotated[
+        Path | None, typer.Option(help="Slow application of the real plant, with P [mA] and A [m/s^2]; else nominal.")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Write such a trace of the vehicle with this friction (CSV).")
+    ] = None,
+    out: Out = None,
+    dry_run: DryRun = False,
+) -> None:
+    """Stops by the deceleration controller, which learns from each: error, jerk and modifier, stop after stop."""
+    import numpy as np
+
+    from sysid.ingest import read_trace, write_csv
+    from sysid.rail.constants import MPH
+    from sysid.rail.traces.stop_cycles import characteristic_of, learning_stops, servo, slow_application
+    from sysid.rail.transit.deceleration import identify_characteristic
+    from sysid.rail.transit.transit import TransitVehicle
+
+    known = characteristic_of(servo()) if trace is None else identify_characteristic(read_trace(trace))
+    knots = ", ".join(f"{a / MPH:.2f} at {p:.1f}" for p, a in zip(known.signals, known.decelerations, strict=True))
+    typer.echo(f"characteristic from {trace or 'the nominal vehicle'}: {knots} (mph/s at mA)")
+    if dry_run:
+        typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/stops.csv and .svg" if out else ""))
+        return
+    if record is not None:
+        write_csv(slow_application(TransitVehicle(model=servo(), friction=friction, speed=2000.0)), record)
+        typer.echo(f"written: {record}")
+    found = learning_stops(known, friction=friction, grade=grade, count=count)
+    typer.echo(f"40 to 20 mph, friction {friction:g}, grade {100.0 * grade:g} %")
+    for number, one in enumerate(found, start=1):
+        typer.echo(
+            f"stop {number:>2}: mean error {100.0 * one.error:+6.2f} % of the rate, largest jerk {one.jerk:.2f} of the "
+            f"limit, modifier {one.modifier:+.3f}"
+        )
+    if out is not None:
+        each = [one.trace for one in found]
+        columns = {"time_s": each[0].sample_time * np.arange(sum(map(len, each)), dtype=np.float64)} | {
+            name: np.concatenate([part[channel] for part in each])
+            for name, channel in (("wanted_m_s", "V_REF"), ("speed_m_s", "V"), ("deceleration_m_s2", "A"),
+                                  ("signal_mA", "P"), ("modifier", "M"))
+        }  # fmt: skip
+        _write(out, "stops", columns)
+        shown = [(name.replace("_", " "), values) for name, values in columns.items() if name != "time_s"]
+        _picture(out / "stops.svg", columns["time_s"], "time of all stops [s]", shown)
 
 
 def _line(path: Path, section: str | None) -> Any:

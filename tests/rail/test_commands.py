@@ -57,6 +57,23 @@ def test_a_table_and_a_picture_are_written(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "terrain.svg").read_text(encoding="utf-8").startswith("<?xml")
 
 
+STOPS = ["stops", "--friction", "0.7"]
+
+
+def test_a_record_of_the_plant_teaches_before_the_first_stop(tmp_path: Path) -> None:
+    def errors(words: list[str]) -> list[float]:
+        return [abs(float(one)) for one in re.findall(r"mean error +([+-][\d.]+) %", run(words))]
+
+    record, out = str(tmp_path / "slow.csv"), tmp_path / "out"
+    nominal = errors([*STOPS, "--count", "3", "--record", record, "--out", str(out)])
+    assert nominal[0] > 10.0
+    assert nominal[2] < 0.1 * nominal[0]
+    assert errors([*STOPS, "--count", "1", "--trace", record])[0] < 0.3 * nominal[0]
+    rows = np.genfromtxt(out / "stops.csv", delimiter=",", names=True)
+    assert np.ptp(rows["modifier"]) > 0.1
+    assert (out / "stops.svg").is_file()
+
+
 EOT = ["eot", "--pairs", "2", "--seconds", "20"]
 
 
@@ -67,7 +84,9 @@ def test_the_end_of_a_train_is_written_with_its_times(tmp_path: Path) -> None:
     assert (tmp_path / "eot.svg").is_file()
 
 
-@pytest.mark.parametrize("words", [["terrain", CREST, TRAIN], DRIVE, EOT], ids=["terrain", "drive", "eot"])
+@pytest.mark.parametrize(
+    "words", [["terrain", CREST, TRAIN], DRIVE, EOT, STOPS], ids=["terrain", "drive", "eot", "stops"]
+)
 def test_a_dry_run_does_nothing(words: list[str], tmp_path: Path) -> None:
     assert "nothing is done" in run([*words, "--dry-run", "--out", str(tmp_path / "out")])
     assert not (tmp_path / "out").exists()
@@ -81,8 +100,10 @@ def test_a_dry_run_does_nothing(words: list[str], tmp_path: Path) -> None:
         ([*DRIVE, "--point", "1200"], "the run cannot be made"),
         ([*DRIVE[:4], "Z", *DRIVE[5:]], "no section Z"),
         (["drive", str(LINES / "crest.yaml"), *DRIVE[2:]], "no track card"),
+        (["stops", "--friction", "9"], "not such stops"),
+        (["eot", "--leak", "-1"], "not a test bench"),
     ],
-    ids=["step", "section", "point", "unknown section", "no card"],
+    ids=["step", "section", "point", "unknown section", "no card", "friction", "leak"],
 )
 def test_what_cannot_be_is_refused_in_words(words: list[str], said: str) -> None:
     with pytest.raises(SysidError, match=said):

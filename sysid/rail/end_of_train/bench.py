@@ -142,7 +142,7 @@ def from_both_ends(consist: Consist, handle: float, *, seconds: float = 150.0, a
     one = ReferenceBrake(consist=consist).advance(command).cylinders
     vents = np.flatnonzero(np.array(watched.vents) > 0.0)
     return BothEnds(
-        time=step * np.arange(len(command)),
+        time=step * np.arange(len(command), dtype=np.float64),
         log=tuple(brake.log),
         opened=float(vents[0]) * step if len(vents) else float("nan"),
         open_for=len(vents) * step,

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from sysid.airbrake.consist import Consist
 from sysid.code_digest import code_digest
@@ -33,6 +33,8 @@ class CycleCase(BaseModel):
         driver: One of :data:`DRIVERS`.
         seed: Of line, hand or commands.
         duration: In s.
+        friction: Of the shoes of the controller's vehicle, 1 being nominal; other drivers have the train's own.
+        grade: That it runs on, rise over run; other drivers have a line of their own.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -41,6 +43,16 @@ class CycleCase(BaseModel):
     driver: Literal["habits", "notches", "controller"]
     seed: int = Field(ge=0)
     duration: float = Field(default=900.0, ge=10.0, le=7200.0)
+    friction: float = Field(default=1.0, ge=0.2, le=3.0)
+    grade: float = Field(default=0.0, ge=-0.06, le=0.06)
+
+    @model_validator(mode="after")
+    def _of_the_controller(self) -> CycleCase:
+        if self.driver != "controller" and (self.friction, self.grade) != (1.0, 0.0):
+            raise ValueError(
+                f"friction and grade are the controller's: {self.driver} has a line and a train of its own"
+            )
+        return self
 
 
 class CycleOptions(BaseModel):
@@ -158,7 +170,7 @@ class _Drive:
         """Psi gauge at each sample."""
         case = self.case
         if case.driver == "controller":
-            return stop_cycle(case.seed, case.duration)
+            return stop_cycle(case.seed, case.duration, friction=case.friction, grade=case.grade)
         train, consist = heavy_haul(pairs=self.options.pairs), Consist(pairs=self.options.pairs)
         habits = HabitSettings(target=self.options.speed / 3.6, running=consist.running_pressure)
         drive = drive_cycle if case.driver == "habits" else line_cycle

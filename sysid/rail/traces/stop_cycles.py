@@ -6,17 +6,23 @@ handle goes down with the signal in steps and up in one move, when the controlle
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import ConfigError
 from sysid.models import ARX, ARXModel, Mapping
 from sysid.rail.constants import MPH
-from sysid.rail.transit.deceleration import COAST, FULL_SERVICE, Characteristic, identify_characteristic
-from sysid.rail.transit.transit import DecelerationController, TransitVehicle, stop_trace
+from sysid.rail.transit.deceleration import COAST, FULL_SERVICE, JERK, RATE, Characteristic, identify_characteristic
+from sysid.rail.transit.transit import DecelerationController, TransitVehicle, largest_jerk, stop_trace
 from sysid.traces import Channel, Trace
 
 SAMPLE_TIME = 0.1
 """In s."""
+
+CRUISING, STOPPING = 20.0, 36.0
+"""Of a stop in s: at 40 mph, and from the command to 20 mph on (ours)."""
 
 LAGS = (0.15, 0.25)
 """Of the cylinder behind the commanded pressure in s, one after the other (ours)."""
@@ -50,8 +56,27 @@ def servo(sample_time: float = SAMPLE_TIME) -> ARXModel:
     )
 
 
+def slow_application(vehicle: TransitVehicle) -> Trace:
+    """What a vehicle shows of its brake characteristic: the signal goes slowly over its braking range.
+
+    Args:
+        vehicle: The plant, fast enough not to come to a stand (some 2000 m/s: on a real one several runs are joined).
+
+    Returns:
+        A trace with the channels P (mA) and A (deceleration by the pendulum in m/s2, the grade taken out).
+    """
+    signals = np.concatenate([np.full(50, COAST), np.linspace(COAST, FULL_SERVICE, 2000)])
+    rates = np.empty(len(signals))
+    for k, signal in enumerate(signals):
+        vehicle.step(float(signal))
+        rates[k] = -vehicle.pendulum
+    channels = (Channel(name="P", unit="mA"), Channel(name="A", unit="m/s^2"))
+    values = np.column_stack([signals, rates])
+    return Trace(name="slow", sample_time=vehicle.sample_time, channels=channels, values=values)
+
+
 def characteristic_of(model: ARXModel) -> Characteristic:
-    """The brake characteristic, found from a slow application of a fast vehicle.
+    """The brake characteristic of the nominal vehicle, found from a slow application.
 
     Args:
         model: Its brake.
@@ -59,16 +84,59 @@ def characteristic_of(model: ARXModel) -> Characteristic:
     Returns:
         The characteristic.
     """
-    vehicle = TransitVehicle(model=model, speed=2000.0)
-    signals = np.concatenate([np.full(50, COAST), np.linspace(COAST, FULL_SERVICE, 2000)])
-    rates = np.empty(len(signals))
-    for k, signal in enumerate(signals):
-        vehicle.step(float(signal))
-        rates[k] = -vehicle.acceleration
-    channels = (Channel(name="P", unit="mA"), Channel(name="A", unit="m/s^2"))
-    values = np.column_stack([signals, rates])
-    trace = Trace(name="slow", sample_time=model.sample_time, channels=channels, values=values)
-    return identify_characteristic(trace)
+    return identify_characteristic(slow_application(TransitVehicle(model=model, speed=2000.0)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StopFigures:
+    """One stop from 40 to 20 mph.
+
+    Args:
+        error: Mean error of the deceleration as a share of the rate asked for.
+        modifier: Of the request, with which the stop was made.
+        jerk: Largest jerk as a multiple of the source's limit.
+        trace: The stop.
+    """
+
+    error: float
+    modifier: float
+    jerk: float
+    trace: Trace
+
+
+def learning_stops(
+    characteristic: Characteristic, *, friction: float = 1.0, grade: float = 0.0, count: int = 5
+) -> list[StopFigures]:
+    """Stop again and again, the controller learning from each.
+
+    Args:
+        characteristic: What the controller knows of the brake before the first.
+        friction: Of the vehicle's shoes, 1 being nominal.
+        grade: Rise over run.
+        count: How many stops.
+
+    Returns:
+        Each stop.
+
+    Raises:
+        ConfigError: If the vehicle or the count cannot be.
+    """
+    if not 1 <= count <= 100 or not -0.06 <= grade <= 0.06 or not 0.2 <= friction <= 3.0:
+        raise ConfigError(
+            "not such stops", where="stops",
+            expected="1 to 100 stops, friction from 0.2 to 3, grades up to 6 %",
+            got=f"{count}, {friction:g}, {100.0 * grade:g} %",
+        )  # fmt: skip
+    controller = DecelerationController(characteristic=characteristic, sample_time=SAMPLE_TIME)
+    vehicle = TransitVehicle(model=servo(), friction=friction, grade=grade)
+    commands = np.repeat([40.0 * MPH, 20.0 * MPH], [round(CRUISING / SAMPLE_TIME), round(STOPPING / SAMPLE_TIME)])
+    found = []
+    for _ in range(count):
+        before, vehicle.speed = controller.modifier, 40.0 * MPH
+        trace = stop_trace(vehicle, controller, commands)
+        jerk = largest_jerk(trace["A"][round((CRUISING - 1.0) / SAMPLE_TIME) :], SAMPLE_TIME) / JERK
+        found.append(StopFigures(error=controller.mean_errors[-1] / RATE, modifier=before, jerk=jerk, trace=trace))
+    return found
 
 
 def speed_commands(
@@ -136,18 +204,19 @@ def handle_of_signal(
     return handle
 
 
-def stop_cycle(seed: int, duration: float, *, friction: float = 1.0) -> NDArray[np.float64]:
+def stop_cycle(seed: int, duration: float, *, friction: float = 1.0, grade: float = 0.0) -> NDArray[np.float64]:
     """The handle of a vehicle whose controller follows random speed commands.
 
     Args:
         seed: Of the commands.
         duration: In s.
         friction: Of the shoes, 1 being nominal.
+        grade: Rise over run.
 
     Returns:
         Handle in psi gauge, one per 0.1 s.
     """
     model, commands = servo(), speed_commands(seed, duration)
     controller = DecelerationController(characteristic=characteristic_of(model), sample_time=SAMPLE_TIME)
-    vehicle = TransitVehicle(model=model, friction=friction, speed=float(commands[0]))
+    vehicle = TransitVehicle(model=model, friction=friction, speed=float(commands[0]), grade=grade)
     return handle_of_signal(np.array(stop_trace(vehicle, controller, commands)["P"]))

@@ -39,6 +39,13 @@ def test_a_seed_is_a_cycle_and_another_is_another() -> None:
     assert not np.array_equal(first, other)
 
 
+def test_friction_and_grade_are_the_controllers() -> None:
+    handles = [MAKER.steps(options(friction=friction, grade=-0.01))[0].run() for friction in (0.7, 1.3)]
+    assert handles[0] != handles[1]
+    with pytest.raises(ValidationError, match="are the controller's"):
+        options(driver="habits", friction=0.7)
+
+
 def test_a_direct_release_brake_is_never_let_off_in_part() -> None:
     handle = stop_cycle(1, 400.0)
     up = np.flatnonzero(np.diff(handle) > 0.0)
