@@ -156,7 +156,11 @@ USUAL_UNITS = frozenset(
 """Units that need not be looked up: pint takes 0.3 s to import and build."""
 
 
-_PRESSURES = frozenset({"Pa", "hPa", "kPa", "MPa", "bar", "mbar", "psi"})
+_ATMOSPHERE = {
+    "Pa": STANDARD_ATMOSPHERE_PA,
+    **{"hPa": 1013.25, "kPa": 101.325, "MPa": 0.101325, "bar": 1.01325, "mbar": 1013.25, "psi": 14.695948775513449},
+}
+"""The standard atmosphere in each usual unit of pressure."""
 
 
 def is_pressure(unit: str) -> bool:
@@ -169,8 +173,26 @@ def is_pressure(unit: str) -> bool:
         True if it is.
     """
     if unit in USUAL_UNITS:
-        return unit in _PRESSURES
+        return unit in _ATMOSPHERE
     return plain_unit(unit) is not None and _parsed(unit).is_compatible_with(_parsed("Pa"))
+
+
+def atmosphere_in(unit: str) -> float:
+    """The standard atmosphere.
+
+    Args:
+        unit: A unit of pressure.
+
+    Returns:
+        It, in that unit.
+
+    Example:
+        >>> atmosphere_in("bar"), atmosphere_in("atm")
+        (1.01325, 1.0)
+    """
+    if unit in _ATMOSPHERE:
+        return _ATMOSPHERE[unit]
+    return float(_registry().Quantity(STANDARD_ATMOSPHERE_PA, "Pa").to(_parsed(unit)).magnitude)
 
 
 def check_unit(unit: str) -> str:
@@ -235,6 +257,25 @@ def convert(
         6.01325
     """
     to_reference = reference if to_reference is None else to_reference
+    usual = unit == to_unit and unit in USUAL_UNITS
+    source, target = (None, None) if usual else _alike(unit, to_unit)
+    if (reference is Reference.NONE) != (to_reference is Reference.NONE):
+        raise UnitError(
+            "a reference is known on one side of the conversion only",
+            expected="gauge or absolute on both sides, or on neither",
+            got=f"{reference.value} -> {to_reference.value}",
+            remedy="declare reference: gauge or reference: absolute for the channel",
+        )
+    converted = np.array(values, dtype=np.float64)
+    if source is not None:
+        converted = np.asarray(_registry().Quantity(converted, source).to(target).magnitude)
+    if reference is to_reference:
+        return converted
+    atmosphere = atmosphere_in(to_unit)
+    return converted + atmosphere if to_reference is Reference.ABSOLUTE else converted - atmosphere
+
+
+def _alike(unit: str, to_unit: str) -> tuple[pint.Unit, pint.Unit]:
     source, target = _parsed(check_unit(unit)), _parsed(check_unit(to_unit))
     if not source.is_compatible_with(target):
         raise UnitError(
@@ -243,18 +284,7 @@ def convert(
             got=f"{unit}, a unit of {source.dimensionality}",
             remedy="correct the unit of the channel",
         )
-    if (reference is Reference.NONE) != (to_reference is Reference.NONE):
-        raise UnitError(
-            "a reference is known on one side of the conversion only",
-            expected="gauge or absolute on both sides, or on neither",
-            got=f"{reference.value} -> {to_reference.value}",
-            remedy="declare reference: gauge or reference: absolute for the channel",
-        )
-    converted = np.asarray(_registry().Quantity(np.asarray(values, dtype=np.float64), source).to(target).magnitude)
-    if reference is to_reference:
-        return converted
-    atmosphere = float(_registry().Quantity(STANDARD_ATMOSPHERE_PA, "Pa").to(target).magnitude)
-    return converted + atmosphere if to_reference is Reference.ABSOLUTE else converted - atmosphere
+    return source, target
 
 
 @cache

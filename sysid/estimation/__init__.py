@@ -1,27 +1,31 @@
 """Traces and a structure in, a FitResult out."""
 
-from sysid.estimation.attempts import Attempt
-from sysid.estimation.linear.arx import fit_arx
-from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
-from sysid.estimation.linear.instrumental import fit_iv4
-from sysid.estimation.linear.modes import Mode, modes
-from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
-from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
-from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
-from sysid.estimation.linear.state_space.search import StateSpaceTraining
-from sysid.estimation.linear.transfer_function import fit_transfer_function
-from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
-from sysid.estimation.networks.joint import CascadeFit, JointTraining
-from sysid.estimation.networks.joint_training import fit_cascade, with_upstream_outputs
-from sysid.estimation.networks.narx import fit_narx
-from sysid.estimation.networks.neural_state_space import fit_neural_state_space, fit_vector_neural_state_space
-from sysid.estimation.networks.posterior import Posterior
-from sysid.estimation.networks.training import FitProgress, Training
-from sysid.estimation.networks.vector_narx import fit_vector_narx
-from sysid.estimation.operating_point import OperatingPoint
-from sysid.estimation.result import Evidence, FitResult, Loop, Status
-from sysid.estimation.stability import StabilityOptions
-from sysid.estimation.uncertainty import Uncertainty
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sysid.estimation.attempts import Attempt
+    from sysid.estimation.linear.arx import fit_arx
+    from sysid.estimation.linear.frequency_response import Spectrum, fit_spectra
+    from sysid.estimation.linear.instrumental import fit_iv4
+    from sysid.estimation.linear.modes import Mode, modes
+    from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
+    from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
+    from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
+    from sysid.estimation.linear.state_space.search import StateSpaceTraining
+    from sysid.estimation.linear.transfer_function import fit_transfer_function
+    from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+    from sysid.estimation.networks.joint import CascadeFit, JointTraining
+    from sysid.estimation.networks.joint_training import fit_cascade, with_upstream_outputs
+    from sysid.estimation.networks.narx import fit_narx
+    from sysid.estimation.networks.neural_state_space import fit_neural_state_space, fit_vector_neural_state_space
+    from sysid.estimation.networks.posterior import Posterior
+    from sysid.estimation.networks.training import FitProgress, Training
+    from sysid.estimation.networks.vector_narx import fit_vector_narx
+    from sysid.estimation.operating_point import OperatingPoint
+    from sysid.estimation.result import Evidence, FitResult, Loop, Status
+    from sysid.estimation.stability import StabilityOptions
+    from sysid.estimation.uncertainty import Uncertainty
 
 __all__ = [
     "Attempt",
@@ -59,3 +63,38 @@ __all__ = [
     "state_orders",
     "with_upstream_outputs",
 ]
+
+_ROOM = "sysid.estimation"
+_WHERE = {
+    "attempts": ("Attempt",),
+    "linear.arx": ("fit_arx",),
+    "linear.frequency_response": ("Spectrum", "fit_spectra"),
+    "linear.instrumental": ("fit_iv4",),
+    "linear.modes": ("Mode", "modes"),
+    "linear.polynomial.fit": ("PolynomialTraining", "fit_polynomial"),
+    "linear.state_space.fit": ("fit_state_space", "fit_vector_state_space"),
+    "linear.state_space.orders": ("StateOrders", "state_orders"),
+    "linear.state_space.search": ("StateSpaceTraining",),
+    "linear.transfer_function": ("fit_transfer_function",),
+    "linear.transfer_function_training": ("TransferFunctionTraining",),
+    "networks.joint": ("CascadeFit", "JointTraining"),
+    "networks.joint_training": ("fit_cascade", "with_upstream_outputs"),
+    "networks.narx": ("fit_narx",),
+    "networks.neural_state_space": ("fit_neural_state_space", "fit_vector_neural_state_space"),
+    "networks.posterior": ("Posterior",),
+    "networks.training": ("FitProgress", "Training"),
+    "networks.vector_narx": ("fit_vector_narx",),
+    "operating_point": ("OperatingPoint",),
+    "result": ("Evidence", "FitResult", "Loop", "Status"),
+    "stability": ("StabilityOptions",),
+    "uncertainty": ("Uncertainty",),
+}
+"""Where each name is defined: a frozen model is run without anything that fits one, which takes longest to import."""
+
+
+def __getattr__(name: str) -> Any:
+    """A name, imported now."""
+    for module, names in _WHERE.items():
+        if name in names:
+            return globals().setdefault(name, getattr(import_module(f"{_ROOM}.{module}"), name))
+    raise AttributeError(f"module {_ROOM!r} has no attribute {name!r}")

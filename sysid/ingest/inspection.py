@@ -23,7 +23,7 @@ from sysid.ingest.restarts import finer_than_clock, records_by_clock
 from sysid.ingest.second_clocks import is_counter, without_second_clocks
 from sysid.ingest.table import RawColumn, RawTable, is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
-from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, convert, is_pressure
+from sysid.units import Reference, atmosphere_in, is_pressure
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
@@ -482,6 +482,5 @@ def _guess_reference(values: NDArray[np.float64], unit: str) -> Reference:
     if not len(values):
         return Reference.GAUGE
     # An absolute record that is ever at rest shows the atmosphere as its smallest value.
-    lowest = float(convert(values.min(keepdims=True), unit, "Pa")[0])
-    near_atmosphere = 0.8 < lowest / STANDARD_ATMOSPHERE_PA < 1.15
+    near_atmosphere = 0.8 < float(values.min()) / atmosphere_in(unit) < 1.15
     return Reference.ABSOLUTE if near_atmosphere else Reference.GAUGE

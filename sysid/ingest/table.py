@@ -16,7 +16,7 @@ from sysid.errors import ChannelError, ReaderError, UnitError
 from sysid.ingest.headers import parse_header, split_reference
 from sysid.ingest.texts import meaning_of
 from sysid.ingest.words import Words
-from sysid.units import Reference, convert, plain_unit
+from sysid.units import USUAL_UNITS, Reference, convert, plain_unit
 
 _TIME_NAMES = {
     "t", "time", "zeit", "tijd", "temps", "tiempo", "tempo", "tid", "timestamp", "timestamps", "time stamp",
@@ -302,6 +302,8 @@ def is_time_unit(unit: str) -> bool:
     """
     if time_unit(unit) in _TIME_UNITS:
         return True
+    if unit in USUAL_UNITS:  # those of time are above
+        return False
     try:
         convert(np.zeros(1), unit, "s")
     except UnitError:
@@ -318,6 +320,8 @@ def time_unit(unit: str) -> str:
     Returns:
         For example ``"s"``, ``"ms"``, ``"ms"``.
     """
+    if unit in USUAL_UNITS:
+        return unit
     plain = plain_unit(unit.casefold()) or unit
     return plain if plain in _TIME_UNITS else unit
 

@@ -14,10 +14,9 @@ from matplotlib.text import Text
 from matplotlib.ticker import Formatter, LogFormatter, NullFormatter, ScalarFormatter
 
 from sysid.names import visible
+from sysid.reporting.figures import palette
 
-# Okabe and Ito, Color Universal Design (2008), without the yellow, which is too faint on white. Neighbours
-# differ in lightness too, and every series has a line style and a marker of its own.
-PALETTE: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
+PALETTE: Final = palette.PALETTE
 DASHES: Final = ("-", (0, (6, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1.5)), (0, (8, 2, 1, 2, 1, 2)))
 MARKERS: Final = ("o", "s", "^", "D", "v", "P", "X")
 # Seven markers on six colours: only the forty-third series looks like the first.

@@ -5,12 +5,12 @@ from __future__ import annotations
 import io
 import re
 import xml.etree.ElementTree as ET
-from typing import Final
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Final
 
 from sysid.names import visible
-from sysid.reporting.figures.style import styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # A reader's machine need not have the font that the layout was computed with.
 _FONT_STACK: Final = "'DejaVu Sans',Verdana,Geneva,sans-serif"
@@ -38,6 +38,8 @@ def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
     Returns:
         The element, without XML declaration, with ``role="img"``, scaling to the width it is given.
     """
+    from sysid.reporting.figures.style import styled
+
     buffer = io.StringIO()
     with styled():
         figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
@@ -49,23 +51,44 @@ def svg(figure: Figure, *, title: str, description: str, name: str) -> str:
         _shorten(element)
     _share(root)
     _unwrap(root)
-    box = root.get("viewBox", "")
-    root.attrib.clear()
-    root.attrib.update(
-        {
-            "role": "img",
-            "aria-labelledby": f"{name}-title {name}-desc",
-            "viewBox": box,
-            "style": f"stroke-linejoin:round;stroke-linecap:butt;font-family:{_FONT_STACK};max-width:{_widest(box)}px",
-        }
-    )
-    for place, (tag, text) in enumerate((("title", title), ("desc", description))):
-        words = ET.Element(tag, {"id": f"{name}-{tag}"})
-        words.text = visible(text, lines=True)
-        root.insert(place, words)
+    whole = described(root.get("viewBox", ""), title=title, description=description, name=name)
+    whole.extend(root)
+    root = whole
     for element in root.iter():
         element.tail = "\n"
     return ET.tostring(root, encoding="unicode").strip()
+
+
+def described(box: str, *, title: str, description: str, name: str) -> ET.Element:
+    """An empty SVG element with its words.
+
+    Args:
+        box: Its ``viewBox``.
+        title: As for :func:`svg`.
+        description: Likewise.
+        name: Likewise.
+
+    Returns:
+        The element.
+    """
+    style = f"stroke-linejoin:round;stroke-linecap:butt;font-family:{_FONT_STACK};max-width:{_widest(box)}px"
+    labels = f"{name}-title {name}-desc"
+    root = ET.Element("svg", {"role": "img", "aria-labelledby": labels, "viewBox": box, "style": style})
+    for tag, text in (("title", title), ("desc", description)):
+        ET.SubElement(root, tag, {"id": f"{name}-{tag}"}).text = visible(text, lines=True)
+    return root
+
+
+def as_file(drawing: str) -> bytes:
+    """A drawing as a file of its own: outside a page a name space says that it is one, or no program draws it.
+
+    Args:
+        drawing: What :func:`svg` gives.
+
+    Returns:
+        The content of the file.
+    """
+    return drawing.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1).encode()
 
 
 def _widest(box: str) -> int:

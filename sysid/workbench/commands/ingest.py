@@ -13,9 +13,8 @@ from sysid.content import nearest_file
 from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
 from sysid.ingest.assemble import stamps_in_seconds
-from sysid.reporting.figures.record_figure import record_figure
-from sysid.reporting.figures.style import styled
-from sysid.reporting.figures.svg import svg
+from sysid.reporting.figures.record_picture import record_picture
+from sysid.reporting.figures.svg import as_file
 from sysid.traces import TraceSet
 from sysid.units import Reference
 from sysid.workbench.commands.reader_options import files_from
@@ -131,16 +130,15 @@ def _picture(found: FileFinding) -> str:
     first = found.cases[0].finding if found.cases else found
     files, table = first.files.model_copy(update={"time": first.time}), first.table
     labels = {column.name: f"{column.name} [{column.unit}]" for column in found.channels}
-    with styled():
-        figure = record_figure(
-            stamps_in_seconds(table, files),
-            {label: table.find(name).values for name, label in labels.items()},
-            title=found.path.name,
-        )
-        drawing = svg(figure, title=f"{found.path.name} as it stands", description=", ".join(labels.values()), name="r")
+    drawing = record_picture(
+        stamps_in_seconds(table, files),
+        {label: table.find(name).values for name, label in labels.items()},
+        title=found.path.name,
+        description=", ".join(labels.values()),
+    )
     target = Path(f"{found.path.stem}.ingest.svg")
     try:
-        write_bytes(target, drawing.encode())
+        write_bytes(target, as_file(drawing))
     except OSError as error:
         # A folder that is not ours to write in shall still be looked into.
         return f"none, as {target} cannot be written ({error.strerror})"

@@ -16,7 +16,7 @@ from sysid.estimation.linear.order_search import Criterion
 from sysid.models import AbstractStructure
 from sysid.names import slug
 from sysid.reporting.figures.style import styled
-from sysid.reporting.figures.svg import svg
+from sysid.reporting.figures.svg import as_file, svg
 from sysid.reporting.numbers import number
 from sysid.units import squared
 from sysid.validation.metrics import percent
@@ -57,7 +57,7 @@ def orders_command(
     with styled():
         drawing = svg(found.plot(), title="Orders", description=f"Loss against size, {chosen}", name="orders")
     picture = Path(f"{slug(traces.name)}.orders.svg")
-    write_bytes(picture, drawing.encode())
+    write_bytes(picture, as_file(drawing))
     console().print(f"picture: {nearby(picture)}", soft_wrap=True)
     if found.states is not None:
         sizes = ", ".join(f"{size:.3f}" for size in found.states.correlations[: most + 3])

@@ -1,0 +1,42 @@
+"""What is known of usual units without looking it up is what pint says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pint
+import pytest
+
+from sysid import units
+from sysid.ingest.table import is_time_unit
+from sysid.units import STANDARD_ATMOSPHERE_PA, USUAL_UNITS, Reference, atmosphere_in, convert, is_pressure
+
+REGISTRY = pint.UnitRegistry(cache_folder=None)
+
+
+def of(unit: str) -> pint.Unit:
+    return REGISTRY.parse_units("dimensionless" if unit == "1" else unit)
+
+
+@pytest.mark.parametrize("unit", sorted(USUAL_UNITS))
+def test_a_usual_unit_is_what_it_is_to_pint(unit: str) -> None:
+    assert is_time_unit(unit) == of(unit).is_compatible_with("s")
+    assert is_pressure(unit) == of(unit).is_compatible_with("Pa")
+    if is_pressure(unit):
+        exact = REGISTRY.Quantity(STANDARD_ATMOSPHERE_PA, "Pa").to(of(unit)).magnitude
+        assert atmosphere_in(unit) == float(exact)  # to the last bit, as traces are found again by their bits
+
+
+@pytest.mark.parametrize("unit", ["kPa", "degC", "1"])
+def test_what_has_its_unit_stays_as_it_is(unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(units, "_registry", lambda: pytest.fail("looked up"))
+    values = np.array([0.1, np.nan, -3e7])
+    converted = convert(values, unit, unit)
+    np.testing.assert_array_equal(converted, values)
+    assert not np.shares_memory(converted, values)
+
+
+def test_a_reference_is_another_by_the_atmosphere(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(units, "_registry", lambda: pytest.fail("looked up"))
+    values = np.array([0.0, 250.5])
+    absolute = convert(values, "kPa", "kPa", reference=Reference.GAUGE, to_reference=Reference.ABSOLUTE)
+    np.testing.assert_array_equal(absolute, values + 101.325)
