@@ -39,7 +39,10 @@ def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float
     for weights, bias, readout, gate in zip(form.hidden_weights, form.hidden_bias, form.readout, gates, strict=True):
         gain = readout + sum(w * value for w, value in zip(gate, x, strict=True))
         y += gain * float(value(np.array(bias + sum(w * number for w, number in zip(weights, x, strict=True)))))
-    return float(min(max(y, form.low), form.high))
+    y = min(max(y, form.low), form.high)
+    least, most = form.between
+    y = y if least is None else max(y, float(form.scaling.scale_output(np.array(least))))
+    return float(y if most is None else min(y, float(form.scaling.scale_output(np.array(most)))))
 
 
 def simulate(form: Recursion, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:

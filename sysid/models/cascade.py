@@ -35,7 +35,7 @@ class Cascade:
         models: The members, in any order; kept in the order in which they run.
         rest: Level of channels at rest: a value in the channel's unit, or the name of an input whose first sample it is
             (a reservoir charged at the running pressure). By default an output's is its model's ``rest_output``.
-        limits: Limits of outputs, by channel.
+        limits: Limits of outputs, by channel; those of a member are its own where nothing is declared here.
 
     Raises:
         ConfigError: If the models cannot be wired (circle, channel computed twice, units, sample times), or a level or
@@ -65,7 +65,7 @@ class Cascade:
         object.__setattr__(self, "models", tuple(self.models[i] for i in wiring.order))
         _check_circles(self.models, wiring)
         object.__setattr__(self, "rest", dict(self.rest))
-        object.__setattr__(self, "limits", dict(self.limits))
+        object.__setattr__(self, "limits", _own_limits(self.models) | dict(self.limits))
         _check_names("rest", self.rest, wiring.channels)
         _check_names("limits", self.limits, wiring.outputs)
         for name, level in self.rest.items():
@@ -156,7 +156,9 @@ class Cascade:
                 got=str(model.mapping),
             )
         models = tuple(model if yes else other for other, yes in zip(self.models, same, strict=True))
-        return replace(self, models=models)
+        own = _own_limits(self.models)  # of which those of the former member go with it
+        declared = {name: limit for name, limit in self.limits.items() if own.get(name) != limit}
+        return replace(self, models=models, limits=declared)
 
     def upstream_of(self, outputs: Collection[str], *, given: Collection[str] = ()) -> Cascade:
         """The part that some outputs depend on.
@@ -366,6 +368,11 @@ class Cascade:
             "rest": dict(self.rest),
             "limits": {name: limit.to_dict() for name, limit in self.limits.items()},
         }
+
+
+def _own_limits(models: Sequence[Member]) -> dict[str, Limit]:
+    """Limits that members have of themselves, by channel."""
+    return {name: limit for model in models for name, limit in model.limits.items()}
 
 
 def _check_circles(models: Sequence[Member], wiring: Wiring) -> None:

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, shortened
 from sysid.models.activations import PLAIN, Activation, check_activation
 from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.cascade_program import Limit
 from sysid.models.lags import MOST, Lagged, Lags, LagSpec, parse_lags, whole
 from sysid.models.mapping import Mapping
+from sysid.models.output_limits import Between, parse_limits, written
 from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
 from sysid.models.scaling import Scaling
@@ -40,9 +42,11 @@ class NARX(AbstractStructure):
             neurons.
         activation: The kind of the neurons: ``tanh``, which saturates, or another of
             :data:`sysid.kernels.neurons.NEURONS`.
+        limits: Values between which the output is held inside the recursion, in its unit: ``[low, high]``, or ``found``
+            where the records show them. For what integrates until it meets an end: a cylinder, a tank, a charge.
 
     Raises:
-        ConfigError: If a set of lags or the number of neurons cannot be used.
+        ConfigError: If a set of lags, the number of neurons or the limits cannot be used.
 
     Example:
         >>> NARX(input_delays=4, output_delays=4, neurons=20).label
@@ -59,6 +63,7 @@ class NARX(AbstractStructure):
     feedthrough: bool = True
     gated: bool = False
     activation: Activation = PLAIN
+    limits: Any = None
 
     kind = "NARX"
 
@@ -71,6 +76,7 @@ class NARX(AbstractStructure):
         feedthrough: bool = True,
         gated: bool = False,
         activation: str = PLAIN,
+        limits: Any = None,
     ) -> None:
         object.__setattr__(self, "input_delays", _per_input(input_delays))
         object.__setattr__(self, "output_delays", parse_lags(output_delays, first=1, where="output_delays"))
@@ -78,6 +84,7 @@ class NARX(AbstractStructure):
         object.__setattr__(self, "feedthrough", feedthrough)
         object.__setattr__(self, "gated", gated)
         object.__setattr__(self, "activation", activation)
+        object.__setattr__(self, "limits", parse_limits(limits))
         check_activation(activation)
         if not whole(neurons) or (neurons == 0 and not feedthrough):
             raise ConfigError(
@@ -100,6 +107,7 @@ class NARX(AbstractStructure):
     def label(self) -> str:
         """Delays and neurons as ``NARX 4/4/20``; other lag sets are written out by their ends and number."""
         kind = " gated" * self.gated + f" {self.activation}" * (self.activation != PLAIN)
+        kind += f" limits {written(self.limits)}" if self.limits else ""
         if not self.input_delays:
             return f"NAR {_short(self.output_delays)}/{self.neurons}{kind}"
         distinct = dict.fromkeys(self.input_delays)
@@ -158,6 +166,7 @@ class NARX(AbstractStructure):
             # Absent where they are the plain ones, so that older files keep their digest.
             **({"gated": True} if self.gated else {}),
             **({"activation": self.activation} if self.activation != PLAIN else {}),
+            **({"limits": self.limits if isinstance(self.limits, str) else list(self.limits)} if self.limits else {}),
         }
 
 
@@ -192,6 +201,7 @@ class NARXModel(AbstractModel):
         output_unit: Unit of the output.
         rest_output: Output at rest, in its unit.
         clamp: Bound of the output in scaled numbers; infinite for none.
+        between: Limits between which it is held, in its unit.
     """
 
     network: NARX
@@ -203,12 +213,14 @@ class NARXModel(AbstractModel):
     output_unit: str
     rest_output: float
     clamp: float = CLAMP
+    between: Between = (None, None)
 
     def __post_init__(self) -> None:
         theta = np.array(self.theta, dtype=np.float64)
         theta.setflags(write=False)
         object.__setattr__(self, "theta", theta)
         object.__setattr__(self, "input_units", tuple(self.input_units))
+        object.__setattr__(self, "between", tuple(self.between))
 
     def with_theta(self, theta: NDArray[np.float64]) -> NARXModel:
         """The same network with other weights."""
@@ -225,6 +237,12 @@ class NARXModel(AbstractModel):
         return len(self.theta)
 
     @property
+    def limits(self) -> Dict[str, Limit]:
+        """What holds its output, as a cascade has it."""
+        low, high = self.between
+        return {} if low is None and high is None else {self.mapping.output: Limit(low=low, high=high)}
+
+    @property
     def recursion(self) -> Recursion:
         """The form that is run and exported."""
         return Recursion(
@@ -234,6 +252,7 @@ class NARXModel(AbstractModel):
             scaling=self.scaling,
             low=-self.clamp,
             high=self.clamp,
+            between=self.between,
             activation=self.network.activation,
         )
 
@@ -249,6 +268,7 @@ class NARXModel(AbstractModel):
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
             "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
+            **({"between": list(self.between)} if self.limits else {}),
         }
 
     @classmethod
@@ -263,5 +283,6 @@ class NARXModel(AbstractModel):
             mapping=Mapping.parse(fields["mapping"]),
             input_units=tuple(fields["input_units"]),
             clamp=np.inf if fields["clamp"] is None else fields["clamp"],
+            between=tuple(fields.get("between", (None, None))),
             **rest,
         )

@@ -17,6 +17,7 @@ from sysid.models.ends import read_now
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lags
+from sysid.models.output_limits import Between
 from sysid.models.scaling import Scaling
 
 
@@ -51,6 +52,7 @@ class Recursion(AbstractForm):
         scaling: Between units and scaled numbers.
         low: Lower bound of the output in scaled numbers; ``-inf`` for none.
         high: Upper bound of the output in scaled numbers; ``inf`` for none.
+        between: Limits of the output in its unit, as a cascade has them: at a bound a run is lost, at a limit right.
         activation: The kind of its neurons, :math:`\sigma`.
     """
 
@@ -60,6 +62,7 @@ class Recursion(AbstractForm):
     scaling: Scaling
     low: float = -np.inf
     high: float = np.inf
+    between: Between = (None, None)
     activation: str = PLAIN
 
     def __post_init__(self) -> None:
@@ -75,6 +78,20 @@ class Recursion(AbstractForm):
                 got=f"shape {theta.shape}",
                 remedy="use parameters that were fitted with this structure",
             )
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Between what the kernels hold the output, in scaled numbers: bounds, and limits where they are closer."""
+        low, high = (None if one is None else float(self.scaling.scale_output(np.array(one))) for one in self.between)
+        return self.low if low is None else max(self.low, low), self.high if high is None else min(self.high, high)
+
+    def in_units(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Scaled outputs in their unit; one that is held at a limit is at it to the last bit, as in a cascade."""
+        found = self.scaling.unscale_output(y)
+        for at, (limit, bound) in enumerate(zip(self.between, self.bounds, strict=True)):
+            if limit is not None:
+                found = np.where((y >= bound) if at else (y <= bound), limit, found)
+        return found
 
     @property
     def numbers(self) -> NDArray[np.float64]:
@@ -180,7 +197,7 @@ class Recursion(AbstractForm):
         """
         u, y = self.extended(inputs, history)
         kernel.free_run(u, y, *self._arguments(len(inputs)))
-        return self.scaling.unscale_output(y[self.lags.depth :])
+        return self.in_units(y[self.lags.depth :])
 
     @property
     def memory(self) -> int:
@@ -240,12 +257,12 @@ class Recursion(AbstractForm):
         measured = y.copy()
         measured[self.lags.depth :] = self.scaling.scale_output(np.asarray(output, dtype=np.float64))
         kernel.predict(u, measured, y, steps, *self._arguments(len(inputs)))
-        return self.scaling.unscale_output(y[self.lags.depth :])
+        return self.in_units(y[self.lags.depth :])
 
     def _arguments(self, n_steps: int) -> tuple[object, ...]:
         lags = self.lags
         tables = (lags.input_channel, lags.input_lag, lags.output_lag)
-        return (lags.depth, n_steps, *tables, self.theta, self.neurons, code_of(self.activation), self.low, self.high)
+        return (lags.depth, n_steps, *tables, self.theta, self.neurons, code_of(self.activation), *self.bounds)
 
 
 STEPS, APART = 12, 1e-5

@@ -158,6 +158,7 @@ FEW_MODELS = (
     "NARX 4/4/20",
     "NARX, linear part alone",
     "NARX, gates of tanh",
+    "NARX against its limits",
     "NARX against its bounds",
 )
 WRAPPED = ("fmi2", "fmi3", "torch-export", "cpp", "arduino", "wasm", "jax")

@@ -31,7 +31,13 @@ def build_arx(*, na: int, nb: tuple[int, ...], nk: tuple[int, ...], seed: int = 
 
 
 def build_narx(
-    structure: NARX, *, n_inputs: int = 2, clamp: float = 3.0, gain: float = 0.4, seed: int = 2
+    structure: NARX,
+    *,
+    n_inputs: int = 2,
+    clamp: float = 3.0,
+    gain: float = 0.4,
+    seed: int = 2,
+    between: tuple[float | None, float | None] = (None, None),
 ) -> NARXModel:
     """A NARX network with random weights, shrunk until its free run forgets where it started."""
     rng = np.random.default_rng(seed)
@@ -55,6 +61,7 @@ def build_narx(
         output_unit="psi",
         rest_output=0.0,
         clamp=clamp,
+        between=between,
     )
 
 
@@ -75,6 +82,9 @@ MODELS: dict[str, Callable[[], AbstractModel]] = {
     "NARX, direct input only": lambda: build_narx(NARX(input_delays="0:0", output_delays=1, neurons=5)),
     "NARX, sparse lags": lambda: build_narx(NARX(input_delays=[1, 2, 4, 8], output_delays=[2, 5], neurons=5)),
     "NARX, delays per input": lambda: build_narx(NARX(input_delays=[[0], [1, 2, 4]], output_delays="1:2", neurons=5)),
+    "NARX against its limits": lambda: build_narx(
+        NARX(input_delays=2, output_delays=2, neurons=8), gain=3.0, seed=5, between=(30.0, 42.5)
+    ),
     "NARX against its bounds": lambda: build_narx(
         NARX(input_delays=2, output_delays=2, neurons=8), clamp=0.1, gain=3.0, seed=5
     ),

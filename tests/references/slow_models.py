@@ -99,6 +99,46 @@ def cylinder(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arr
     return found
 
 
+def spindle(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """A motor on a spindle that carries a slide between two stops, which stop it dead; input in V, output in mm.
+
+    Coulomb friction holds the slide until the motor pulls harder; the load is a spring-like seal towards one end.
+    """
+    h, stroke, speed, place, current = time[1] - time[0], 80.0, 0.0, 40.0, 0.0
+    steps, found = max(1, round(h / 1e-3)), np.empty(len(time))
+    dt = h / steps
+    for k, volts in enumerate(inputs[:, 0]):
+        for _ in range(steps):
+            current += dt / 0.02 * ((volts - 0.08 * speed) / 2.0 - current)
+            force = current - 0.006 * max(place - 50.0, 0.0)
+            held = 0.3
+            if speed == 0.0 and abs(force) <= held:
+                continue
+            rubbing = held * np.sign(speed if speed else force)
+            faster = speed + dt * (force - rubbing - 0.002 * speed) / 0.004
+            speed = 0.0 if speed * faster < 0.0 else faster
+            place += dt * speed
+            if not 0.0 <= place <= stroke:
+                place, speed = min(max(place, 0.0), stroke), 0.0
+        found[k] = place
+    return found
+
+
+def basin(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """A basin that is filled and drained by pumps, runs over at its edge and can run dry; inputs in V, output in m."""
+    h, level, filling = time[1] - time[0], 1.0, 0.0
+    steps, found = max(1, round(h / 0.1)), np.empty(len(time))
+    dt = h / steps
+    for k, (fill, drain) in enumerate(inputs):
+        for _ in range(steps):
+            filling += dt / 3.0 * (max(fill - 1.0, 0.0) - filling)
+            area = 4.0 + 1.5 * level
+            level += dt * (0.05 * filling - 0.04 * drain * np.sqrt(1.0 + 0.3 * level)) / area
+            level = min(max(level, 0.0), 2.0)
+        found[k] = level
+    return found
+
+
 def hangs(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """Is never done where the input goes above 1."""
     while inputs.max() > 1.0:

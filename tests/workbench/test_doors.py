@@ -80,6 +80,7 @@ FITS = [
     pytest.param(NARX, {"seed": 7, "max_iterations": 4}, EVERYWHERE, id="NARX that runs away"),
     pytest.param(NARX, {"seed": 7, "loop": "open", "max_iterations": 8}, EVERYWHERE, id="NARX one step ahead"),
     pytest.param(NARX, {"seed": 7, "max_iterations": 30, "starts": 3}, EVERYWHERE, id="NARX of several starts"),
+    pytest.param(NARX | {"limits": [None, 130]}, {"seed": 7, "max_iterations": 4}, EVERYWHERE, id="NARX with a limit"),
     pytest.param(
         NARX | {"gated": True}, {"seed": 7, "max_iterations": 6, "pretraining": 60, "starts": 3, "ensemble": 2},
         EVERYWHERE, id="NARX gated, an ensemble",

@@ -29,6 +29,7 @@ from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import check_initial, grown
 from sysid.estimation.networks.windows import Windows, in_place, with_note
+from sysid.estimation.output_ends import ends_of, told
 from sysid.estimation.result import FitResult, Loop
 from sysid.models import NARX, History, Mapping, NARXModel, Recursion, Start
 from sysid.traces import Trace
@@ -74,7 +75,8 @@ def fit_narx(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
-        ConfigError: If the structure does not fit the mapping, or ``initial`` has another structure.
+        ConfigError: If the structure does not fit the mapping, ``initial`` has another structure, or limits that are to
+            be found are not there.
     """
     began = time.perf_counter()
     training, start = training or Training(), start or Start()
@@ -127,7 +129,9 @@ def fit_narx(
         )
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
     fit = multistart_result(choice, list(tasks), training, status, seconds)
-    return replace(with_note(fit, windows), posterior=posterior)
+    model = template  # whose limits all of them have
+    notes = [told(model.between, mapping.output, model.output_unit)] * bool(model.limits)
+    return replace(with_note(fit, windows), posterior=posterior, notes=(*with_note(fit, windows).notes, *notes))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -260,6 +264,7 @@ def _template(
         input_units=tuple(first.channel(name).unit for name in mapping.inputs),
         output_unit=first.channel(mapping.output).unit,
         rest_output=rest,
+        between=ends_of(network.limits, experiments, mapping.output),
     )
 
 

@@ -97,8 +97,10 @@ class StepSamples(AbstractProvider):
             u, y = template.recursion.extended(experiment.inputs, experiment.history)
             target = template.scaling.scale_output(experiment.output)
             y[-len(target) :] = target
+            low, high = template.recursion.bounds  # at a limit a step says only that it would go on
             weights = experiment.one_step(layout.lags).weights
             counted = np.ones(len(target), dtype=bool) if weights is None else weights > 0.0
+            counted = counted & (target > low) & (target < high)
             rows.append(lagged(u, y, layout.lags, len(target))[counted])
             targets.append(target[counted])
         regressors = (np.concatenate(rows) - basis.centre) @ basis.matrix.T

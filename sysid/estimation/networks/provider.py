@@ -256,7 +256,7 @@ class RecursionProvider(AbstractProvider):
     def _arguments(self, record: _Record, theta: NDArray[np.float64]) -> tuple[object, ...]:
         template = self.template
         n = len(record.target)
-        kind, bounds = code_of(template.activation), (template.low, template.high)
+        kind, bounds = code_of(template.activation), template.bounds
         return (template.lags.depth, n, *self._tables(), read_only(theta), template.neurons, kind, *bounds)
 
     def at(self, theta: NDArray[np.float64]) -> Recursion:

@@ -15,6 +15,9 @@ depends on how its inputs got where they are, but whatever came before, it comes
 **Traces** (:class:`TraceSequences`) of a generator's random commands: the inputs that the system really has, and with
 them the outputs it really has, so that every plateau on the way is judged.
 
+An output that has stood elsewhere under the inputs of rest has none to come back to: what integrates stays where it is,
+and where its run settles is not judged.
+
 Limits: an excursion asks more than the system does: it passes joints, speeds and pairs of inputs that the system itself
 would not. Its targets before the end are not what the system would have put out. Without a plateau at rest any plateau
 is taken, and records without any can show that a run stays bounded, not where it settles.
@@ -40,6 +43,9 @@ STILL = 0.01
 
 AT_REST = 0.05
 """Share of a channel's range within which it is where a record began."""
+
+KEPT = 0.1
+"""Share of an output's range away from where records began at which it has stood under the same inputs: it stays."""
 
 CANDIDATES = 128
 """Places that are looked at for the next passage; the closest is taken. More of them make smaller jumps and fewer
@@ -155,7 +161,10 @@ class Excursions(AbstractSequences):
             left.append(np.arange(n, 0, -1))
             still.append(_plateaus(record / scale, self.hold))
         rest = [s & _near(record, begins, scale) for s, record in zip(still, self.records, strict=True)]
-        reach = [_next(flags) for flags in (rest if any(flags.any() for flags in rest) else still)]
+        ends = rest if any(flags.any() for flags in rest) else still
+        if self._stays(still, begins, scale):
+            ends = [np.zeros_like(flags) for flags in still]
+        reach = [_next(flags) for flags in ends]
         firsts = np.cumsum([0, *(len(record) for record in self.records[:-1])])
         moves = np.concatenate(slopes)
         largest = np.abs(moves).max(axis=0)
@@ -175,6 +184,19 @@ class Excursions(AbstractSequences):
     def _fixed(self) -> list[int]:
         """Inputs that never move within a record: parameters of what was recorded, as a mass is."""
         return [j for j in range(len(self.inputs)) if all(np.ptp(record[:, j]) == 0.0 for record in self.records)]
+
+    def _stays(self, still: list[NDArray[np.bool_]], begins: NDArray[np.float64], scale: NDArray[np.float64]) -> bool:
+        """Whether an output has stood elsewhere than where a record began, the inputs being as they were there.
+
+        What integrates, and friction that holds, leave an output where it is: there is no rest to come back to.
+        """
+        m = len(self.inputs)
+        for record, stands in zip(self.records, still, strict=True):
+            inputs = _near(record[:, :m], begins[:, :m], scale[:m])
+            away = np.abs(record[:, np.newaxis, m:] - begins[:, m:]) > KEPT * scale[m:]
+            if bool(np.any(stands & inputs & np.all(np.any(away, axis=2), axis=1))):
+                return True
+        return False
 
     def _groups(self) -> NDArray[np.int64]:
         """Of each row, with which others its passages may be joined: a parameter does not move within a sequence."""

@@ -18,11 +18,14 @@ from sysid.models import (
     TransferFunction,
 )
 from sysid.models.curves import NONE
+from sysid.models.output_limits import FOUND
 from sysid.workbench.auto.look import Looked
 
 CURVE = "piecewise 6"
 """A learnt curve that can be any."""
 LINEAR_ORDERS = range(1, 7)
+ONE_STEP = {"pretraining": 2000, "pretraining_iterations": 100}
+"""Training that begins one step ahead, at a small part of its price."""
 REGULARISATIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
 """Fixed weights of the size of the parameters; the evidence finds its own where none is given."""
 
@@ -51,6 +54,7 @@ class Family:
         around: What stands next to one of it, the most promising first; nothing for what is tried in full at once.
         in_motion: What of it is tried before all else where runs do not begin at rest: what learns where it begins, or
             remembers one sample alone.
+        at_ends: What of it is tried before all else where outputs stand at ends: what is held there.
     """
 
     kind: str
@@ -58,6 +62,7 @@ class Family:
     first: Callable[[Looked], Sequence[Try]]
     around: Callable[[Try, Looked], Sequence[Try]] = lambda _, __: ()
     in_motion: Callable[[Looked], Sequence[Try]] = lambda _: ()
+    at_ends: Callable[[Looked], Sequence[Try]] = lambda _: ()
 
 
 def _arx(looked: Looked) -> list[Try]:
@@ -114,6 +119,20 @@ def _narx(looked: Looked) -> list[Try]:
     return [_narx_of(looked.lags, neurons, looked) for neurons in (4, 10)]
 
 
+def _narx_at_ends(looked: Looked) -> list[Try]:
+    """What is held where the output stands in the records.
+
+    Friction and stops switch within a sample, which a start that is trained one step ahead finds.
+    """
+    found = []
+    for lags, neurons in ((3, 8), (5, 14)):
+        first = min(looked.delay, 1)
+        inputs = f"{first}:{first + lags - 1}"
+        network = NARX(input_delays=inputs, output_delays=3, neurons=neurons, limits=FOUND)
+        found.append(Try(structure=network, training=ONE_STEP))
+    return found
+
+
 def _narx_of(lags: int, neurons: int, looked: Looked) -> Try:
     inputs = f"{looked.delay}:{looked.delay + lags - 1}" if looked.n_inputs else []
     return Try(structure=NARX(input_delays=inputs, output_delays=lags, neurons=neurons))
@@ -121,19 +140,22 @@ def _narx_of(lags: int, neurons: int, looked: Looked) -> Try:
 
 def _around_narx(one: Try, _: Looked) -> list[Try]:
     network = cast("NARX", one.structure)
-    lags = len(network.output_delays)
+    shortest = min(map(len, (*network.input_delays, network.output_delays)))
     moves: list[dict[str, Any]] = [
         {"neurons": round(1.6 * network.neurons) + 1},
         {"gated": not network.gated},
-        *([_lags(network, n) for n in (lags + 1, lags - 1) if n >= 1]),
+        *([_lags(network, more) for more in (1, -1) if shortest + more >= 1]),
         {"neurons": max(1, round(0.6 * network.neurons))},
     ]
     return _moved(one, moves)
 
 
-def _lags(network: NARX, n: int) -> dict[str, Any]:
-    first = [delays[0] for delays in network.input_delays]
-    return {"input_delays": [list(range(k, k + n)) for k in first], "output_delays": list(range(1, n + 1))}
+def _lags(network: NARX, more: int) -> dict[str, Any]:
+    inputs, output = (
+        [list(range(lags[0], lags[0] + len(lags) + more)) for lags in some]
+        for some in (network.input_delays, (network.output_delays,))
+    )
+    return {"input_delays": inputs, "output_delays": output[0]}
 
 
 def _blocks(looked: Looked) -> list[Try]:
@@ -204,6 +226,7 @@ FAMILIES = (
         first=_narx,
         around=_around_narx,
         in_motion=lambda looked: [_narx_of(1, 10, looked)],
+        at_ends=_narx_at_ends,
     ),
     Family(kind=HammersteinWiener.kind, linear=False, first=_blocks, around=_around_blocks),
     Family(kind=PolynomialNARX.kind, linear=False, first=_polynomials),

@@ -11,6 +11,7 @@ from sysid.advice import Verdict
 from sysid.api.looking import Advice, SystemAdvice, advise
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
+from sysid.estimation.output_ends import found_ends
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind
 from sysid.reporting.advice_words import lines
 from sysid.traces import Role, Trace, TraceSet
@@ -36,6 +37,8 @@ class Looked:
         never_negative: Whether no output ever is, so that its sensor may not tell a sign.
         suggested: What ``sysid advise`` suggests.
         cautions: What it asks to be looked at, in words.
+        ends: Whether every output stands at an end while inputs move on, as what integrates until it meets a stop: then
+            what holds its output there is tried first.
         in_motion: Whether outputs move before any input does though each run begins as if they had stood: then what
             remembers one sample, or learns where it begins, is tried first.
     """
@@ -47,6 +50,7 @@ class Looked:
     suggested: tuple[AbstractStructure, ...] = ()
     cautions: tuple[str, ...] = ()
     in_motion: bool = False
+    ends: bool = False
 
     @property
     def lags(self) -> int:
@@ -80,6 +84,7 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(one.structure for one in advice[0].suggestions) if len(advice) == 1 else (),
         cautions=tuple(_cautions(advice)),
+        ends=all(at_ends(data.estimation, mapping).values()),
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
     )
 
@@ -101,6 +106,23 @@ def in_motion(traces: Sequence[Trace], mapping: Mapping) -> dict[str, float]:
         still = slice(0, int(changed[0]) if len(changed) else len(inputs))
         moved = {name: max(most, float(np.ptp(trace[name][still]))) for name, most in moved.items()}
     return {name: by for name, by in moved.items() if by > MOVED * span_of(traces, name)}
+
+
+def at_ends(traces: Sequence[Trace], mapping: Mapping) -> dict[str, bool]:
+    """Of each output whether it stands at its least or greatest value while an input moves on.
+
+    Args:
+        traces: The records.
+        mapping: What moves, and what answers.
+
+    Returns:
+        The verdicts, by name.
+    """
+    parts = [(trace.columns(mapping.inputs), trace, trace.usable_samples) for trace in traces]
+    return {
+        name: found_ends([(u[usable], trace[name][usable]) for u, trace, usable in parts]) != (None, None)
+        for name in mapping.outputs
+    }
 
 
 def span_of(traces: Sequence[Trace], name: str) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from statistics import median_high
 from typing import Any
 
@@ -142,12 +143,17 @@ class Plan:
             yield finals
 
     def _search(self) -> Iterator[list[Try]]:
-        # In motion, what begins at rest is far off, however large: what learns where it begins comes first.
-        if self.looked.in_motion:
-            self.budget.unlimited = 1
-            nonlinear_first = sorted(self.families, key=lambda family: family.linear)
-            yield from self._rounds_of([one for family in nonlinear_first for one in family.in_motion(self.looked)])
-            yield from self._near_the_best()
+        # In motion, what begins at rest is far off, however large: what learns where it begins comes first. At ends it
+        # is what runs on through them.
+        for told, first in (
+            (self.looked.in_motion, attrgetter("in_motion")),
+            (self.looked.ends, attrgetter("at_ends")),
+        ):
+            if told:
+                self.budget.unlimited = 1
+                nonlinear_first = sorted(self.families, key=lambda family: family.linear)
+                yield from self._rounds_of([one for family in nonlinear_first for one in first(family)(self.looked)])
+                yield from self._near_the_best()
         yield from self._unasked(linear=True)
         self.budget.unlimited = 1  # on a slow machine linear models alone would have taken all
         yield from self._unasked(linear=False)

@@ -48,6 +48,14 @@ def test_a_stable_model_passes_and_settles_on_the_plateau():
     assert found.largest_plateau_error < 1e-3
 
 
+def test_where_a_run_settles_is_not_judged_of_what_has_no_rest_to_come_back_to():
+    rests = [record(seed) for seed in range(3)]
+    kept = np.cumsum(0.01 * rests[0].columns(["a"]), axis=0) % 3.0  # goes on, and stays
+    stays = replace(rests[0], values=np.column_stack([rests[0].columns(["a", "b"]), kept]))
+    assert excursions(*rests).has_plateaus
+    assert not excursions(*rests[1:], stays).has_plateaus
+
+
 def test_a_run_that_grows_without_bound_is_found():
     found = check_stability(model(1.02), excursions(), count=20)
     assert (found.stable, found.unbounded) == (False, 20)

@@ -9,7 +9,7 @@ import pytest
 
 from sysid.models import Mapping, Start, StartKind
 from sysid.traces import Role, Trace
-from sysid.workbench.auto.look import Looked, in_motion, look
+from sysid.workbench.auto.look import Looked, at_ends, in_motion, look
 from tests.workbench.auto.conftest import data, record
 
 MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
@@ -38,6 +38,14 @@ def test_outputs_that_move_before_any_input_does_are_known() -> None:
     for name, y in (("decays", 5.0 * 0.8 ** np.arange(40)), ("rests", np.minimum(u[:, 0], 0.5))):
         trace = Trace(name=name, sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
         assert bool(in_motion([trace], MAPPING)) is (name == "decays")
+
+
+def test_outputs_that_stand_at_an_end_while_an_input_moves_on_are_known() -> None:
+    u = np.tile(np.linspace(-1.0, 1.0, 40), 5)[:, np.newaxis]
+    channels = record("a", 200).channels
+    for y, ends in ((np.clip(u[:, 0], -0.5, None), True), (u[:, 0], False)):
+        trace = Trace(name="a", sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
+        assert set(at_ends([trace], MAPPING).values()) == {ends}
 
 
 def test_what_asks_to_be_looked_at_is_told_in_words(looked: Looked) -> None:

@@ -204,6 +204,16 @@ def test_the_median_of_its_errors_is_what_a_point_is_worth() -> None:
     assert error(with_repeats(lucky, [lost, lost])) == math.inf
 
 
+def test_what_stands_at_ends_has_first_what_is_held_there() -> None:
+    for ends in (False, True):
+        _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, ends=ends))
+        held = [point for points in rounds for point in points if "limits found" in point.structure.label]
+        assert bool(held) is ends
+        assert ("limits found" in rounds[0][0].structure.label) is ends
+        assert all(point.training["pretraining"] for point in held)
+        assert len({tuple(map(len, point.structure.input_delays)) for point in held}) > 1 or not ends
+
+
 def test_what_begins_in_motion_has_first_what_remembers_one_sample_or_learns_where_it_begins() -> None:
     for in_motion in (False, True):
         _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, in_motion=in_motion))
