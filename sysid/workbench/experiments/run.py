@@ -18,6 +18,7 @@ from sysid.traces import Channel, TraceSet
 from sysid.units import is_pressure
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.runner.events import Warned
+from sysid.workbench.runner.naming import cases_of
 from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Estimate, NotKnownError, Outlined, Step, Work
@@ -157,7 +158,7 @@ class _Experiments:
 
         return Step(
             name=LOADING.name, title=LOADING.title, make=make,
-            outcome=lambda found: f"{len(found.traces)} cases of {found.traces.name}",
+            outcome=lambda found: cases_of(found.traces),
         )  # fmt: skip
 
 

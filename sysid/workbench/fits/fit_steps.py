@@ -35,6 +35,7 @@ from sysid.workbench.fits.record import (
     write_scores,
 )
 from sysid.workbench.runner import events
+from sysid.workbench.runner.naming import cases_of
 from sysid.workbench.runner.run import REPORT, Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
 from sysid.workbench.runner.store import read_json, strict, write_json
@@ -292,9 +293,8 @@ class FitSteps:
 
         def outcome(exports: Sequence[Mapping[str, Any]]) -> str:
             worst = max((float(entry["largest_difference"]) for entry in exports), default=0.0)
-            return (
-                f"{len(exports)} {'file' if len(exports) == 1 else 'files'}, at most {worst:.1e} {unit} from the model"
-            )
+            files = "1 file" if len(exports) == 1 else f"{len(exports)} files"
+            return f"{files}, at most {_in(f'{worst:.1e}', unit)} from the model"
 
         return Step(
             name="export",
@@ -365,8 +365,7 @@ def _loaded(data: Data) -> events.DataLoaded:
 
 
 def _cases(data: Data) -> str:
-    cases = f"{len(data.traces)} cases of {data.traces.name}"
-    cases = f"{cases}, {len(data.selection)} to choose by" if data.selection else cases
+    cases = cases_of(data.traces) + (f", {len(data.selection)} to choose by" if data.selection else "")
     return "; ".join(
         [cases, *(f"{name} has samples of {other}, which is fitted" for name, other in data.traces.shared)]
     )
@@ -391,7 +390,12 @@ def _ended(fit: FitResult) -> str:
 def _worst(scores: steps.Scores) -> str:
     """How a fit came out, in a line."""
     worst = max(scores.evaluation.cases.values(), key=lambda case: case.free_run.mse)
-    return f"free run at worst {worst.free_run.mse:.3g} {squared(worst.free_run.unit)} ({worst.case})"
+    return f"free run at worst {_in(f'{worst.free_run.mse:.3g}', squared(worst.free_run.unit))} ({worst.case})"
+
+
+def _in(figure: str, unit: str) -> str:
+    """A figure in its unit; a pure number has none to be told."""
+    return figure if unit == "1" else f"{figure} {unit}"
 
 
 def _looked(found: Sequence[Mapping[str, Any]]) -> str:

@@ -21,8 +21,10 @@ def table_of_fits(results: Results) -> Table:
     units = {fit.unit for fit in results.fits}
     unit = squared(units.pop()) if len(units) == 1 else "each output's unit, squared"
     # Shown in one power of ten, as publications print them, so that columns compare at a glance.
-    title = f"Free run, mean squared error in {unit}" + (
-        "; of a whole, its outputs' mean fit" if results.systems else ""
+    title = (
+        "Free run, mean squared error"
+        + (f" in {unit}" if unit != "1" else "")
+        + ("; of a whole, its outputs' mean fit" if results.systems else "")
     )
     table = Table(title=title, title_justify="left", header_style="bold")
     table.add_column("fit")

@@ -14,6 +14,7 @@ from sysid.traces import TraceSet
 from sysid.workbench.making.config import MakingConfig
 from sysid.workbench.making.maker import Maker, find_maker
 from sysid.workbench.runner.kept_steps import kept_steps
+from sysid.workbench.runner.naming import cases_of
 from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Outlined, Step, Work
@@ -82,7 +83,7 @@ class _Making:
             name=LOADING.name,
             title=LOADING.title,
             make=make,
-            outcome=lambda traces: f"{len(traces)} cases of {traces.name}",
+            outcome=cases_of,
         )
 
     def _written(self, run: Run, results: Mapping[str, Any]) -> Path:

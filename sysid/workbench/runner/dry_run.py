@@ -22,7 +22,10 @@ from sysid.workbench.runner.steps import Done, Estimate, NotKnownError, Outlined
 T = TypeVar("T")
 
 PATIENCE_S = 20.0
-"""Seconds after which a dry run times no further steps: it shall answer while one waits."""
+"""Seconds after which a dry run times no further steps: it shall answer while one waits.
+
+Of the processor, so that what is told does not hang on what else the machine does.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +60,7 @@ class DryRun(Run):
     loads: bool = False
     planned: dict[str, PlannedStep] = field(default_factory=dict)
     seen: dict[str, Done[Any]] = field(default_factory=dict)
-    began: float = field(default_factory=time.perf_counter)
+    began: float = field(default_factory=time.process_time)
 
     def tell(self, event: Event) -> None:
         """There is nobody to tell."""
@@ -71,7 +74,7 @@ class DryRun(Run):
         Raises:
             NotKnownError: If it has taken too long.
         """
-        if time.perf_counter() - self.began > PATIENCE_S:
+        if time.process_time() - self.began > PATIENCE_S:
             raise NotKnownError("work between the steps")
 
     def do(self, step: Step[T]) -> Done[T]:
@@ -168,7 +171,7 @@ class DryRun(Run):
             seconds = self.store.last_time(step.timed_as or step.name, amount=step.amount())
             if seconds is not None:
                 found = Estimate(seconds=seconds, basis="as last time")
-            elif step.how_long and not self.loads and time.perf_counter() - self.began <= PATIENCE_S:
+            elif step.how_long and not self.loads and time.process_time() - self.began <= PATIENCE_S:
                 found = step.how_long()
             else:
                 return step.typical
@@ -231,4 +234,5 @@ def together(planned: Sequence[PlannedStep]) -> Estimate:
     """
     unknown = sum(one.seconds is None for one in planned)
     seconds = sum(one.seconds for one in planned if one.seconds is not None)
-    return Estimate(seconds=seconds, basis=f"what {unknown} steps take of which it is not known" if unknown else "")
+    steps = "one step" if unknown == 1 else f"{unknown} steps"
+    return Estimate(seconds=seconds, basis=f"{steps} whose time is not known" if unknown else "")

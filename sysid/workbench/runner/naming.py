@@ -1,8 +1,10 @@
-"""Files shown to people."""
+"""Files and data sets as they are shown to people."""
 
 from __future__ import annotations
 
 from pathlib import Path
+
+from sysid.traces import TraceSet
 
 
 def nearby(path: Path) -> Path:
@@ -20,3 +22,15 @@ def nearby(path: Path) -> Path:
     """
     here, whole = Path.cwd().resolve(), path.resolve()
     return whole.relative_to(here) if whole.is_relative_to(here) else path
+
+
+def cases_of(traces: TraceSet) -> str:
+    """How many cases of which data set.
+
+    Args:
+        traces: The data set.
+
+    Returns:
+        For example ``"3 cases of rig"``.
+    """
+    return f"{len(traces)} {'case' if len(traces) == 1 else 'cases'} of {traces.name}"

@@ -87,7 +87,7 @@ def test_what_is_not_known_is_said_and_not_counted(workspace: Path, monkeypatch:
     monkeypatch.setattr(dry_run, "PATIENCE_S", -1.0)  # it times nothing
     fits = of("Fitting")
     assert [(step.seconds, step.basis) for step in fits] == [(None, "not known before it is run")] * 3
-    assert together(planned()).basis == "what 3 steps take of which it is not known"
+    assert together(planned()).basis == "3 steps whose time is not known"
 
 
 def test_a_fit_that_was_cut_off_has_less_to_go(done: Path) -> None:
