@@ -29,6 +29,8 @@ class Kind(enum.Enum):
     WORD = enum.auto()
     NOTHING = enum.auto()
 
+    __hash__ = object.__hash__  # of an enumeration it is written in Python, and asked for with every cell
+
 
 DATA = frozenset({Kind.NUMBER, Kind.WHOLE, Kind.TIME})
 

@@ -86,9 +86,11 @@ class _Split:
 
     def fits(self, row: Row) -> bool:
         """Whether a row goes on as the run does."""
-        cells = trimmed(row.cells, self.width)
-        found = [kind_of(cell) for cell in cells]
-        return len(found) == self.width and _merged(self.kinds, found) is not None and any(k in DATA for k in found)
+        return self.goes_on(tuple(map(kind_of, trimmed(row.cells, self.width))))
+
+    def goes_on(self, kinds: tuple[Kind, ...]) -> bool:
+        """Whether cells of these kinds go on as the run does."""
+        return len(kinds) == self.width and _merged(self.kinds, kinds) is not None and any(k in DATA for k in kinds)
 
 
 @dataclass(kw_only=True)
@@ -170,7 +172,12 @@ def _without_marks(lines: Sequence[str], options: FileOptions) -> tuple[list[str
 def _best(lines: list[str], given: str | None, options: FileOptions, path: Path, *, whole: bool) -> _Split:
     best: _Split | None = None
     problem: ReaderError | None = None
+    absent = False
     for separator in (given,) if given else SEPARATORS:
+        if separator != BLANKS and not any(separator in text for text in lines):
+            if absent:  # nor does this one divide anything
+                continue
+            absent = True
         try:
             ended = (f"{text}\n" for text in lines)
             rows = split_rows(ended, separator, line=1, comment=options.comment, path=path, whole=whole)
@@ -212,8 +219,8 @@ def _runs(separator: str, rows: list[Row], options: FileOptions) -> _Split:
     run: tuple[Kind, ...] = ()
     best_score = 0.0
     length = 0
-    for row in rows:
-        kinds = tuple(kind_of(cell, options.missing) for cell in row.cells)
+    found = [tuple(kind_of(cell, options.missing) for cell in row.cells) for row in rows]
+    for kinds in found:
         merged = _merged(run, kinds)
         length, run = (1, kinds) if merged is None else (length + 1, merged)
         score = length * _numeric(run) ** 2
@@ -222,7 +229,11 @@ def _runs(separator: str, rows: list[Row], options: FileOptions) -> _Split:
     split = _Split(separator=separator, rows=rows, kinds=best)
     if not best:
         return split
-    fitting = sum(map(split.fits, rows)) * _numeric(best) ** 2 * (1.0 if len(best) > 1 else 0.5)
+    fits = [
+        split.goes_on(kinds) if len(kinds) == len(best) and not options.missing else split.fits(row)
+        for row, kinds in zip(rows, found, strict=True)
+    ]
+    fitting = sum(fits) * _numeric(best) ** 2 * (1.0 if len(best) > 1 else 0.5)
     alike = sum(len(trimmed(row.cells, len(best))) == len(best) > 1 for row in rows)
     return replace(split, score=(fitting + 0.25 * alike) / len(rows))
 
@@ -236,6 +247,8 @@ def _merged(run: Sequence[Kind], kinds: Sequence[Kind]) -> tuple[Kind, ...] | No
     """What two rows hold together, or ``None`` if they do not go on from each other."""
     if len(run) != len(kinds):
         return None
+    if run == kinds:
+        return tuple(run)
     merged = []
     for known, new in zip(run, kinds, strict=True):
         if known is new or new is Kind.NOTHING:

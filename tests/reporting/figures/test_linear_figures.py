@@ -10,7 +10,7 @@ from scipy import signal
 
 from sysid.estimation import FitResult, TransferFunctionTraining, fit_transfer_function
 from sysid.models import Mapping, TransferFunction
-from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.figures.linear_figures import _filter_step, bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.svg import svg
 from tests.estimation.linear_systems import steps, trace_of
 
@@ -53,6 +53,25 @@ def test_the_step_response_ends_at_the_gain() -> None:
     y = figure.axes[0].lines[0].get_ydata()
     assert y[-1] == pytest.approx(fit.model.response(0, np.array([0.0]))[0].real, rel=1e-6)
     assert svg(figure, title="Step", description="Step response", name="step").startswith("<svg")
+
+
+def test_it_is_that_of_another_library() -> None:
+    fit = fitted(0.1, "discrete")
+    (A, B, C, D), n = fit.model.matrices, 60
+    _, (exact,) = signal.dstep((A, B[:, :1], C, D[:, :1], fit.model.sample_time), n=n)
+    drawn = step_figure(fit.model, samples=n).axes[0].lines[0].get_ydata()
+    np.testing.assert_allclose(drawn, exact[:, 0], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(("n_b", "n_f", "n"), [(1, 1, 5), (4, 2, 50), (2, 5, 3), (3, 3, 0)])
+def test_all_draws_at_once_are_filtered_as_each_alone(n_b: int, n_f: int, n: int) -> None:
+    rng = np.random.default_rng(n_b)
+    b, f = rng.standard_normal((7, n_b)), 0.2 * rng.standard_normal((7, n_f))
+    f[:, 0] = 2.0
+    found = np.zeros((7, n))
+    _filter_step(b, f, found)
+    alone = [signal.lfilter(*one, np.ones(n)) for one in zip(b, f, strict=True)]
+    np.testing.assert_allclose(found, np.reshape(alone, (7, n)), rtol=1e-12, atol=1e-12)
 
 
 def test_a_zero_far_off_is_counted_and_does_not_shrink_the_circle() -> None:
