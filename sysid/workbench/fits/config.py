@@ -90,6 +90,8 @@ class ExportConfig(BaseModel):
         tolerance: Largest difference allowed between a file and its model, in the output's unit.
         run_times: Whether every file is timed beside the model's own free run; some seconds a format.
         case: Of parameters that differ by case, the case whose values the files have; by default they are inputs.
+        unstable: Whether a fit whose free run is unstable (status ``UNSTABLE``) may leave. Without, ``best`` is the
+            best of the others, and nothing is exported where there is none.
     """
 
     model_config = STRICT
@@ -99,6 +101,7 @@ class ExportConfig(BaseModel):
     tolerance: float = Field(default=1e-9, gt=0.0)
     run_times: bool = False
     case: str | None = None
+    unstable: bool = True
 
 
 class ReportConfig(BaseModel):

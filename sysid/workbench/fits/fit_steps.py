@@ -128,9 +128,12 @@ class FitSteps:
             run.then(partial(self._announce, run, loaded, fitted, fit.name))
         asked = self.config.export.fit if self.config.export else "best"
         sizes = steps.output_sizes(loaded.value, self.config.mapping.outputs)
-        choice = self.chosen or steps.choose({name: one.pairs for name, one in fitted.items()}, asked, sizes)
+        pairs = {name: one.pairs for name, one in fitted.items()}
+        unstable = self.config.export is None or self.config.export.unstable
+        choice = self.chosen or steps.choose(pairs, asked, sizes, unstable=unstable)
         best = fitted[choice.name]
-        bundle = run.do(self._export(run, best, loaded)) if self.config.export else None
+        leaves = self.config.export is not None and not choice.withheld
+        bundle = run.do(self._export(run, best, loaded)) if leaves else None
         exports = () if bundle is None else bundle.value
         if bundle is not None:
             place, stored = run.store.path / "bundle", bundle.stored

@@ -21,6 +21,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.grey_box.by_case import for_case
+from sysid.estimation.result import Status
 from sysid.export.exporters import wanted_formats
 from sysid.models import AbstractStructure, Cascade
 from sysid.traces import Role
@@ -229,15 +230,21 @@ class Choice:
         name: The fit.
         chosen_by: By which figure, on which traces, as a sentence.
         cases_chose: Whether the cases that are scored took part in the choice.
+        withheld: Whether it may not be exported, being unstable.
     """
 
     name: str
     chosen_by: str
     cases_chose: bool = False
+    withheld: bool = False
 
 
 def choose(
-    fits: Mapping[str, Sequence[tuple[FitResult, Scores]]], asked: str, sizes: Sequence[float] = (1.0,)
+    fits: Mapping[str, Sequence[tuple[FitResult, Scores]]],
+    asked: str,
+    sizes: Sequence[float] = (1.0,),
+    *,
+    unstable: bool = True,
 ) -> Choice:
     """Choose the fit that is exported and put first in the report.
 
@@ -245,10 +252,23 @@ def choose(
         fits: By name of the fit, for each of its outputs the fit and its figures.
         asked: ``best``, or the name of a fit.
         sizes: For each output the squared error that counts as one.
+        unstable: Whether an unstable fit may be exported; else the best of the others is.
 
     Returns:
         The choice. Cases for validation have no say in it.
     """
+    if not unstable:
+        stable = {
+            name: pairs for name, pairs in fits.items() if all(fit.status is not Status.UNSTABLE for fit, _ in pairs)
+        }
+        found = choose(stable or fits, asked, sizes)
+        if found.name in stable:
+            left = ", ".join(name for name in fits if name not in stable)
+            only = f" Only stable fits may be exported; {left} is not." if left and asked == "best" else ""
+            return dataclasses.replace(found, chosen_by=found.chosen_by + only)
+        return dataclasses.replace(
+            found, withheld=True, chosen_by=f"{found.chosen_by} It is not exported: its free run is unstable."
+        )
     if asked != "best":
         return Choice(name=asked, chosen_by="Named in the pipeline.")
 

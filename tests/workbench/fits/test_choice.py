@@ -1,0 +1,31 @@
+"""Which fit is exported: the best on the traces that choose, and never an unstable one where that is asked for."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace as Fake
+
+import pytest
+
+from sysid.estimation.result import Status
+from sysid.workbench.fits.steps import choose
+
+FOUND = {
+    "good": [(Fake(status=Status.CONVERGED), Fake(selection_mse=2.0))],
+    "best": [(Fake(status=Status.UNSTABLE), Fake(selection_mse=1.0))],
+    "poor": [(Fake(status=Status.CONVERGED), Fake(selection_mse=3.0))],
+}
+
+
+def test_an_unstable_fit_may_be_the_best_unless_it_is_said() -> None:
+    assert choose(FOUND, "best").name == "best"
+    chosen = choose(FOUND, "best", unstable=False)
+    assert (chosen.name, chosen.withheld) == ("good", False)
+    assert "best is not" in chosen.chosen_by
+
+
+@pytest.mark.parametrize("asked", ["best", "lost"])
+def test_nothing_leaves_where_all_are_unstable_or_an_unstable_one_is_named(asked: str) -> None:
+    fits = {"lost": FOUND["best"]} if asked == "best" else {"lost": FOUND["best"], **FOUND}
+    chosen = choose(fits, asked, unstable=False)
+    assert (chosen.name, chosen.withheld) == ("lost", True)
+    assert "not exported: its free run is unstable" in chosen.chosen_by
