@@ -76,6 +76,11 @@ class BrakeValve:
         lap_band: Band about the command in which the listing stops a release (DPcEG).
         command_drop: Pipe above command that opens the listing's quick service (7000 in the text).
         empty_pipe: Absolute pipe pressure below which the listing stops a release (11E4 in the text).
+        first_fall: Of a distributor of graduated release: pipe below the control reservoir that applies; half of it
+            releases (ours: between the 0.3 bar in 60 s that must not apply and the 0.6 bar in 6 s that must).
+        full_fall: The same that gives all of ``cylinder_limit``; 1.5 bar.
+        cylinder_limit: Largest gauge pressure of its cylinder; 3.8 bar.
+        opening_band: What the cylinder is off by at which its choke is fully open, in proportion below (ours).
     """
 
     auxiliary_volume: float = 0.041
@@ -98,6 +103,10 @@ class BrakeValve:
     lap_band: float = 20_000.0
     command_drop: float = 7_000.0
     empty_pipe: float = 110_000.0
+    first_fall: float = 8_000.0
+    full_fall: float = 150_000.0
+    cylinder_limit: float = 380_000.0
+    opening_band: float = 10_000.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,6 +158,11 @@ class Consist:
         head: The locomotive's brake valve.
         valve: The wagon pair's brake valve.
         cylinder: The wagon pair's brake cylinder.
+        loads: Share of the valve's pressure that a cylinder gets, one for all pairs or one for each: 1 is loaded,
+            less is what an empty/load device leaves (AAR: a volume stands for what the cylinder does not take; UIC:
+            a relay).
+        retainers: Psi gauge that the retaining valve of a pair holds in its cylinder on a release, one for all or one
+            for each; 0 is direct exhaust, 20 the high-pressure position of freight cars.
 
     Raises:
         ConfigError: If a number is out of its range.
@@ -165,6 +179,8 @@ class Consist:
     head: HeadValve = field(default_factory=HeadValve)
     valve: BrakeValve = field(default_factory=BrakeValve)
     cylinder: Cylinder = field(default_factory=Cylinder)
+    loads: float | tuple[float, ...] = 1.0
+    retainers: float | tuple[float, ...] = 0.0
 
     def __post_init__(self) -> None:
         if not (isinstance(self.pairs, int) and self.pairs >= 1):
@@ -188,6 +204,26 @@ class Consist:
                 got=self.running_pressure,
                 remedy="give it in psi gauge",
             )
+        for name, low, high in (("loads", 0.2, 1.0), ("retainers", 0.0, 50.0)):
+            values = self._of_pairs(getattr(self, name))
+            if len(values) != self.pairs or not all(low <= value <= high for value in values):
+                raise ConfigError(
+                    f"{name} do not fit the train", where=name, got=getattr(self, name),
+                    expected=f"one number from {low:g} to {high:g}, or {self.pairs} of them, one for each pair",
+                )  # fmt: skip
+
+    def _of_pairs(self, given: float | tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(given) if isinstance(given, tuple | list) else (float(given),) * self.pairs
+
+    @property
+    def load_of_pairs(self) -> tuple[float, ...]:
+        """Share of the valve's pressure that each pair's cylinder gets."""
+        return self._of_pairs(self.loads)
+
+    @property
+    def retained_by_pairs(self) -> tuple[float, ...]:
+        """Psi gauge that each pair's retaining valve holds."""
+        return self._of_pairs(self.retainers)
 
     @property
     def vehicles(self) -> int:

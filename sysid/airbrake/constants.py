@@ -82,6 +82,12 @@ def kernel_constants(consist: Consist, variant: Variant, dt: float) -> kernel.Co
         speed_gates=variant.speed_gates,
         accelerated_service=variant.accelerated_service,
         accelerated_emergency=variant.accelerated_emergency,
+        accelerated_application=variant.accelerated_application,
+        graduated_release=variant.graduated_release,
+        first_fall=valve.first_fall,
+        fall_gain=valve.cylinder_limit / valve.full_fall,
+        cylinder_limit=valve.cylinder_limit,
+        opening_band=valve.opening_band,
     )
 
 

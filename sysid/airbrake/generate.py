@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any, Literal, TypeVar
 
@@ -10,10 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from sysid.airbrake.command import MAX_DURATION, Command
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.equipment import EQUIPMENT, Equipment
 from sysid.airbrake.machine import QUANTITIES, Probe
+from sysid.airbrake.radio import Radio
 from sysid.airbrake.sequences import RandomCommand
 from sysid.airbrake.simulate import AirBrakeRecord, simulate
-from sysid.airbrake.variant import VARIANTS, Variant
+from sysid.airbrake.variant import VARIANTS
 from sysid.errors import ConfigError
 from sysid.excitation import excite
 from sysid.traces import Channel, Trace
@@ -77,13 +80,25 @@ class _Recipe(BaseModel):
         return self
 
 
+class _Radio(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    delay: float = 1.0
+    loss: float = 0.0
+    repeat: float = 1.0
+    seed: int = Field(default=0, ge=0)
+
+
 class _Options(BaseModel):
     model_config = ConfigDict(extra="forbid")
-    variant: str = "physical"
+    variant: str | None = None
+    equipment: str | None = None
     switches: dict[str, bool | float | str | None] = Field(default_factory=dict)
     pairs: int = Field(default=50, ge=1, le=200)
     locomotives: tuple[int, ...] = ()
-    running_pressure: float = 90.0
+    loads: float | tuple[float, ...] = 1.0
+    retainers: float | tuple[float, ...] = 0.0
+    radio: _Radio | None = None
+    running_pressure: float | None = None
     speed: float = Field(default=1.0, ge=0)
     time_step: float = Field(default=1e-3, gt=0)
     node: int = 3
@@ -159,15 +174,27 @@ def _probe(channel: str, options: _Options) -> Probe | None:
     return Probe(quantity=pair[0], node=pair[1])
 
 
-def _variant(options: _Options) -> Variant:
-    if options.variant not in VARIANTS:
+def _equipment(options: _Options) -> Equipment:
+    """What stands at the cars: a row of its own, or a reading of the reference with the dissertation's valve."""
+    for name, given, rows in (
+        ("equipment", options.equipment, EQUIPMENT),
+        ("variant", options.variant, VARIANTS),
+    ):
+        if given is not None and given not in rows:
+            raise ConfigError(
+                f"unknown {name}", where=f"options, {name}", expected=f"one of {', '.join(rows)}", got=given
+            )
+    if options.equipment is not None and options.variant is not None:
         raise ConfigError(
-            "unknown variant",
-            where="options, variant",
-            expected=f"one of {', '.join(VARIANTS)}",
-            got=options.variant,
-        )
-    return VARIANTS[options.variant].with_options(options.switches)
+            "equipment and variant are both given", where="options",
+            expected="one of them: a row of equipment says how its valve works",
+            got=f"{options.equipment} and {options.variant}", remedy="leave variant out, and turn switches",
+        )  # fmt: skip
+    if options.equipment is not None:
+        row = EQUIPMENT[options.equipment]
+    else:
+        row = Equipment(variant=VARIANTS[options.variant or "physical"], about="as the variant has it")
+    return dataclasses.replace(row, variant=row.variant.with_options(options.switches))
 
 
 def _column(channel: Channel, probe: Probe | None, record: AirBrakeRecord) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -194,9 +221,12 @@ def generate(
             ``{random: {seed: 7, duration: 900, ...}}`` (limits: :class:`sysid.airbrake.sequences.RandomCommand`), or
             ``{excitation: {kind: ramps, seed: 7, duration: 900, low: 66, high: 90, options: {rise: 50}}}`` (a kind of
             :func:`sysid.excitation.excite`; from 66 psi to the running pressure by default).
-        options: ``variant``, ``switches`` (fields of :class:`sysid.airbrake.variant.Variant`), ``pairs``,
-            ``locomotives``, ``running_pressure`` in psi gauge, ``speed`` in m/s, ``time_step`` in s, ``node``, and
-            ``quantities``: what each channel is, ``command``, a quantity at ``node``, or ``{quantity: node}``.
+        options: ``variant`` or ``equipment`` (a row of :data:`sysid.airbrake.equipment.EQUIPMENT`), ``switches``
+            (fields of :class:`sysid.airbrake.variant.Variant`), ``pairs``, ``locomotives``, ``radio`` (how these hear
+            of the handle: :class:`sysid.airbrake.radio.Radio`), ``loads`` and ``retainers`` (one number or one a pair:
+            :class:`sysid.airbrake.consist.Consist`), ``running_pressure`` in psi gauge, ``speed`` in m/s, ``time_step``
+            in s, ``node``, and ``quantities``: what each channel is, ``command``, a quantity at ``node``, or
+            ``{quantity: node}``.
         channels: Channels wanted, in their units.
         sample_time: Seconds between samples; each is the mean over its time steps.
 
@@ -220,21 +250,29 @@ def generate(
     """
     recipe_ = _checked(_Recipe, recipe, f"the recipe of case {case}")
     options_ = _checked(_Options, options, "the options of the generator")
-    variant = _variant(options_)
+    equipment = _equipment(options_)
+    running = equipment.running_pressure if options_.running_pressure is None else options_.running_pressure
     consist = Consist(
-        pairs=options_.pairs, locomotives=options_.locomotives, running_pressure=options_.running_pressure
+        pairs=options_.pairs,
+        locomotives=options_.locomotives,
+        running_pressure=running,
+        valve=equipment.valve,
+        loads=options_.loads,
+        retainers=options_.retainers,
     )
     probes = [_probe(channel.name, options_) for channel in channels]
     record = simulate(
-        _command(recipe_, options_.running_pressure, sample_time),
+        _command(recipe_, running, sample_time),
         consist=consist,
-        variant=variant,
+        variant=equipment.variant,
         probes=tuple(dict.fromkeys(probe for probe in probes if probe is not None)),
         time_step=options_.time_step,
         sample_time=sample_time,
         speed=options_.speed,
+        radio=None if options_.radio is None else Radio(**options_.radio.model_dump()),
     )
     columns = [_column(channel, probe, record) for channel, probe in zip(channels, probes, strict=True)]
+    kind = f"equipment {options_.equipment}" if options_.equipment else f"variant {options_.variant or 'physical'}"
     switches = "".join(f", {name}={value}" for name, value in options_.switches.items())
     return Trace(
         name=case,
@@ -242,8 +280,7 @@ def generate(
         channels=channels,
         values=np.column_stack(columns),
         provenance=(
-            f"simulated: variant {options_.variant}{switches}, {consist.vehicles} vehicles, "
-            f"step {options_.time_step:g} s",
+            f"simulated: {kind}{switches}, {consist.vehicles} vehicles, step {options_.time_step:g} s",
             f"each sample is the mean over its {round(sample_time / options_.time_step)} steps",
         ),
     )

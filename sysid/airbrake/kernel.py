@@ -76,6 +76,12 @@ class Constants(NamedTuple):
     speed_gates: bool
     accelerated_service: bool
     accelerated_emergency: bool
+    accelerated_application: bool
+    graduated_release: bool
+    first_fall: float  # of a distributor: pipe under the control reservoir that applies
+    fall_gain: float  # cylinder Pa per Pa of fall
+    cylinder_limit: float  # Pa gauge
+    opening_band: float  # cylinder off what is wanted that opens the choke fully
 
 
 class Table(NamedTuple):
@@ -102,10 +108,11 @@ class State(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Where the valves and the further locomotives sit: node indices from 0."""
+    """Where the valves and the further locomotives sit: node indices from 0; what each valve's retainer holds."""
 
     valve_nodes: Integers
     port_nodes: Integers
+    retained: Array  # Pa absolute under which no cylinder is emptied; 0 without a retainer
 
 
 class Work(NamedTuple):
@@ -119,6 +126,7 @@ class Drive(NamedTuple):
     """What is done to the train, one value per output sample."""
 
     command: Array  # Pa absolute
+    remote: Array  # the same as the further locomotives have it
     speed: Array  # m/s
     tail_area: Array  # m2 open to the atmosphere behind the last vehicle
 
@@ -178,7 +186,7 @@ def _vent(p, pc, ps, emergency, command, moving, c, values, slopes):
     if emergency:
         return _flow(c.emergency_vent, p, c.atmosphere, values, slopes) if moving else 0.0
     if c.quick_service == 2:
-        if ps - p >= 2.0 * c.service_drop and pc < c.quick_service_pressure:
+        if ps - p >= 2.0 * c.service_drop and (c.accelerated_application or pc < c.quick_service_pressure):
             return _flow(c.quick_service_area, p, c.atmosphere, values, slopes)
         return 0.0
     if p <= c.atmosphere and command < c.running and moving:
@@ -223,8 +231,37 @@ def _cylinder_pressure(content, c):
 
 
 @numba.njit(error_model="numpy", forceinline=True, _nrt=False)
-def _valve(j, p, before, command, moving, x, content, releasing, tripped, nodes, valves, c, values, slopes):
+def _distributor(j, p, x, content, releasing, retained, nodes, valves, c, values, slopes):
+    """Advance distributor j of graduated release; returns what a valve does."""
+    at_a, at_c, at_s = nodes + j, nodes + 2 * valves + j, nodes + 3 * valves + j
+    pa, pc, ps = x[at_a], x[at_c], x[at_s]
+    fall = ps - p
+    if fall > c.first_fall:
+        releasing[j] = False
+    elif fall < 0.5 * c.first_fall:
+        releasing[j] = True
+    wanted = c.atmosphere if releasing[j] else c.atmosphere + min(c.cylinder_limit, max(0.0, c.fall_gain * fall))
+    to_s = _flow(c.charge_action, p, ps, values, slopes) if releasing[j] else 0.0
+    to_a = _charge(c.charge_auxiliary, p, pa, c, values, slopes) if p > pa else 0.0
+    vent = 0.0
+    if not releasing[j] and pc < c.quick_service_pressure and p > c.atmosphere:
+        vent = _flow(c.quick_service_area, p, c.atmosphere, values, slopes)
+    opening = min(1.0, max(0.0, (wanted - pc) / c.opening_band))
+    from_a = _flow(opening * c.apply, pa, pc, values, slopes)
+    closing = min(1.0, max(0.0, (pc - wanted) / c.opening_band)) if pc > retained else 0.0
+    exhaust = _flow(closing * c.release, pc, c.atmosphere, values, slopes)
+    x[at_a] = pa + c.per_auxiliary * (to_a - from_a)
+    x[at_s] = ps + c.per_action * to_s
+    content[j] += c.gas_step * (from_a - exhaust)
+    x[at_c] = _cylinder_pressure(content[j], c)
+    return -to_a - to_s - vent, vent + exhaust
+
+
+@numba.njit(error_model="numpy", forceinline=True, _nrt=False)
+def _valve(j, p, before, command, moving, x, content, releasing, tripped, retained, nodes, valves, c, values, slopes):
     """Advance valve j; returns (flow into the pipe, flow to the atmosphere other than from the pipe vent)."""
+    if c.graduated_release:
+        return _distributor(j, p, x, content, releasing, retained, nodes, valves, c, values, slopes)
     at_a, at_e = nodes + j, nodes + valves + j
     at_c, at_s = at_e + valves, at_e + 2 * valves
     pa, pe, pc, ps = x[at_a], x[at_e], x[at_c], x[at_s]
@@ -249,7 +286,7 @@ def _valve(j, p, before, command, moving, x, content, releasing, tripped, nodes,
         bleed = _flow(c.bleed_action, ps, c.atmosphere, values, slopes)
     vent = _vent(p, pc, ps, emergency, command, moving, c, values, slopes)
     opened = _cylinder_open(p, before, releasing[j], command, moving, c)
-    exhaust = _flow(c.release, pc, c.atmosphere, values, slopes) if opened else 0.0
+    exhaust = _flow(c.release, pc, c.atmosphere, values, slopes) if opened and pc > retained else 0.0
     if c.exhaust_as_printed:
         exhaust = abs(exhaust)
     back_to_pipe = 0.0
@@ -325,8 +362,8 @@ def _leaks(x, net, c, values, slopes):
 
 @numba.njit(error_model="numpy", forceinline=True, _nrt=False)
 def _step(
-    command, moving, tail_area, x, content, port, releasing, tripped, history, cursor,
-    valve_nodes, port_nodes, flows, net, c, values, slopes,
+    command, remote, moving, tail_area, x, content, port, releasing, tripped, history, cursor,
+    valve_nodes, port_nodes, retained, flows, net, c, values, slopes,
 ):  # fmt: skip
     """Advance everything by one step; returns the mass flow into the train in kg/s."""
     nodes, valves = len(flows), len(valve_nodes)
@@ -340,7 +377,7 @@ def _step(
         net[i] = flows[i - 1] - flows[i]
     if c.leak_area > 0.0:
         gained -= _leaks(x, net, c, values, slopes)
-    gained += _ports(x, port, port_nodes, net, command, moving, c, values, slopes)
+    gained += _ports(x, port, port_nodes, net, remote, moving, c, values, slopes)
     row = cursor[0]
     for j in range(valves):
         at = valve_nodes[j]
@@ -350,7 +387,7 @@ def _step(
             before = history[row, j]
             history[row, j] = p
         inflow, lost = _valve(
-            j, p, before, command, moving, x, content, releasing, tripped, nodes, valves, c, values, slopes
+            j, p, before, command, moving, x, content, releasing, tripped, retained[j], nodes, valves, c, values, slopes
         )
         net[at] += inflow
         gained -= lost
@@ -394,8 +431,9 @@ def advance(
     # every opening and call, which took nine tenths of the run time. Hence no array is made in here.
     x, content, port, history, cursor = state.pressures, state.content, state.port, state.history, state.cursor
     releasing, tripped = state.releasing, state.tripped
-    valve_nodes, port_nodes, values, slopes = layout.valve_nodes, layout.port_nodes, table.values, table.slopes
-    commands, speeds, tail_areas = drive.command, drive.speed, drive.tail_area
+    valve_nodes, port_nodes, retained = layout.valve_nodes, layout.port_nodes, layout.retained
+    values, slopes = table.values, table.slopes
+    commands, remotes, speeds, tail_areas = drive.command, drive.remote, drive.speed, drive.tail_area
     flows, net, sums = state.flows, work.net, work.sums
     gained = 0.0
     for k in range(len(commands)):
@@ -404,8 +442,8 @@ def advance(
         moving = speeds[k] > 0.01 or not c.speed_gates
         for _ in range(steps):
             gained += _step(
-                commands[k], moving, tail_areas[k], x, content, port, releasing, tripped, history, cursor,
-                valve_nodes, port_nodes, flows, net, c, values, slopes,
+                commands[k], remotes[k], moving, tail_areas[k], x, content, port, releasing, tripped, history, cursor,
+                valve_nodes, port_nodes, retained, flows, net, c, values, slopes,
             )  # fmt: skip
             for w in range(len(watch)):
                 sums[w] += x[watch[w]]

@@ -215,7 +215,15 @@ class BrakedTrain:
         self._layout = kernel.Layout(
             valve_nodes=np.array(consist.valve_nodes, dtype=np.int64) - 1,
             port_nodes=np.array(consist.port_nodes, dtype=np.int64) - 1,
+            retained=np.array(
+                [psi * PSI_IN_PA + STANDARD_ATMOSPHERE_PA if psi else 0.0 for psi in consist.retained_by_pairs]
+            ),
         )
+        shares = [
+            consist.load_of_pairs[consist.valve_nodes.index(p.node)] if p.quantity == "cylinder" else 1.0
+            for p in probes
+        ]
+        self._shares = None if all(share == 1.0 for share in shares) else np.array(shares)
         nodes = consist.vehicles
         self._work = kernel.Work(net=np.zeros(nodes), sums=np.zeros(len(probes)))
 
@@ -230,6 +238,7 @@ class BrakedTrain:
         *,
         speed: NDArray[np.float64] | float = 1.0,
         tail_vent: NDArray[np.float64] | float = 0.0,
+        remote: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
         """Advance by as many samples as there are commands.
 
@@ -237,6 +246,7 @@ class BrakedTrain:
             command: Handle in psi gauge at each sample, shape ``(n,)``, not above the running pressure.
             speed: Speed in m/s, one number or one per sample.
             tail_vent: Area in m2 open behind the last vehicle, one number or one per sample.
+            remote: What the further locomotives have heard of the handle, shape ``(n,)``; the handle itself by default.
 
         Returns:
             Pressures in Pa absolute, averaged over each sample, shape ``(n, n_probes)``.
@@ -245,7 +255,8 @@ class BrakedTrain:
             ConfigError: If the command exceeds the running pressure, or the shapes do not fit.
         """
         handle = _per_sample(command, len(command), "command")
-        if handle.max(initial=0.0) > self.consist.running_pressure:
+        heard = handle if remote is None else _per_sample(remote, len(handle), "remote")
+        if max(handle.max(initial=0.0), heard.max(initial=0.0)) > self.consist.running_pressure:
             raise ConfigError(
                 "the command exceeds the running pressure",
                 where="command",
@@ -255,6 +266,7 @@ class BrakedTrain:
             )
         drive = kernel.Drive(
             command=handle * PSI_IN_PA + STANDARD_ATMOSPHERE_PA,
+            remote=heard * PSI_IN_PA + STANDARD_ATMOSPHERE_PA,
             speed=_per_sample(speed, len(handle), "speed"),
             tail_area=_per_sample(tail_vent, len(handle), "tail_vent"),
         )
@@ -262,4 +274,6 @@ class BrakedTrain:
         self.gained += kernel.advance(
             self.state, self._layout, drive, self._steps, self._watch, output, self._constants, self._table, self._work
         )
+        if self._shares is not None:
+            output = STANDARD_ATMOSPHERE_PA + self._shares * (output - STANDARD_ATMOSPHERE_PA)
         return output

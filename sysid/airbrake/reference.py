@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from sysid.airbrake.consist import TEMPERATURE, Consist
 from sysid.airbrake.flow import GAS_CONSTANT, HEAT_RATIO, FlowTable
 from sysid.airbrake.variant import QuickService, Variant
+from sysid.units import PSI_IN_PA
 from sysid.units import STANDARD_ATMOSPHERE_PA as PATM
 
 
@@ -25,6 +26,7 @@ class PlainPair:
         self.content = 0.0 if variant.piston else PATM * consist.cylinder.volume
         self.releasing = variant.latched_release
         self.tripped = False
+        self.retained = 0.0
         self.past = [consist.charged] * max(1, round(variant.rising_delay / time_step))
 
 
@@ -45,6 +47,8 @@ class PlainTrain:
         self.between = [0.0] * (consist.vehicles - 2)
         self.port = [consist.charged] * len(consist.port_nodes)
         self.pairs = [PlainPair(consist, variant, time_step) for _ in range(consist.pairs)]
+        for pair, psi in zip(self.pairs, consist.retained_by_pairs, strict=True):
+            pair.retained = psi * PSI_IN_PA + PATM if psi else 0.0
 
     def _coefficient(self, low: float, high: float) -> float:
         position = math.sqrt(1.0 - low / high) * (len(self._values) - 1)
@@ -98,15 +102,17 @@ class PlainTrain:
             return command
         return max(command, held - rate * self.time_step)
 
-    def step(self, command: float, *, speed: float = 1.0, tail_area: float = 0.0) -> None:
+    def step(self, command: float, *, speed: float = 1.0, tail_area: float = 0.0, remote: float | None = None) -> None:
         """Advance by one step.
 
         Args:
             command: Handle in Pa absolute.
             speed: Speed in m/s.
             tail_area: Area in m2 open behind the last vehicle.
+            remote: The handle as the further locomotives have it; the same by default.
         """
         consist, pipe = self.consist, list(self.pipe)
+        heard = command if remote is None else remote
         moving = speed > 0.01 or not self.variant.speed_gates
         self.between = [
             self._between(m, p, q) for m, (p, q) in zip(self.between, itertools.pairwise(pipe[1:]), strict=True)
@@ -116,11 +122,14 @@ class PlainTrain:
         net = [net[0], *(n - self._leak(p) for n, p in zip(net[1:], pipe[1:], strict=True))]
         for index, node in enumerate(consist.port_nodes):
             local = pipe[node - 1]
-            net[node - 1] += self._head(self.port[index], local, command)
+            net[node - 1] += self._head(self.port[index], local, heard)
             behind = pipe[node] if node < len(pipe) and self.variant.relay_band is None else local
-            self.port[index] = self._held(self.port[index], behind, command, moving)
+            self.port[index] = self._held(self.port[index], behind, heard, moving)
         for pair, node in zip(self.pairs, consist.valve_nodes, strict=True):
-            net[node - 1] += self._pair(pair, pipe[node - 1], command, moving)
+            if self.variant.graduated_release:
+                net[node - 1] += self._distributor(pair, pipe[node - 1])
+            else:
+                net[node - 1] += self._pair(pair, pipe[node - 1], command, moving)
         per_pipe = GAS_CONSTANT * TEMPERATURE * self.time_step / consist.pipe.volume
         self.pipe = [p + per_pipe * n for p, n in zip(pipe, net, strict=True)]
         self.pipe[0] = self._held(pipe[0], pipe[1], command, moving)
@@ -141,7 +150,7 @@ class PlainTrain:
         m_sa = self._flow(q.bleed_action, ps, PATM) if bleeds else 0.0
         m_v = self._vent(pair, p3, command, moving, emergency)
         opened = self._opened(pair, p3, command, moving)
-        m_x = self._flow(q.release, pc, PATM) if opened else 0.0
+        m_x = self._flow(q.release, pc, PATM) if opened and pc > pair.retained else 0.0
         m_x = abs(m_x) if v.exhaust_as_printed else m_x
         m_r = self._flow(q.accelerate_service, pe, p3) if released and pe >= p3 and v.accelerated_service else 0.0
         after = pair.tripped and not emergency
@@ -157,6 +166,31 @@ class PlainTrain:
         pair.content += rt * (m_ac + m_ec - m_x - m_cb)
         pair.cylinder = self._cylinder_pressure(pair.content)
         return m_r + m_cb - m_a - m_e - m_s - m_v
+
+    def _distributor(self, pair: PlainPair, p3: float) -> float:
+        """Advance one distributor of graduated release; returns the flow into the pipe."""
+        q, control = self.consist.valve, pair.action
+        fall = control - p3
+        if fall > q.first_fall:
+            pair.releasing = False
+        elif fall < q.first_fall / 2:
+            pair.releasing = True
+        asked = 0.0 if pair.releasing else min(q.cylinder_limit, max(0.0, q.cylinder_limit * fall / q.full_fall))
+        off = asked + PATM - pair.cylinder
+        m_s = self._flow(q.charge_action, p3, control) if pair.releasing else 0.0
+        m_a = self._charging(q.charge_auxiliary, p3, pair.auxiliary) if p3 > pair.auxiliary else 0.0
+        first = not pair.releasing and pair.cylinder < PATM + self.variant.quick_service_limit
+        m_v = self._flow(q.quick_service, p3, PATM) if first and p3 > PATM else 0.0
+        m_ac = self._flow(q.apply * min(1.0, max(0.0, off / q.opening_band)), pair.auxiliary, pair.cylinder)
+        m_x = 0.0
+        if pair.cylinder > pair.retained:
+            m_x = self._flow(q.release * min(1.0, max(0.0, -off / q.opening_band)), pair.cylinder, PATM)
+        rt = GAS_CONSTANT * TEMPERATURE * self.time_step
+        pair.auxiliary += rt / q.auxiliary_volume * (m_a - m_ac)
+        pair.action += rt / q.action_volume * m_s
+        pair.content += rt * (m_ac - m_x)
+        pair.cylinder = self._cylinder_pressure(pair.content)
+        return -m_a - m_s - m_v
 
     def _remember(self, pair: PlainPair, p3: float, emergency: bool) -> None:
         valve = self.consist.valve
@@ -181,7 +215,8 @@ class PlainTrain:
             area = valve.emergency_vent if moving else 0.0
         elif v.quick_service is QuickService.LOCAL:
             falling = pair.action - p3 >= 2.0 * valve.service_drop
-            area = valve.quick_service if falling and pair.cylinder < PATM + v.quick_service_limit else 0.0
+            limited = pair.cylinder >= PATM + v.quick_service_limit and not v.accelerated_application
+            area = valve.quick_service if falling and not limited else 0.0
         elif p3 <= PATM and command < self.consist.charged and moving:
             area = valve.emergency_vent
         elif v.quick_service is QuickService.COMMAND and p3 - command > valve.command_drop and moving:

@@ -11,6 +11,7 @@ from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.flow import FlowTable
 from sysid.airbrake.machine import BrakedTrain, Probe, all_probes
+from sysid.airbrake.radio import Radio
 from sysid.airbrake.variant import PHYSICAL, Variant
 from sysid.errors import ConfigError
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
@@ -73,6 +74,7 @@ def simulate(
     speed: NDArray[np.float64] | float = 1.0,
     tail_vent: NDArray[np.float64] | float = 0.0,
     table: FlowTable | None = None,
+    radio: Radio | None = None,
 ) -> AirBrakeRecord:
     """Simulate the air brake of a train that starts charged, with empty cylinders.
 
@@ -87,6 +89,7 @@ def simulate(
         tail_vent: Area in m2 open to the atmosphere behind the last vehicle (an end-of-train valve), one number
             or one per sample.
         table: Flow table in place of the formula's.
+        radio: How the further locomotives hear of the handle; at once by default.
 
     Returns:
         The record.
@@ -108,7 +111,8 @@ def simulate(
     )
     handle = command.sampled(sample_time=sample_time)
     before = train.stored
-    pressures = train.advance(handle, speed=speed, tail_vent=tail_vent)
+    remote = None if radio is None else radio.heard(handle, sample_time)
+    pressures = train.advance(handle, speed=speed, tail_vent=tail_vent, remote=remote)
     return AirBrakeRecord(
         sample_time=sample_time,
         probes=probes,

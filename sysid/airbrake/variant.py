@@ -80,6 +80,13 @@ class Variant:
         speed_gates: A train at rest vents nothing, releases its brakes and is recharged, as printed.
         accelerated_service: Emergency reservoir to pipe on a service release (ABD and later; not AB).
         accelerated_emergency: Cylinder to pipe on a release after an emergency (ABD and later; not AB).
+        accelerated_application: The local vent goes on for as long as the pipe falls at a service rate, also when the
+            cylinder has its limit: the accelerated application valve of ABDW, which ABDX has built in.
+        graduated_release: A distributor of UIC leaflet 540 in place of the AB family's valve: the cylinder follows
+            what the pipe has fallen below a control reservoir, down as well as up (``first_fall``, ``full_fall`` and
+            ``cylinder_limit`` of :class:`~sysid.airbrake.consist.BrakeValve`; the chamber ``action`` is the control
+            reservoir, ``auxiliary`` the supply reservoir behind a check valve, ``emergency`` is not used). An
+            emergency is a full application. Needs ``laminar_ratio``.
 
     Raises:
         ConfigError: If a field needs another that is not set, or a number is out of range.
@@ -105,6 +112,8 @@ class Variant:
     speed_gates: bool = True
     accelerated_service: bool = True
     accelerated_emergency: bool = True
+    accelerated_application: bool = False
+    graduated_release: bool = False
 
     def __post_init__(self) -> None:
         needs = {
@@ -112,6 +121,7 @@ class Variant:
             "graduating_lap": "latched_release",
             "equalising_rate": "relay_band",
             "pipe_momentum": "laminar_ratio",
+            "graduated_release": "laminar_ratio",
         }
         for name, other in needs.items():
             if getattr(self, name) and not getattr(self, other):

@@ -57,6 +57,17 @@ def test_switches_reach_the_physics() -> None:
     assert "piston=True" in mended.provenance[0]
 
 
+def test_equipment_brings_its_valve_and_its_running_pressure() -> None:
+    uic = SMALL | {"equipment": "uic-p", "loads": 0.5, "locomotives": [2]}
+    command = {"command": [[0, 72.5], [20, 40], [300, 40]], "time_unit": "ds"}
+    trace = made(recipe=command, options=uic)
+    assert trace["BP"][0] == pytest.approx(72.52, abs=0.02)  # 5 bar
+    assert trace["BC"][-1] == pytest.approx(0.5 * 55.114, abs=0.5)  # 3.8 bar
+    assert "equipment uic-p" in trace.provenance[0]
+    late = made(recipe=command, options=uic | {"radio": {"delay": 5.0}})
+    assert late["BP"][60] > trace["BP"][60] + 1.0
+
+
 def test_a_random_recipe_repeats_from_its_seed() -> None:
     recipe = {"random": {"seed": 3, "duration": 60.0, "emergency": 0.5}}
     assert made(recipe=recipe).digest == made(recipe=recipe).digest
@@ -84,6 +95,9 @@ def test_an_excitation_moves_the_handle(kind: str) -> None:
         ({"recipe": {"random": {"seed": 1, "duration": 9.0, "steps": 0}}}, ConfigError, "steps is out of range"),
         ({"options": {"pairs": 0}}, ConfigError, "options of the generator, pairs"),
         ({"options": {"variant": "real"}}, ConfigError, "unknown variant"),
+        ({"options": {"equipment": "kunze-knorr"}}, ConfigError, "unknown equipment"),
+        ({"options": {"equipment": "abd", "variant": "listing"}}, ConfigError, "both given"),
+        ({"options": {"radio": {"loss": 2.0}}}, ConfigError, "not a radio"),
         ({"options": {"switches": {"pistons": True}}}, ConfigError, "unknown switch pistons"),
         ({"options": {"node": 4}}, ConfigError, "no auxiliary pressure at node 4"),
         ({"options": {"quantities": {"BP": "steam"}}}, ConfigError, "unknown quantity"),

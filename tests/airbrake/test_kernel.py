@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.equipment import EQUIPMENT
 from sysid.airbrake.flow import flow_table
 from sysid.airbrake.machine import BrakedTrain, all_probes
 from sysid.airbrake.reference import PlainTrain
@@ -18,6 +19,7 @@ TRAINS = {
     "three pairs": Consist(pairs=3),
     "locomotive inside": Consist(pairs=3, locomotives=(1,)),
     "locomotive last": Consist(pairs=2, locomotives=(2,)),
+    "retainers": Consist(pairs=2, retainers=(20.0, 0.0)),
 }
 
 
@@ -39,6 +41,8 @@ def single_switches() -> dict[str, Variant]:
     variants["listing, exhaust as printed"] = LISTING.with_options({"exhaust_as_printed": True})
     for name in ("accelerated_service", "accelerated_emergency"):
         variants[f"physical, no {name}"] = PHYSICAL.with_options({name: False})
+    variants["physical, accelerated application"] = PHYSICAL.with_options({"accelerated_application": True})
+    variants["distributor of UIC 540"] = EQUIPMENT["uic-p"].variant
     return variants
 
 
@@ -102,8 +106,10 @@ def test_single_steps_from_random_states_agree_with_the_plain_step(consist: Cons
         randomise(compiled, plain, rng)
         command = float(rng.choice([0.0, 64.2, rng.uniform(50.0, 90.0), 90.0]))
         speed, tail = float(rng.choice([0.0, 5.0])), float(rng.choice([0.0, 2e-4]))
-        compiled.advance(np.array([command]), speed=speed, tail_vent=tail)
-        plain.step(command * PSI_IN_PA + STANDARD_ATMOSPHERE_PA, speed=speed, tail_area=tail)
+        heard = float(rng.choice([command, 0.0, 80.0]))
+        compiled.advance(np.array([command]), speed=speed, tail_vent=tail, remote=np.array([heard]))
+        absolute, remote = (psi * PSI_IN_PA + STANDARD_ATMOSPHERE_PA for psi in (command, heard))
+        plain.step(absolute, speed=speed, tail_area=tail, remote=remote)
         np.testing.assert_allclose(compiled.state.pressures, plain_pressures(plain), rtol=1e-12, atol=0.0)
         np.testing.assert_allclose(compiled.state.port, plain.port, rtol=1e-15, atol=0.0)
         assert compiled.state.releasing.tolist() == [pair.releasing for pair in plain.pairs]
