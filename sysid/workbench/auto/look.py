@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -77,14 +78,15 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
     known = _set(data, data.estimation, data.selection)
     found = advise(known, mapping)
     advice = list(found.outputs.values()) if isinstance(found, SystemAdvice) else [found]
+    ends = at_ends(data.estimation, mapping)
     return Looked(
         n_inputs=len(mapping.inputs),
         n_outputs=len(mapping.outputs),
         orders=_orders(data, mapping, start),
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(one.structure for one in advice[0].suggestions) if len(advice) == 1 else (),
-        cautions=tuple(_cautions(advice)),
-        ends=all(at_ends(data.estimation, mapping).values()),
+        cautions=(*_cautions(advice), *_held_apart(ends)),
+        ends=all(ends.values()),
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
     )
 
@@ -151,6 +153,17 @@ def _orders(data: Data, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
         return ()  # too short for any: what is tried then says so itself
     structures = [one.fit.model.structure for one in found.finalists if np.isfinite(one.mean_fit)]
     return tuple(replace(one) for one in structures if isinstance(one, ARX))[:ARX_TRIED]
+
+
+def _held_apart(ends: Dict[str, bool]) -> list[str]:
+    """Outputs at ends beside others that are at none: nothing that is tried for all of them is held there."""
+    some = [name for name, stands in ends.items() if stands]
+    if not some or len(some) == len(ends):
+        return []
+    return [
+        f"{', '.join(some)} stands at an end while an input moves on, and nothing that is tried for all outputs "
+        f"together is held there. Search it by itself, without {', '.join(name for name in ends if name not in some)}."
+    ]
 
 
 def _cautions(advice: Sequence[Advice]) -> list[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from operator import attrgetter
 from statistics import median_high
 from typing import Any
 
@@ -143,17 +142,19 @@ class Plan:
             yield finals
 
     def _search(self) -> Iterator[list[Try]]:
-        # In motion, what begins at rest is far off, however large: what learns where it begins comes first. At ends it
-        # is what runs on through them.
-        for told, first in (
-            (self.looked.in_motion, attrgetter("in_motion")),
-            (self.looked.ends, attrgetter("at_ends")),
-        ):
-            if told:
-                self.budget.unlimited = 1
-                nonlinear_first = sorted(self.families, key=lambda family: family.linear)
-                yield from self._rounds_of([one for family in nonlinear_first for one in first(family)(self.looked)])
-                yield from self._near_the_best()
+        nonlinear_first = sorted(self.families, key=lambda family: family.linear)
+        # In motion, what begins at rest is far off, however large: what learns where it begins comes first.
+        if self.looked.in_motion:
+            self.budget.unlimited = 1
+            yield from self._rounds_of([one for family in nonlinear_first for one in family.in_motion(self.looked)])
+            yield from self._near_the_best()
+        # At ends it is what runs on through them; that a curve levels off there the least of each other kind shows.
+        if self.looked.ends:
+            self.budget.unlimited = 1
+            yield from self._rounds_of([one for family in nonlinear_first for one in family.at_ends(self.looked)])
+            for linear in (True, False):
+                yield from self._rounds_of(self._least(linear=linear))
+            yield from self._near_the_best()
         yield from self._unasked(linear=True)
         self.budget.unlimited = 1  # on a slow machine linear models alone would have taken all
         yield from self._unasked(linear=False)
@@ -178,14 +179,17 @@ class Plan:
         Args:
             linear: Linear structures, which leave time for the others; or those.
         """
-        wanted = self._first(linear=linear)
-        least: dict[str, Try] = {}
+        yield from self._rounds_of(self._least(linear=linear))
+        self.budget.most = LINEAR if linear else 1.0
+        yield from self._rounds_of(self._first(linear=linear))
+        self.budget.most = 1.0
+
+    def _least(self, *, linear: bool) -> list[Try]:
+        """The least of each kind."""
+        wanted, least = self._first(linear=linear), dict[str, Try]()
         for one in sorted(wanted, key=lambda one: size_of(one.structure)):
             least.setdefault(one.structure.kind, one)
-        yield from self._rounds_of([one for one in wanted if least[one.structure.kind] is one])
-        self.budget.most = LINEAR if linear else 1.0
-        yield from self._rounds_of(wanted)
-        self.budget.most = 1.0
+        return [one for one in wanted if least[one.structure.kind] is one]
 
     def _first(self, *, linear: bool) -> list[Try]:
         """What is tried unasked."""
