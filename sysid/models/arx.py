@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.base import AbstractStructure
 from sysid.models.lags import MOST, Lagged, Lags, per_input, whole
+from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
+from sysid.models.realisation import observer_row
 from sysid.models.recursion import Recursion
 from sysid.models.scaling import Scaling
-from sysid.models.to_control import Matrices, in_powers_of_z, transfer_function
+from sysid.models.to_control import Matrices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +84,7 @@ class ARX(AbstractStructure):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ARXModel(AbstractModel):
+class ARXModel(LinearForms):
     r"""A fitted ARX model, in the channels' units.
 
     :math:`\hat y_t = d + \sum_i a_i y_{t-i} + \sum_j \sum_i b_{j,i} u_{j,t-n_{k,j}-i}`. Note the sign: MATLAB's
@@ -173,39 +175,13 @@ class ARXModel(AbstractModel):
             lags=self.orders.lags, neurons=0, theta=theta, scaling=Scaling.identity(len(self.mapping.inputs))
         )
 
-    def to_control(self) -> Any:
-        """The model as a ``control.TransferFunction``, from deviations of the inputs to deviations of the output.
-
-        Returns:
-            One row of transfer functions, one column per input; see :mod:`sysid.models.to_control` for a state space.
-        """
-        F = np.concatenate([[1.0], -self.a])
-        B = [
-            np.concatenate([np.zeros(nk), b, [0.0] * (not len(b))])
-            for b, nk in zip(self.b, self.orders.nk, strict=True)
-        ]
-        return transfer_function([in_powers_of_z(b, F) for b in B], self.mapping, self.sample_time)
-
     @property
     def matrices(self) -> Matrices:
-        """A state space of it: delay lines of the output and of each input as a state, newest first."""
-        lags = self.orders.lags
-        lengths = [len(lags.output), *(max(per, default=0) for per in lags.inputs)]
-        first = np.concatenate([[0], np.cumsum(lengths)])
-        n, m = int(first[-1]), lags.n_inputs
-        C, D = np.zeros((1, n)), np.zeros((1, m))
-        C[0, : lengths[0]] = self.a
-        for j, (per, b) in enumerate(zip(lags.inputs, self.b, strict=True)):
-            for lag, weight in zip(per, b.tolist(), strict=True):
-                if lag == 0:
-                    D[0, j] = weight
-                else:
-                    C[0, first[1 + j] + lag - 1] = weight
-        A, B = np.eye(n, k=-1), np.zeros((n, m))
-        for j, (at, length) in enumerate(zip(first[:-1], lengths, strict=True)):
-            if length:
-                A[at] = C[0] if j == 0 else 0.0
-                B[at] = D[0] if j == 0 else np.eye(m)[j - 1]
+        """A state space of it, in observer form: as many states as its longest lag."""
+        ups = {
+            j: np.concatenate([np.zeros(nk), b]) for j, (nk, b) in enumerate(zip(self.orders.nk, self.b, strict=True))
+        }
+        A, B, C, D = observer_row([(np.concatenate([[1.0], -self.a]), ups)], len(ups))
         return A, B, C, D
 
     def to_dict(self) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
 from sysid.models.history import known_inputs
+from sysid.models.to_control import of_wired
 from sysid.models.wiring import Member, Wiring
 from sysid.traces import Trace
 
@@ -186,6 +187,25 @@ class Cascade:
         there = {name: level for name, level in self.rest.items() if name in channels}
         rest = {name: level for name, level in there.items() if not isinstance(level, str) or level in channels}
         return Cascade(models=models, rest=rest, limits=limits)
+
+    def to_control(self) -> Any:
+        """Linear members as one object of python-control, from deviations of the inputs to deviations of every output.
+
+        Returns:
+            A ``control.StateSpace`` in the channels' units, dead times among its states.
+
+        Raises:
+            ConfigError: If a member is not linear, or an output has limits.
+        """
+        if self.limits:
+            raise ConfigError(
+                "a cascade with limits is not linear",
+                where=", ".join(self.limits),
+                expected="no limits",
+                got=f"limits of {len(self.limits)} outputs",
+                remedy="convert the members one by one: cascade.member(NAME).to_control()",
+            )
+        return of_wired(self.models, self.inputs, self.outputs, self.sample_time)
 
     @cached_property
     def stages(self) -> tuple[CompiledStage | ModelStage, ...]:

@@ -15,6 +15,7 @@ from scipy import linalg
 
 from sysid.errors import ConfigError
 from sysid.models.continuous import rates
+from sysid.models.realisation import Ratios, observer_row
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,10 @@ def d2c(system: Any) -> Any:
 
     _check_time(system, discrete=True)
     given = state_space(system)
-    remedy = "take a dead time out of the model first, or fit a continuous transfer function"
+    remedy = (
+        "take model.continuous(), of a cascade that of each member, which keeps dead times beside the system; where "
+        "that is refused too, fit fewer coefficients, or a transfer function with domain: continuous"
+    )
     A, B = rates(given.A, given.B, given.dt, remedy=remedy)
     return control.StateSpace(A, B, given.C, given.D, 0, **_names(given))
 
@@ -72,29 +76,105 @@ def d2d(system: Any, sample_time: float) -> Any:
 
     Args:
         system: In discrete time.
-        sample_time: The other one in seconds.
+        sample_time: The other one in seconds. A whole multiple of the given one always works; any other one goes
+            through continuous time.
 
     Returns:
         A ``control.StateSpace``.
 
     Raises:
         ConfigError: If the discrete system has no continuous one; see :func:`d2c`.
+
+    Example:
+        >>> import control
+        >>> float(d2d(control.tf([1.0], [1.0, 0.5], 0.1), 0.2).poles()[0].real)
+        0.25
     """
-    return c2d(d2c(system), sample_time)
+    import control
+
+    _check_time(system, discrete=True)
+    times = _positive(sample_time) / system.dt
+    if not (times >= 1.0 and abs(times - round(times)) < 1e-9 * times):
+        return c2d(d2c(system), sample_time)
+    given = state_space(system)
+    A, B = np.eye(given.nstates), np.zeros_like(given.B)
+    for _ in range(round(times)):
+        A, B = given.A @ A, given.A @ B + given.B
+    return control.StateSpace(A, B, given.C, given.D, float(sample_time), **_names(given))
 
 
 def state_space(system: Any) -> Any:
     """A system as ``control.StateSpace``.
 
     Args:
-        system: An object of python-control.
+        system: An object of python-control. Transfer functions become one block in observer form for each denominator
+            of an output, or in controller form for each of an input where that takes fewer states, in balanced scales:
+            what shares its poles shares its states, and nothing else is joined.
 
     Returns:
         The state space.
+
+    Raises:
+        ConfigError: If a transfer function has more zeros than poles.
+
+    Example:
+        >>> import control
+        >>> shared = [1.0, -1.5, 0.7]
+        >>> state_space(control.tf([[[1.0], [0.5]]], [[shared, shared]], 0.1)).nstates
+        2
     """
     import control
 
-    return control.ss(system)
+    if not isinstance(system, control.TransferFunction):
+        return control.ss(system)
+    rows, columns = _observer(system.num, system.den), _observer(*(_across(x) for x in (system.num, system.den)))
+    if len(columns[0]) < len(rows[0]):
+        A, B, C, D = columns[0].T, columns[2].T, columns[1].T, columns[3].T
+    else:
+        A, B, C, D = rows
+    return control.StateSpace(*_scaled(A, B, C), D, system.dt, **_names(system))
+
+
+def _scaled(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
+    """The same system with states of a like size; scaling by powers of two, which rounds nothing."""
+    if not len(A):
+        return A, B, C
+    found, (scale, _) = linalg.matrix_balance(A, permute=False, separate=True)
+    return found, B / scale[:, np.newaxis], C * scale
+
+
+def _across(of: Any) -> list[list[Array]]:
+    """What stands in rows by columns."""
+    return [list(column) for column in zip(*of, strict=True)]
+
+
+def _observer(nums: Any, dens: Any) -> tuple[Array, Array, Array, Array]:
+    """Output below output, each with states of its own."""
+    rows = []
+    for num, den in zip(nums, dens, strict=True):
+        parts: list[Ratios] = []
+        for j, pair in enumerate(zip(num, den, strict=True)):
+            up, down = (np.trim_zeros(np.asarray(one, dtype=np.float64), "f") for one in pair)
+            if len(up) > len(down):
+                raise ConfigError(
+                    "the transfer function has no state space",
+                    expected="at most as many zeros as poles",
+                    got=f"{len(up) - 1} zeros and {len(down) - 1} poles",
+                    remedy="add poles that are fast enough not to matter",
+                )
+            top, bottom = np.pad(up, (len(down) - len(up), 0)) / down[0], down / down[0]
+            same = next((part for part in parts if np.array_equal(part[0], bottom)), None)
+            if same is None:
+                parts.append((bottom, {j: top}))
+            else:
+                same[1][j] = top
+        rows.append(observer_row(parts, len(num)))
+    return (
+        np.asarray(linalg.block_diag(*(A for A, *_ in rows))).reshape(2 * (sum(len(A) for A, *_ in rows),)),
+        np.concatenate([B for _, B, *_ in rows]),
+        np.asarray(linalg.block_diag(*(C for *_, C, _ in rows))),
+        np.concatenate([D for *_, D in rows]),
+    )
 
 
 def transfer_function(system: Any) -> Any:
@@ -246,14 +326,13 @@ def reduced(system: Any, states: int) -> Reduction:
             remedy="keep as many as there are large singular values",
         )
     solve = linalg.solve_discrete_lyapunov if discrete else (lambda A, Q: linalg.solve_continuous_lyapunov(A, -Q))
-    P, Q = _root(solve(given.A, given.B @ given.B.T)), _root(solve(given.A.T, given.C.T @ given.C))
+    A, B, C = _scaled(given.A, given.B, given.C)
+    P, Q = _root(solve(A, B @ B.T)), _root(solve(A.T, C.T @ C))
     U, sizes, Vt = linalg.svd(Q.T @ P)
     # Projections of the square-root method: nothing is inverted but the singular values that are kept.
     scale = 1.0 / np.sqrt(sizes[:states])
     left, right = (U[:, :states] * scale).T @ Q.T, P @ Vt[:states].T * scale
-    small = control.StateSpace(
-        left @ given.A @ right, left @ given.B, given.C @ right, given.D, given.dt, **_names(given)
-    )
+    small = control.StateSpace(left @ A @ right, left @ B, C @ right, given.D, given.dt, **_names(given))
     return Reduction(system=small, singular_values=sizes, bound=float(2.0 * sizes[states:].sum()))
 
 

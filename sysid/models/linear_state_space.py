@@ -17,12 +17,13 @@ from sysid.models.continuous import ContinuousStateSpace, rates
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
 from sysid.models.lags import MOST, per_input, whole
+from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
 from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_space import StateSpace
-from sysid.models.to_control import Matrices, in_powers_of_z, state_space, transfer_function
+from sysid.models.to_control import Matrices, state_space
 
 MOST_STATES = 100
 """A subspace method compresses matrices of some times as many columns."""
@@ -232,7 +233,7 @@ class _StateSpaceModel(InnovationModel):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LinearStateSpaceModel(_StateSpaceModel):
+class LinearStateSpaceModel(_StateSpaceModel, LinearForms):
     """A fitted state space of one output.
 
     Args:
@@ -260,29 +261,6 @@ class LinearStateSpaceModel(_StateSpaceModel):
             B=gain * numerators[0, j, first:], F=F, delay=first + late, discrete=True,
             of_numerator=f"B({self.mapping.inputs[j]}, ", of_denominator="F(",
         )  # fmt: skip
-
-    def to_control(self, *, continuous: bool = False, pade_order: int = 3) -> Any:
-        """The model as an object of python-control, from deviations of the inputs to deviations of the output.
-
-        Args:
-            continuous: Give the continuous form, as a ``control.StateSpace``.
-            pade_order: Order of the Padé approximation that stands for its dead times.
-
-        Returns:
-            A ``control.TransferFunction`` of one row, one column per input;
-            :func:`sysid.models.to_control.state_space` keeps the states.
-
-        Raises:
-            ConfigError: If there is no continuous form.
-        """
-        if continuous:
-            return self.continuous().to_control(pade_order=pade_order)
-        F, numerators, _ = polynomials(self.system)
-        gains = self.scaling.output_scale / np.array(self.scaling.input_scale)
-        late = self.orders.shifts(len(gains))
-        rows = [np.concatenate([np.zeros(k), row]) for k, row in zip(late, numerators[0], strict=True)]
-        ratios = [in_powers_of_z(gain * row, F) for gain, row in zip(gains, rows, strict=True)]
-        return transfer_function(ratios, self.mapping, self.sample_time)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again."""

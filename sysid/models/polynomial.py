@@ -20,12 +20,14 @@ from sysid.models.base import AbstractStructure
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
 from sysid.models.lags import per_input, whole
+from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
+from sysid.models.realisation import ObserverBlock
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
-from sysid.models.to_control import Matrices, in_powers_of_z, transfer_function
+from sysid.models.to_control import Matrices
 
 Array = NDArray[np.float64]
 
@@ -291,10 +293,10 @@ class Polynomials:
         if len(self.A) > 1 or not m:
             den = np.convolve(self.A, self.D)
             ups = [np.convolve(b, self.D) for b in self.B]
-            blocks = [_Block.of(den, dict(enumerate(ups)), self.C)]
+            blocks = [ObserverBlock.of(den, dict(enumerate(ups)), self.C)]
         else:
-            blocks = [_Block.of(f, {j: b}, None) for j, (b, f) in enumerate(zip(self.B, self.F, strict=True))]
-            blocks.append(_Block.of(self.D, {}, self.C))
+            blocks = [ObserverBlock.of(f, {j: b}, None) for j, (b, f) in enumerate(zip(self.B, self.F, strict=True))]
+            blocks.append(ObserverBlock.of(self.D, {}, self.C))
         n = sum(len(block.K) for block in blocks)
         A, B, K = np.zeros((n, n), dtype), np.zeros((n, m), dtype), np.zeros((n, 1), dtype)
         C, D, at = np.zeros((1, n)), np.zeros((1, m), dtype), 0
@@ -310,33 +312,7 @@ class Polynomials:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Block:
-    A: NDArray[Any]
-    K: NDArray[Any]
-    B: dict[int, tuple[NDArray[Any], Any]]
-
-    @classmethod
-    def of(cls, den: NDArray[Any], ups: dict[int, NDArray[Any]], noise: NDArray[Any] | None) -> _Block:
-        """Observer form of numerators over one denominator; the noise's first coefficient is 1."""
-        n = max([len(den), *(len(up) for up in ups.values()), *([] if noise is None else [len(noise)])]) - 1
-        d = _padded(den, n + 1)
-        A = np.eye(n, k=1, dtype=den.dtype)
-        if n:
-            A[:, 0] = -d[1:]
-        B = {}
-        for j, up in ups.items():
-            b = _padded(up, n + 1)
-            B[j] = (b[1:] - d[1:] * b[0], b[0])
-        K = np.zeros(n, dtype=den.dtype) if noise is None else _padded(noise, n + 1)[1:] - d[1:]
-        return cls(A=A, K=K, B=B)
-
-
-def _padded(values: NDArray[Any], length: int) -> NDArray[Any]:
-    return np.concatenate([values, np.zeros(length - len(values), dtype=values.dtype)])
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PolynomialModel(InnovationModel):
+class PolynomialModel(LinearForms, InnovationModel):
     """A fitted polynomial model.
 
     Args:
@@ -428,16 +404,6 @@ class PolynomialModel(InnovationModel):
             B=gain * p.B[j][delay:], F=p.A if common else p.F[j], delay=delay, discrete=True,
             of_numerator=f"B({name}, ", of_denominator="A(" if common else f"F({name}, ",
         )  # fmt: skip
-
-    def to_control(self) -> Any:
-        """The model as a ``control.TransferFunction``, from deviations of the inputs to deviations of the output.
-
-        Returns:
-            One row, one column per input; see :mod:`sysid.models.to_control` for a state space.
-        """
-        ratios = [self.ratio(j) for j in range(len(self.mapping.inputs))]
-        pairs = [in_powers_of_z(np.concatenate([np.zeros(one.delay), one.B]), one.F) for one in ratios]
-        return transfer_function(pairs, self.mapping, self.sample_time)
 
     @property
     def matrices(self) -> Matrices:

@@ -1,9 +1,10 @@
-"""State spaces of bases, and the exact sampling of continuous ones."""
+"""State spaces of bases and of ratios of polynomials, and the exact sampling of continuous ones."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,3 +133,72 @@ def _continuous_section(section: BasisSection) -> _Section:
     matrix = np.array([[-d[1], -d[0] / w], [w, 0.0]])
     powers = np.array([[0.0, 1.0 / w], [1.0, 0.0], [-d[1], -d[0] / w]])
     return _Section(matrix=matrix, drive=np.array([1.0, 0.0]), powers=powers, direct=np.array([0.0, 0.0, 1.0]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ObserverBlock:
+    """Ratios of polynomials over one denominator in observer form: the first state is the output but for ``D``.
+
+    Args:
+        A: Shape ``(n, n)``, the denominator in its first column.
+        K: Of what has 1 as its first coefficient, such as innovations; shape ``(n,)``.
+        B: By the place of an input its column, shape ``(n,)``, and its part of ``D``.
+    """
+
+    A: NDArray[Any]
+    K: NDArray[Any]
+    B: dict[int, tuple[NDArray[Any], Any]]
+
+    @classmethod
+    def of(cls, den: NDArray[Any], ups: dict[int, NDArray[Any]], noise: NDArray[Any] | None) -> ObserverBlock:
+        """From polynomials in ``1/z``, or in falling powers with the denominator as long as any numerator.
+
+        Args:
+            den: The denominator; its first coefficient is 1.
+            ups: By the place of an input its numerator.
+            noise: Numerator of innovations; its first coefficient is 1.
+
+        Returns:
+            The block.
+        """
+        n = max([len(den), *(len(up) for up in ups.values()), *([] if noise is None else [len(noise)])]) - 1
+        d = _padded(den, n + 1)
+        A = np.eye(n, k=1, dtype=den.dtype)
+        if n:
+            A[:, 0] = -d[1:]
+        B = {}
+        for j, up in ups.items():
+            b = _padded(up, n + 1)
+            B[j] = (b[1:] - d[1:] * b[0], b[0])
+        K = np.zeros(n, dtype=den.dtype) if noise is None else _padded(noise, n + 1)[1:] - d[1:]
+        return cls(A=A, K=K, B=B)
+
+
+def _padded(values: NDArray[Any], length: int) -> NDArray[Any]:
+    return np.concatenate([values, np.zeros(length - len(values), dtype=values.dtype)])
+
+
+Ratios = tuple[NDArray[np.float64], dict[int, NDArray[np.float64]]]
+"""A denominator, and by the place of an input its numerator."""
+
+
+def observer_row(parts: Iterable[Ratios], n_inputs: int) -> tuple[NDArray[np.float64], ...]:
+    """The state space of an output that is a sum of ratios, one block for each denominator.
+
+    Args:
+        parts: The ratios, as :meth:`ObserverBlock.of` takes them.
+        n_inputs: Inputs.
+
+    Returns:
+        ``A``, ``B``, ``C`` and ``D``.
+    """
+    blocks = [ObserverBlock.of(den, ups, None) for den, ups in parts]
+    n = sum(len(block.A) for block in blocks)
+    B, C, D, at = np.zeros((n, n_inputs)), np.zeros((1, n)), np.zeros((1, n_inputs)), 0
+    for block in blocks:
+        for j, (column, direct) in block.B.items():
+            B[at : at + len(column), j], D[0, j] = column, direct
+        if len(block.A):
+            C[0, at] = 1.0
+        at += len(block.A)
+    return np.asarray(linalg.block_diag(*(block.A for block in blocks if len(block.A)))).reshape(n, n), B, C, D

@@ -11,7 +11,9 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
+from sysid.errors import ConfigError
 from sysid.extras import need
 from sysid.models.mapping import Mapping
 from sysid.names import distinct, signal_name
@@ -75,6 +77,49 @@ def state_space(model: Linear) -> Any:
 
     A, B, C, D = model.matrices
     return control.StateSpace(A, B, C, D, model.sample_time, **signals(model.mapping))
+
+
+def of_wired(models: Sequence[Any], inputs: Sequence[str], outputs: Sequence[str], sample_time: float) -> Any:
+    """Linear models wired by the names of their channels as one ``control.StateSpace``.
+
+    Args:
+        models: The models.
+        inputs: Channels that none of them writes.
+        outputs: Channels that they write.
+        sample_time: Seconds.
+
+    Returns:
+        The state space in the channels' units, from the inputs to every output.
+
+    Raises:
+        ConfigError: If a model is not linear.
+    """
+    need("control", "an object of python-control")
+    import control
+
+    for model in models:
+        if not hasattr(model, "matrices"):
+            raise ConfigError(
+                "a model that is not linear has no state space of python-control",
+                where=str(model.mapping),
+                expected="ARX, TF, OE, ARMAX, BJ, SS",
+                got=model.structure.label,
+                remedy="fit that output by a linear structure too",
+            )
+    parts = [model.matrices for model in models]
+    written = [name for model in models for name in model.mapping.outputs]
+    reads = np.zeros((sum(len(model.mapping.inputs) for model in models), len(written) + len(inputs)))
+    for row, name in enumerate(name for model in models for name in model.mapping.inputs):
+        reads[row, written.index(name) if name in written else len(written) + list(inputs).index(name)] = 1.0
+    inner, outer = np.split(reads, [len(written)], axis=1)
+    A, B, C, D = (linalg.block_diag(*blocks) for blocks in zip(*parts, strict=True))
+    # What is read at the same sample comes in a chain: y = C x + D (inner y + outer u) can always be solved for y.
+    solved = np.linalg.inv(np.eye(len(written)) - D @ inner)
+    C, D = solved @ C, solved @ D @ outer
+    B, A = B @ (inner @ D + outer), A + B @ inner @ C
+    at = [written.index(name) for name in outputs]
+    known = signals(Mapping(inputs=tuple(inputs), outputs=tuple(outputs)))
+    return control.StateSpace(A, B, C[at], D[at], sample_time, **known)
 
 
 def signals(mapping: Mapping) -> dict[str, list[str]]:

@@ -13,9 +13,11 @@ from scipy import linalg
 
 from sysid.errors import ConfigError, shortened
 from sysid.models import orthonormal_basis as bases
-from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.base import AbstractStructure
+from sysid.models.continuous import ContinuousStateSpace
 from sysid.models.history import History
 from sysid.models.lags import MOST, per_input, whole
+from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
 from sysid.models.orthonormal_basis import BasisSection, Domain
 from sysid.models.polynomial_moves import Polynomials
@@ -24,7 +26,7 @@ from sysid.models.ratio import Ratio
 from sysid.models.realisation import Realisation, realise
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
-from sysid.models.to_control import Matrices, delayed, in_powers_of_z, transfer_function
+from sysid.models.to_control import Matrices
 
 MOST_POLES = 100
 """For each input; beyond some ten the coefficients lose all meaning in double precision."""
@@ -115,7 +117,7 @@ def _domain(value: object) -> Domain:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TransferFunctionModel(AbstractModel):
+class TransferFunctionModel(LinearForms):
     """A fitted transfer function.
 
     Args:
@@ -320,24 +322,21 @@ class TransferFunctionModel(AbstractModel):
         C[k:], C[k - 1] = row, direct
         return Realisation(A=A, B=B, C=C[np.newaxis], D=np.zeros(1))
 
-    def to_control(self, *, pade_order: int = 3) -> Any:
-        """The model as a ``control.TransferFunction``, from deviations of the inputs to deviations of the output.
-
-        Args:
-            pade_order: Order of the Padé approximation that stands for a dead time of a continuous model.
-
-        Returns:
-            One row of transfer functions, one column per input; see :mod:`sysid.models.to_control` for a state space.
-        """
-        discrete = self.orders.domain is Domain.DISCRETE
-        ratios = []
-        for j, delay in enumerate(self.delays):
-            B, F = self.numerator(j), self.denominator(j)
-            if discrete:
-                ratios.append(in_powers_of_z(np.concatenate([np.zeros(delay), B]), F))
-            else:
-                ratios.append(delayed((B[::-1], F[::-1]), delay * self.sample_time, pade_order))
-        return transfer_function(ratios, self.mapping, self.sample_time if discrete else 0.0)
+    def continuous(self) -> ContinuousStateSpace:
+        """The system in continuous time: of a continuous model itself, section by section; see the base class."""
+        if self.orders.domain is Domain.DISCRETE:
+            return super().continuous()
+        parts = [realise(self.basis(j), self.orders.domain) for j in range(len(self.sections))]
+        gains = self.scaling.output_scale / np.array(self.scaling.input_scale)
+        n, at = sum(len(part.A) for part in parts), 0
+        B, C, D = np.zeros((n, len(parts))), np.zeros((1, n)), np.zeros((1, len(parts)))
+        for j, (part, taps, gain) in enumerate(zip(parts, self.taps, gains, strict=True)):
+            here = slice(at, at + len(part.A))
+            B[here, j], C[0, here], D[0, j] = part.B, gain * (taps @ part.C), gain * (taps @ part.D)
+            at = here.stop
+        A = linalg.block_diag(*(part.A for part in parts))
+        delays = tuple(k * self.sample_time for k in self.delays)
+        return ContinuousStateSpace(A=A, B=B, C=C, D=D, delays=delays, mapping=self.mapping)
 
     @property
     def matrices(self) -> Matrices:

@@ -50,6 +50,36 @@ def test_transfer_functions_and_state_spaces_are_the_same_system() -> None:
     assert transfer_function(state_space(one))(z) == pytest.approx(one(z))
 
 
+def test_what_shares_its_poles_shares_its_states_whatever_the_number_of_inputs_and_outputs() -> None:
+    slow, fast, x = [1.0, -1.5, 0.7], [1.0, -0.2], np.exp(0.3j)
+    wide = control.tf([[[1.0], [0.5, 0.1], [2.0]]], [[slow, slow, fast]], 0.1)
+    tall = control.tf([[[1.0]], [[0.5, 0.1, 0.3]], [[2.0]]], [[slow], [slow], [fast]], 0.1)
+    for system in (wide, tall):
+        found = state_space(system)
+        assert found.nstates == 3
+        np.testing.assert_allclose(found(x), system(x), rtol=1e-10)
+        assert (found.input_labels, found.output_labels) == (system.input_labels, system.output_labels)
+    both = plant(0.1)
+    np.testing.assert_allclose(state_space(transfer_function(both))(x), both(x), rtol=1e-7)
+
+
+def test_a_whole_multiple_of_the_sample_time_needs_no_continuous_system() -> None:
+    fast = state_space(control.tf([[[1.0, 0.3], [2.0]]], [[[1.0, 0.5, 0.0], [1.0, 0.5, 0.0]]], 0.1))  # -0.5 and 0
+    slow = d2d(fast, 0.3)
+    y, z = (control.step_response(one, T=np.arange(n) * one.dt).outputs for one, n in ((fast, 31), (slow, 11)))
+    np.testing.assert_allclose(y[..., ::3], z, rtol=1e-10, atol=1e-12)
+
+
+def test_milliseconds_are_reduced_as_seconds_are() -> None:
+    """A dead time by Padé and fast poles: coefficients of a polynomial in s range over thirty decades."""
+    sizes = []
+    for unit in (1.0, 1e-3):
+        num, den = control.pade(0.1 * unit, 4)
+        plant = control.tf(num, den) * control.tf([2.0], [unit**2, 0.4 * unit, 1.0])
+        sizes.append(reduced(plant, 2).singular_values)
+    np.testing.assert_allclose(sizes[1], sizes[0], rtol=1e-6)
+
+
 @pytest.mark.parametrize("dt", [0, 0.1])
 def test_canonical_forms_are_the_same_system_in_named_coordinates(dt: float) -> None:
     one = plant(dt)[0, 0]  # three states of one input and one output
@@ -79,6 +109,8 @@ def test_canonical_forms_are_the_same_system_in_named_coordinates(dt: float) -> 
         lambda: c2d(plant(), 0.0),
         lambda: reduced(control.tf([1.0], [1.0, -1.0]), 1),
         lambda: reduced(plant(), 4),
+        lambda: state_space(control.tf([1.0, 0.0, 0.0], [1.0, 1.0])),
+        lambda: d2d(plant(), 0.1),
         lambda: canonical(plant(), "companion"),
         lambda: canonical(plant(), "diagonal"),
         lambda: canonical(control.ss([[0.5, 1.0], [0.0, 0.5]], [[0.0], [1.0]], [[1.0, 0.0]], 0.0, 0.1), "modal"),
@@ -90,6 +122,8 @@ def test_canonical_forms_are_the_same_system_in_named_coordinates(dt: float) -> 
         "no time",
         "unstable",
         "more states",
+        "more zeros than poles",
+        "continuous at another rate",
         "two inputs",
         "no form",
         "equal poles",

@@ -27,6 +27,20 @@ SHOWN = 400
 """Samples shown of a step response."""
 
 
+def band(draws: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Between which values the next draw lies with 95 %, whatever the number of draws (Weibull's plotting positions).
+
+    Percentiles that reach from the first draw to the last would hold 94 % of 200 draws' successors.
+
+    Args:
+        draws: Shape ``(n_draws, n_points)``.
+
+    Returns:
+        Shape ``(2, n_points)``.
+    """
+    return np.asarray(np.percentile(draws, BAND, axis=0, method="weibull"))
+
+
 def bode_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, seed: int = 0, points: int = 200) -> Figure:
     """Magnitude and phase of every input, with 95 % bands.
 
@@ -50,9 +64,9 @@ def bode_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, seed: 
             above, below = axes[0, j], axes[1, j]
             phase = np.unwrap(np.angle(shown))
             if len(drawn):
-                gains = np.percentile(np.abs(drawn), BAND, axis=0)
+                gains = band(np.abs(drawn))
                 above.fill_between(frequency, *gains, color=BAND_COLOUR, label="95 %")
-                around = np.percentile(phase + np.angle(drawn / shown), BAND, axis=0)
+                around = band(phase + np.angle(drawn / shown))
                 below.fill_between(frequency, *np.degrees(around), color=BAND_COLOUR)
             above.loglog(frequency, np.abs(shown), color=PALETTE[0], label=view.name)
             below.semilogx(frequency, np.degrees(phase), color=PALETTE[0])
@@ -91,8 +105,8 @@ def step_figure(
             if len(view.B) > 1:
                 # A draw that is not stable must not take the picture with it.
                 room = max(float(np.ptp(y)), 1e-12)
-                band = np.percentile(_step_responses(view, n), BAND, axis=0)[:, ::every]
-                low, high = np.clip(band, y.min() - room, y.max() + room)
+                drawn = band(_step_responses(view, n))[:, ::every]
+                low, high = np.clip(drawn, y.min() - room, y.max() + room)
                 place.fill_between(time[::every], low, high, color=BAND_COLOUR, label="95 %")
             shape = "steps-post" if every == 1 else "default"
             place.plot(
