@@ -10,7 +10,7 @@ from scipy import signal
 
 from sysid.estimation import FitResult, TransferFunctionTraining, fit_transfer_function
 from sysid.models import Mapping, TransferFunction
-from sysid.reporting.figures.linear_figures import _filter_step, bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.figures.linear_figures import _filter_step, band, bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.svg import svg
 from tests.estimation.linear_systems import steps, trace_of
 
@@ -30,10 +30,15 @@ def test_bode_shows_the_response_within_its_band(domain: str) -> None:
     above, below = bode_figure(fit.model, fit.uncertainty).axes
     frequency, gain = above.lines[0].get_data()
     np.testing.assert_allclose(gain, np.abs(fit.model.response(0, np.asarray(frequency))))
-    band = above.collections[0].get_paths()[0].vertices
-    assert band[:, 1].min() <= gain.min()
-    assert band[:, 1].max() >= gain.max()
+    outline = above.collections[0].get_paths()[0].vertices
+    assert outline[:, 1].min() <= gain.min()
+    assert outline[:, 1].max() >= gain.max()
     assert "degrees" in below.get_ylabel()
+
+
+def test_a_band_leaves_out_a_fortieth_at_either_end_of_what_comes_next() -> None:
+    draws = np.arange(1, 200)[:, np.newaxis] / 200.0  # where 199 draws of a uniform number lie on average
+    np.testing.assert_allclose(band(draws)[:, 0], [0.025, 0.975], rtol=1e-12)
 
 
 def test_noise_widens_the_cloud_of_poles() -> None:
