@@ -2,9 +2,11 @@
 
     python -m tests.benchmarks doubt
     python -m tests.benchmarks doubt --count=8 --first=100 --error=1
+    python -m tests.benchmarks doubt --wholes=service-cascade-any,combined-brake-grown,combined-brake-held
 
-* Each published whole of the service brake (``WHOLES``) alone on ``abdx-kinds-unseen``: per kind the share of the
-  sequences within 1 psi rms, and how many diverge. ``--count=`` takes so many of each kind from number ``--first=`` on.
+* Each published whole of the service brake (``WHOLES``, or those of ``--wholes=``) alone on ``abdx-kinds-unseen``: per
+  kind the share of the sequences within 1 psi rms, and how many diverge. ``--count=`` takes so many of each kind from
+  number ``--first=`` on.
 * Each of them as the first member of a committee with the others: the threshold of its doubt is found on
   ``abdx-kinds-calibration`` (``--calibrate=`` sequences of each of its three kinds) so that 5 % of the right answers
   are doubted there; then per unseen kind the share of samples with an error over ``--error=`` psi, how many of these
@@ -37,6 +39,12 @@ def option(name: str, default: float) -> float:
     return float(given[-1]) if given else default
 
 
+def named() -> tuple[str, ...]:
+    """The wholes."""
+    given = [word.partition("=")[2] for word in sys.argv[1:] if word.startswith("--wholes=")]
+    return tuple(given[-1].split(",")) if given else WHOLES
+
+
 def sequences(data: str, kinds: tuple[str, ...], first: int, count: int) -> dict[str, list[Trace]]:
     """Traces by kind."""
     return {
@@ -47,7 +55,7 @@ def sequences(data: str, kinds: tuple[str, ...], first: int, count: int) -> dict
 def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: float) -> None:
     """Print both tables."""
     wholes: dict[str, Cascade] = {}
-    for name in WHOLES:
+    for name in named():
         model = read_bundle(REPORTS / name / "bundle").model
         wholes[name] = model if isinstance(model, Cascade) else Cascade(models=(model,))
     every = [trace for traces in unseen.values() for trace in traces]
@@ -57,7 +65,7 @@ def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: f
         for kind, one in found.by_kind.items():
             print(f"  {kind:<10} {100 * one.within:5.1f} %  median {one.quantiles[0.5]:.2f} psi, {one.lost} diverge")
     calibration = [trace for traces in known.values() for trace in traces]
-    for name in WHOLES:
+    for name in named():
         members = [wholes[name], *(whole for other, whole in wholes.items() if other != name)]
         threshold = doubt_threshold(members, calibration, OUTPUT, error=error)
         both = committee(members, {OUTPUT: threshold})
