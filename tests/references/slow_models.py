@@ -83,9 +83,14 @@ def thermal(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
 
 def cylinder(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A hydraulic cylinder behind a proportional valve, with friction and end stops; input in V, output in mm."""
-    h, mass, supply, stroke, area = time[1] - time[0], parameters.get("mass", 200.0), 100e5, 0.3, 1.2e-3
-    volume, bulk, gain, steps = 4e-4, 1.2e9, 1.5e-7, max(1, round((time[1] - time[0]) / 1e-4))
-    position, speed, pressure, found, dt = 0.15, 0.0, 0.0, np.empty(len(time)), h / steps
+    return cylinder_run(float(time[1] - time[0]), inputs, parameters.get("mass", 200.0))
+
+
+def cylinder_run(h: float, inputs: Array, mass: float) -> Array:
+    """The same of numbers alone, which ``compiled_models`` compiles."""
+    supply, stroke, area, volume, bulk, gain = 100e5, 0.3, 1.2e-3, 4e-4, 1.2e9, 1.5e-7
+    steps = max(1, round(h / 1e-4))
+    position, speed, pressure, found, dt = 0.15, 0.0, 0.0, np.empty(len(inputs)), h / steps
     for k, volts in enumerate(inputs[:, 0]):
         for _ in range(steps):
             flow = gain * volts * np.sqrt(max(supply - np.sign(volts) * pressure, 0.0)) * 0.1
@@ -104,8 +109,13 @@ def spindle(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
 
     Coulomb friction holds the slide until the motor pulls harder; the load is a spring-like seal towards one end.
     """
-    h, stroke, speed, place, current = time[1] - time[0], 80.0, 0.0, 40.0, 0.0
-    steps, found = max(1, round(h / 1e-3)), np.empty(len(time))
+    return spindle_run(float(time[1] - time[0]), inputs)
+
+
+def spindle_run(h: float, inputs: Array) -> Array:
+    """The same of numbers alone."""
+    stroke, speed, place, current = 80.0, 0.0, 40.0, 0.0
+    steps, found = max(1, round(h / 1e-3)), np.empty(len(inputs))
     dt = h / steps
     for k, volts in enumerate(inputs[:, 0]):
         for _ in range(steps):
@@ -126,10 +136,15 @@ def spindle(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
 
 def basin(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A basin that is filled and drained by pumps, runs over at its edge and can run dry; inputs in V, output in m."""
-    h, level, filling = time[1] - time[0], 1.0, 0.0
-    steps, found = max(1, round(h / 0.1)), np.empty(len(time))
+    return basin_run(float(time[1] - time[0]), inputs)
+
+
+def basin_run(h: float, inputs: Array) -> Array:
+    """The same of numbers alone."""
+    level, filling, steps, found = 1.0, 0.0, max(1, round(h / 0.1)), np.empty(len(inputs))
     dt = h / steps
-    for k, (fill, drain) in enumerate(inputs):
+    for k in range(len(inputs)):
+        fill, drain = inputs[k, 0], inputs[k, 1]
         for _ in range(steps):
             filling += dt / 3.0 * (max(fill - 1.0, 0.0) - filling)
             area = 4.0 + 1.5 * level

@@ -1,0 +1,27 @@
+"""The slow models that stand at ends, compiled: the same numbers, so fast that 1,000 of their runs can be had."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import slow_models
+from numba import njit
+from slow_models import Array
+
+_cylinder, _spindle, _basin = map(njit, (slow_models.cylinder_run, slow_models.spindle_run, slow_models.basin_run))
+
+
+def cylinder(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """As ``slow_models:cylinder``."""
+    return _cylinder(time[1] - time[0], np.ascontiguousarray(inputs), parameters.get("mass", 200.0))
+
+
+def spindle(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """As ``slow_models:spindle``."""
+    return _spindle(time[1] - time[0], np.ascontiguousarray(inputs))
+
+
+def basin(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """As ``slow_models:basin``."""
+    return _basin(time[1] - time[0], np.ascontiguousarray(inputs))
