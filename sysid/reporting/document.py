@@ -101,7 +101,8 @@ def _accuracy(results: Results, published: PublishedTable | None) -> Section:
     parts: list[Part] = [] if not results.systems else [systems_table(results)]
     for index, (mapping, fits) in enumerate(results.mappings().items()):
         parts.append(accuracy_table(fits, "free_run", best))
-        parts.append(_mse_picture(mapping, fits, f"mse-{index}"))
+        if len(case_columns(fits)) > 1:  # of one case the table says it all
+            parts.append(_mse_picture(mapping, fits, f"mse-{index}"))
         parts += [accuracy_table(fits, "one_step", best)] if any(fit.predicts for fit in fits) else []
     if published is not None:
         parts.append(f"Published figures: {published.reference}; {published.part}. {published.comparability}")

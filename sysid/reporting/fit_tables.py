@@ -52,7 +52,7 @@ def accuracy_table(fits: Sequence[FitRecord], kind: str, best: Collection[str]) 
     note = {
         "free_run": "The model runs on its own past output: the figure that counts.",
         "one_step": "Each step starts from measured output: this says little about a free run. A model whose noise is "
-        "added to its output (a transfer function, a neural state space) has no such prediction: -.",
+        "added to its output (a transfer function, a neural state space) has no such prediction, and shows a dash.",
     }[kind]
     return Table(
         caption=f"{words}: mean squared error [{squared(fits[0].unit)}] by case. {fits[0].mapping}.",

@@ -148,6 +148,8 @@ def _weakness(fit: FitRecord, cases: Dict[str, CaseRecord], instants: Sequence[I
         return f"The free run diverges on {', '.join(diverging)}: do not use this model there."
     worst = max(cases, key=lambda name: cases[name].free_run.mse)
     text = f"Weakest on {worst} (mse {quantity(cases[worst].free_run.mse, squared(fit.unit))})."
+    if len(cases) == 1 and instants:  # what is said of its accuracy says that
+        text = ""
     if instants:
         instant = instants[0]
         text += (
@@ -155,7 +157,7 @@ def _weakness(fit: FitRecord, cases: Dict[str, CaseRecord], instants: Sequence[I
             f"{instant.time:g}\u00a0s, where the target is {quantity(instant.target, fit.unit, digits=5)} and "
             f"the free run {quantity(instant.simulated, fit.unit, digits=5)}."
         )
-    return text
+    return text.strip()
 
 
 def _export(fit: FitRecord) -> str:

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.browser
 
 MAPPING = "pump -> level"
 RUNS = ("ARX [2; 2; 1] · open", "NARX 2/2/5 · open", "NARX 2/2/5 · closed")
-BEST, PARENT = "NARX 2/2/5 · closed", "one step ahead"
+BEST, PARENT = "NARX 2/2/5 · closed", "network, open loop"
 COLUMNS = ("mean_free_run_mse", "worst_free_run_mse", "mean_nrmse_fit", "mean_run_time_s", "parameters")
 CASE = "VAL"
 PICTURES = """[...new Map(
