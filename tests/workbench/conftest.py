@@ -136,6 +136,12 @@ def stub_report(folder: Path) -> Path:
     return page
 
 
+@pytest.fixture(scope="session")
+def report_stub() -> Callable[[Path], Path]:
+    """Writes a stub for a report."""
+    return stub_report
+
+
 @pytest.fixture
 def quick_report(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs write a stub for a report."""

@@ -7,7 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -88,21 +88,35 @@ def test_own_data_from_a_yaml(workspace: Path) -> None:
 
 
 @pytest.fixture
-def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_report(quick_report: None) -> None:
     """The report costs two seconds, and most of what follows is not about it."""
 
-    def write_report(folder: Path) -> Path:
-        page = folder / "report" / "index.html"
-        page.parent.mkdir(exist_ok=True)
-        page.write_text("no report")
-        return page
 
-    monkeypatch.setattr("sysid.reporting.report.write_report", write_report)
+@pytest.fixture(scope="module")
+def first_run(
+    tmp_path_factory: pytest.TempPathFactory,
+    write_rig: Callable[[Path], None],
+    report_stub: Callable[[Path], Path],
+) -> tuple[Path, Results]:
+    """The workspace's pipeline, run once for all tests of what a second run does, and its results."""
+    folder = tmp_path_factory.mktemp("first")
+    write_rig(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sysid.reporting.report.write_report", report_stub)
+        patch.chdir(folder)
+        results, stored = run(folder)
+    assert stored == dict.fromkeys(FITS, False)
+    return folder, results
 
 
-@pytest.mark.usefixtures("no_report")
-def test_a_report_is_written_again_only_if_something_changed(workspace: Path) -> None:
-    first, _ = run(workspace)
+@pytest.fixture
+def first(first_run: tuple[Path, Results], workspace: Path, no_report: None) -> Results:
+    """Results of a first run, which stands in the workspace."""
+    shutil.copytree(first_run[0] / "run", workspace / "run")
+    return first_run[1]
+
+
+def test_a_report_is_written_again_only_if_something_changed(workspace: Path, first: Results) -> None:
     page = workspace / "run" / "report" / "index.html"
     written = page.stat().st_mtime_ns
     again, _ = run(workspace)
@@ -113,9 +127,8 @@ def test_a_report_is_written_again_only_if_something_changed(workspace: Path) ->
     assert page.stat().st_mtime_ns > written
 
 
-@pytest.mark.usefixtures("no_report")
+@pytest.mark.usefixtures("first")
 def test_stored_results_are_the_computed_ones(workspace: Path) -> None:
-    run(workspace)
     folder = RunFolder(path=workspace / "run").fit("closed-loop")
     fit, scores = read_fit(folder), read_scores(folder)
     read = read_pipeline(workspace / "pipelines" / "first.yaml")
@@ -127,9 +140,7 @@ def test_stored_results_are_the_computed_ones(workspace: Path) -> None:
         assert scores.evaluation.cases[name].free_run == case.free_run
 
 
-@pytest.mark.usefixtures("no_report")
-def test_a_second_run_fits_nothing(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    first, _ = run(workspace)
+def test_a_second_run_fits_nothing(workspace: Path, first: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(steps, "fit_traces", lambda *_: pytest.fail("fitted again"))
     monkeypatch.setattr(steps, "score", lambda *_: pytest.fail("scored again"))
     second, stored = run(workspace)
@@ -137,34 +148,28 @@ def test_a_second_run_fits_nothing(workspace: Path, monkeypatch: pytest.MonkeyPa
     assert [fit.model_dump_json() for fit in second.fits] == [fit.model_dump_json() for fit in first.fits]
 
 
-@pytest.mark.usefixtures("no_report")
-def test_fresh_does_everything_again_with_the_same_result(workspace: Path) -> None:
-    first, _ = run(workspace)
+def test_fresh_does_everything_again_with_the_same_result(workspace: Path, first: Results) -> None:
     second, stored = run(workspace, fresh=True)
     assert stored == dict.fromkeys(FITS, False)
     for before, after in zip(first.fits, second.fits, strict=True):
         assert {n: c.free_run for n, c in after.cases.items()} == {n: c.free_run for n, c in before.cases.items()}
 
 
-@pytest.mark.usefixtures("no_report")
+@pytest.mark.usefixtures("first")
 def test_a_changed_fit_does_not_concern_the_others(workspace: Path) -> None:
-    run(workspace)
     rewrite(workspace, "loop: closed, max_iterations: 8", "loop: closed, max_iterations: 9")
     _, stored = run(workspace)
     assert stored == {"ARX": True, "open loop": True, "closed loop": False}
 
 
-@pytest.mark.usefixtures("no_report")
+@pytest.mark.usefixtures("first")
 def test_a_changed_initial_fit_concerns_what_starts_from_it(workspace: Path) -> None:
-    run(workspace)
     rewrite(workspace, "loop: open, max_iterations: 8", "loop: open, max_iterations: 7")
     _, stored = run(workspace)
     assert stored == {"ARX": True, "open loop": False, "closed loop": False}
 
 
-@pytest.mark.usefixtures("no_report")
-def test_a_damaged_result_is_done_again(workspace: Path) -> None:
-    first, _ = run(workspace)
+def test_a_damaged_result_is_done_again(workspace: Path, first: Results) -> None:
     damaged = workspace / "run" / "fits" / "open-loop" / "fit.json"
     damaged.write_text(damaged.read_text()[:-20], encoding="utf-8")
     second, stored = run(workspace)
