@@ -182,9 +182,11 @@ def _walk(p, layout, values, past, kept, held):
             _keep(kept[t], h, p.neurons, neuron_first)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
 def run(p, depth, rest, values, kept, held):
     """Run all members over all samples, writing the outputs into ``values``.
+
+    The layout is handed from one compiled function to the other: in one with the passes it was compiled again for each
+    of them, a third of what the first run of a cascade waits for, and to hand it over takes as long as ten samples.
 
     Args:
         p: The members.
@@ -195,19 +197,9 @@ def run(p, depth, rest, values, kept, held):
             where nobody needs them.
         held: What held each output at each sample, shape ``(n_samples, n_outputs)``, written.
     """
-    layout = laid_out(p)
-    # Samples whose past reaches before the first run in an array of their own, which begins with that past.
-    first = min(depth, len(values))
-    room = np.empty((depth + first, values.shape[1]))
-    for row in range(depth):
-        copy_numbers(rest, room[row])
-    copy_rows(values[:first], room[depth:])
-    _walk(p, layout, room, depth, kept, held)
-    copy_rows(room[depth:], values)
-    _walk(p, layout, values, first, kept[first:], held[first:])
+    _run(p, laid_out(p), depth, rest, values, kept, held)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
 def go_on(p, past, values, kept, held):
     """Run all members from a row on, whatever stands in the rows before it.
 
@@ -219,3 +211,16 @@ def go_on(p, past, values, kept, held):
         held: As for :func:`run`, from row ``past`` on.
     """
     _walk(p, laid_out(p), values, past, kept, held)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _run(p, layout, depth, rest, values, kept, held):
+    """Run over all samples: those whose past reaches before the first in an array of their own, then the others."""
+    first = min(depth, len(values))
+    room = np.empty((depth + first, values.shape[1]))
+    for row in range(depth):
+        copy_numbers(rest, room[row])
+    copy_rows(values[:first], room[depth:])
+    _walk(p, layout, room, depth, kept, held)
+    copy_rows(room[depth:], values)
+    _walk(p, layout, values, first, kept[first:], held[first:])

@@ -72,12 +72,17 @@ def write_tanks(folder: Path, seed: int = 0) -> None:
     (folder / "dataset.yaml").write_text(text + "\n", encoding="utf-8")
 
 
+def fill(folder: Path) -> None:
+    """A workspace with both."""
+    write_tanks(folder / "datasets" / "tanks")
+    (folder / "pipelines").mkdir()
+    (folder / "pipelines" / "tanks.yaml").write_text(PIPELINE, encoding="utf-8")
+
+
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A workspace with both, the current folder."""
-    write_tanks(tmp_path / "datasets" / "tanks")
-    (tmp_path / "pipelines").mkdir()
-    (tmp_path / "pipelines" / "tanks.yaml").write_text(PIPELINE, encoding="utf-8")
+    """One, the current folder."""
+    fill(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

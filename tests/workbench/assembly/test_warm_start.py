@@ -15,7 +15,7 @@ from sysid.workbench.assembly.runner import read_assembly
 from sysid.workbench.commands.run import run_request
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
-from tests.workbench.assembly.conftest import PIPELINE, assembly_results
+from tests.workbench.assembly.conftest import PIPELINE, assembly_results, fill
 
 QUICK = PIPELINE.replace("candidates: 2", "candidates: 1").replace(
     "retrain: {members: [lower], max_iterations: 5}\n", ""
@@ -32,10 +32,22 @@ def run(workspace: Path, name: str, text: str) -> Path:
     return workspace / "runs" / name
 
 
+@pytest.fixture(scope="module")
+def first_whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace in which the first whole was trained, once for all tests that go on from it."""
+    folder = tmp_path_factory.mktemp("first")
+    fill(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        run(folder, "tanks", FIRST)
+    return folder
+
+
 @pytest.fixture
-def trained(workspace: Path) -> Path:
+def trained(workspace: Path, first_whole: Path) -> Path:
     """The run folder of the first whole."""
-    return run(workspace, "tanks", FIRST)
+    shutil.copytree(first_whole, workspace, dirs_exist_ok=True)
+    return workspace / "runs" / "tanks"
 
 
 def test_its_networks_stand_where_members_would_be_fitted(workspace: Path, trained: Path) -> None:
