@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError
+from sysid.errors import ConfigError, TraceError, shortened
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability
 from sysid.estimation.stability.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
 from sysid.models import ARX, AbstractModel, Mapping, Start, StartKind, beginning
+from sysid.models.lags import whole
 from sysid.traces import Trace
 
 STILL_S = 20.0
@@ -58,14 +59,23 @@ class StabilityOptions:
     source: str = "Given traces."
 
     def __post_init__(self) -> None:
+        if not isinstance(self.sequences, Iterable):
+            raise ConfigError(
+                "sequences are not traces", where="sequences", expected="traces that are run as they are",
+                got=shortened(self.sequences), remedy="how many random sequences there are is count",
+            )  # fmt: skip
         object.__setattr__(self, "sequences", tuple(self.sequences))
-        for name, wrong, expected in (
-            ("count", self.count < 0, "0 or more"),
-            ("seed", self.seed < 0, "0 or more"),
-            ("tolerance", not self.tolerance > 0.0, "above 0"),
-        ):
-            if wrong:
-                raise ConfigError(f"{name} is too small", where=name, expected=expected, got=getattr(self, name))
+        for name in ("count", "seed"):
+            if not whole(getattr(self, name)) or getattr(self, name) < 0:
+                raise ConfigError(
+                    f"{name} is not a number that can be used", where=name, expected="a whole number, 0 or more",
+                    got=shortened(getattr(self, name)), remedy=f"write for example {name}: 100",
+                )  # fmt: skip
+        if not (isinstance(self.tolerance, int | float) and self.tolerance > 0.0):
+            raise ConfigError(
+                "tolerance is not a number that can be used", where="tolerance", expected="a number above 0",
+                got=shortened(self.tolerance), remedy=f"write for example tolerance: {TOLERANCE}",
+            )  # fmt: skip
 
     @property
     def terms(self) -> dict[str, Any]:

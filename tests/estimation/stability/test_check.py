@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -159,3 +160,16 @@ def test_several_outputs_have_a_linear_yardstick_each():
     found = check_stability(plant, asked.source, count=100, reference=lambda: asked.reference)
     assert found.stable
     assert not check_stability(plant, asked.source, count=100).stable
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [({"count": -1}, "count"), ({"count": "10"}, "count"), ({"seed": 1.5}, "seed"), ({"tolerance": 0.0}, "tolerance"),
+     ({"tolerance": "small"}, "tolerance"), ({"sequences": 10}, "sequences")],
+    ids=str,
+)  # fmt: skip
+def test_options_that_cannot_be_used_are_refused_in_words(options: dict[str, Any], field: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        StabilityOptions(**options)
+    assert refused.value.where == field
+    assert refused.value.remedy
