@@ -66,7 +66,7 @@ def terrain(
 
     from sysid.rail.dynamics.train import read_train
     from sysid.rail.track.features import features
-    from sysid.rail.track.handling import SPEED_GAINS, peak_force, sag_acceleration
+    from sysid.rail.track.handling import SPEED_GAINS, lateral_ratio, peak_force, quadrant, sag_acceleration
     from sysid.rail.track.terrain import CREST, PATTERNS, Shape, combined, correlation, effective_grade
 
     line, consist = _line(track, section), read_train(train)
@@ -98,6 +98,12 @@ def terrain(
             f"m ({1000.0 * one.correlation:+.1f} per mille): {handling}; coupler {force.coupler} "
             f"{'draft' if force.force >= 0.0 else 'buff'} {abs(force.force) / 1000.0:.0f} kN"
         )
+        if line.curvatures.any():
+            ratios = lateral_ratio(line, consist, one.apex)
+            worst = int(np.argmax(np.abs(ratios)))
+            typer.echo(
+                f"       {quadrant(one, line, shape).value}; at a crawl L/V {ratios[worst]:+.3f} at vehicle {worst + 1}"
+            )
     if not found:
         typer.echo("neither crest nor sag")
     if out is not None:

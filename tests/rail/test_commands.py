@@ -57,6 +57,14 @@ def test_a_table_and_a_picture_are_written(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "terrain.svg").read_text(encoding="utf-8").startswith("<?xml")
 
 
+def test_a_line_with_curves_says_the_quadrant_and_the_lateral_force(tmp_path: Path) -> None:
+    bent = tmp_path / "bent.yaml"
+    bent.write_text("name: bent\ngrade: [[-4000, 8], [0, -8]]\ncurve: [[-2000, 500]]\n", encoding="utf-8")
+    assert re.search(
+        r"crest with significant curvature; at a crawl L/V \+0\.\d+ at vehicle \d+", run(["terrain", str(bent), TRAIN])
+    )
+
+
 STOPS = ["stops", "--friction", "0.7"]
 
 

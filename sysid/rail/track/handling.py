@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.rail.constants import GRAVITY, KMH
 from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
 from sysid.rail.track.features import Feature, Severity
-from sysid.rail.track.terrain import Shape, effective_grade, quasi_static_forces
+from sysid.rail.track.terrain import MEAN, Shape, correlation, effective_grade, quasi_static_forces
 
 SPEED_GAINS = {Severity.LOW: 8.0 * KMH, Severity.MEDIUM: 5.0 * KMH, Severity.HIGH: 3.0 * KMH, Severity.NONE: np.inf}
 """Largest gain of speed in m/s over a crest (the source: predetermined, falling with severity; values ours)."""
@@ -112,6 +114,60 @@ def peak_force(track: TrackProfile, train: Train, x: float) -> ForceEstimate:
     forces = quasi_static_forces(track, train, x)
     at = int(np.argmax(np.abs(forces)))
     return ForceEstimate(force=float(forces[at]), coupler=at + 1)
+
+
+CURVED = 1.0 / 1500.0
+"""Mean curvature under the train in 1/m from which a feature counts as curved (the source: a threshold; value ours)."""
+
+TREAD_DISTANCE = 1.5
+"""Between the circles on which a pair of wheels of standard gauge rolls, in m."""
+
+
+class Quadrant(enum.Enum):
+    """A feature by grade and curvature together; the value is what is said."""
+
+    STRAIGHT_CREST = "crest without curvature"
+    CURVED_CREST = "crest with significant curvature"
+    STRAIGHT_SAG = "sag without curvature"
+    CURVED_SAG = "sag with significant curvature"
+
+
+def quadrant(feature: Feature, track: TrackProfile, shape: Shape) -> Quadrant:
+    """In which quadrant of grade and curvature a feature lies.
+
+    Args:
+        feature: The crest or sag.
+        track: The line.
+        shape: The train, whose leading end is at the apex.
+
+    Returns:
+        The quadrant.
+    """
+    bend = correlation(track, shape, np.array([feature.apex]), pattern=MEAN, values=np.abs(track.curvatures))[0]
+    return Quadrant(f"{feature.kind} {'with significant' if bend >= CURVED else 'without'} curvature")
+
+
+def lateral_ratio(track: TrackProfile, train: Train, x: float, *, speed: float = 0.0) -> NDArray[np.float64]:
+    """L/V of each vehicle by the coupler forces that grades make, the curve's acceleration and the cant.
+
+    Two couplers at an angle of ``curvature * length / 2`` each pull a vehicle sideways with the sum of their forces
+    times that angle; draft pulls to the inside of the curve, buff pushes outside. No slack, no yaw of the vehicle:
+    geometry and statics, where the source gives no equation.
+
+    Args:
+        track: The line.
+        train: The train.
+        x: Of the first vehicle's centre in m.
+        speed: In m/s.
+
+    Returns:
+        Lateral over vertical force, positive to the inside, shape ``(n,)``.
+    """
+    forces = np.concatenate([[0.0], quasi_static_forces(track, train, x), [0.0]])
+    bend, cant = (of(x - train.offsets) for of in (track.curvature, track.superelevation))
+    pulled = (forces[:-1] + forces[1:]) * 0.5 * train.lengths * np.abs(bend)
+    carried = train.masses * (GRAVITY * np.abs(cant) / TREAD_DISTANCE - speed**2 * np.abs(bend))
+    return np.asarray((pulled + carried) / (train.masses * GRAVITY))
 
 
 def sub_trains(train: Train) -> tuple[Shape, ...]:

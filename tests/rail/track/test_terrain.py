@@ -10,7 +10,15 @@ from sysid.rail.dynamics.train import Train, heavy_haul, locomotive, wagon
 from sysid.rail.dynamics.vehicle import Davis, Vehicle
 from sysid.rail.track import terrain
 from sysid.rail.track.features import Severity, StartRule, Thresholds, crest_starts, features
-from sysid.rail.track.handling import crest_handling, peak_force, sag_acceleration, sub_trains
+from sysid.rail.track.handling import (
+    Quadrant,
+    crest_handling,
+    lateral_ratio,
+    peak_force,
+    quadrant,
+    sag_acceleration,
+    sub_trains,
+)
 from sysid.rail.track.terrain import (
     CREST,
     PATTERNS,
@@ -244,6 +252,42 @@ def test_a_train_that_crawls_over_a_crest_has_the_quasi_static_forces() -> None:
     middle = slice(7, 12)
     np.testing.assert_allclose(motion.forces[k, middle].mean(), expected[middle].mean(), rtol=0.35)
     assert (motion.forces[k, middle] > 0.0).all()
+
+
+BENT = TrackProfile.from_steps(
+    "bent crest", grade=[(-5.0 * L, Y), (0.0, -Y)], curvature=[(-5.0 * L, 0.0), (-600.0, 1.0 / 500.0)]
+)
+
+
+@pytest.mark.parametrize(
+    ("track", "expected"),
+    [
+        (TRIANGLE, Quadrant.STRAIGHT_CREST),
+        (BENT, Quadrant.CURVED_CREST),
+        (TROUGH, Quadrant.STRAIGHT_SAG),
+    ],
+    ids=["crest", "crest in a curve", "sag"],
+)
+def test_a_feature_lies_in_a_quadrant_of_grade_and_curvature(track: TrackProfile, expected: Quadrant) -> None:
+    shape, x = uniform(L, 1e7), np.arange(-2000.0, 2000.0, 25.0)
+    (found,) = features(x, correlation(track, shape, x))
+    assert quadrant(found, track, shape) is expected
+
+
+def test_draft_in_a_curve_pulls_inside_by_force_times_length_over_radius() -> None:
+    train = free([100e3] * 100)
+    ratios = lateral_ratio(BENT, train, 495.0)
+    force = peak_force(BENT, train, 495.0).force
+    # The fiftieth vehicle has the largest force behind it and one a fiftieth less before it.
+    assert ratios[49] == pytest.approx(force * (1.0 - 0.5 / 50.0) * 10.0 / 500.0 / (100e3 * 9.80665))
+    np.testing.assert_array_equal(lateral_ratio(TRIANGLE, train, 495.0), 0.0)
+
+
+def test_speed_pushes_outside_and_cant_holds_against_it() -> None:
+    level = TrackProfile.from_steps("canted", curvature=[(-5.0 * L, 1.0 / 500.0)], superelevation=[(-5.0 * L, 0.12)])
+    balanced = np.sqrt(9.80665 * 0.12 / 1.5 * 500.0)
+    assert lateral_ratio(level, free([5e4] * 3), 0.0, speed=balanced) == pytest.approx(0.0, abs=1e-12)
+    assert lateral_ratio(level, free([5e4] * 3), 0.0, speed=2.0 * balanced) == pytest.approx(-3.0 * 0.12 / 1.5)
 
 
 def test_sub_trains_share_the_wagons_by_power() -> None:
