@@ -122,13 +122,14 @@ def _narx(looked: Looked) -> list[Try]:
 def _narx_at_ends(looked: Looked) -> list[Try]:
     """What is held where the output stands in the records.
 
-    Friction and stops switch within a sample, which a start that is trained one step ahead finds.
+    Friction and stops switch within a sample, which a start that is trained one step ahead finds. At a stop past
+    outputs do not show what goes on behind it, a pump that runs down: past inputs do, over as long as that takes.
     """
     found = []
-    for lags, neurons in ((3, 8), (5, 14)):
+    for lags, own, neurons in ((3, 3, 8), (5, 3, 14), (8, 2, 12)):
         first = min(looked.delay, 1)
         inputs = f"{first}:{first + lags - 1}"
-        network = NARX(input_delays=inputs, output_delays=3, neurons=neurons, limits=FOUND)
+        network = NARX(input_delays=inputs, output_delays=own, neurons=neurons, limits=FOUND)
         found.append(Try(structure=network, training=ONE_STEP))
     return found
 
