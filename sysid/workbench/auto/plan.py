@@ -148,16 +148,16 @@ class Plan:
             self.budget.unlimited = 1
             yield from self._rounds_of([one for family in nonlinear_first for one in family.in_motion(self.looked)])
             yield from self._near_the_best()
-        # At ends it is what runs on through them; that a curve levels off there the least of each other kind shows.
+        # At ends it is what runs on through them; where another kind does as well, its least shows at once.
         if self.looked.ends:
             held = [one for family in nonlinear_first for one in family.at_ends(self.looked)]
             kinds = {one.structure.kind for one in held}
             self.budget.unlimited = 1
             yield from self._rounds_of(held)
-            for linear in (True, False):
-                yield from self._rounds_of(
-                    [one for one in self._least(linear=linear) if one.structure.kind not in kinds]
-                )
+            yield from self._rounds_of(self._least(linear=True))
+            # Networks alone: blocks and polynomials, which take long, may wait.
+            rivals = [one for one in self._least(linear=False) if estimator_of(one.structure).initial is not None]
+            yield from self._rounds_of([one for one in rivals if one.structure.kind not in kinds])
             yield from self._near_the_best()
         yield from self._unasked(linear=True)
         self.budget.unlimited = 1  # on a slow machine linear models alone would have taken all
