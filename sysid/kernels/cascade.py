@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from sysid.kernels.arrays import copy_numbers, copy_rows
 from sysid.kernels.cascade_layout import (
@@ -27,12 +28,15 @@ from sysid.kernels.cascade_layout import (
     LOW,
     LOW_CHANNEL,
     SUM_HEAD,
+    Program,
     from_a_line,
     laid_out,
 )
 from sysid.kernels.neurons.table import activate
 from sysid.kernels.registers import LANES, affine, dot, tanh
 
+Array = NDArray[np.float64]
+Held = NDArray[np.int8]
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 ONE, TWO, HEAD = np.uintp(1), np.uintp(2), np.uintp(SUM_HEAD)
@@ -182,7 +186,7 @@ def _walk(p, layout, values, past, kept, held):
             _keep(kept[t], h, p.neurons, neuron_first)
 
 
-def run(p, depth, rest, values, kept, held):
+def run(p: Program, depth: int, rest: Array, values: Array, kept: Array, held: Held) -> None:
     """Run all members over all samples, writing the outputs into ``values``.
 
     The layout is handed from one compiled function to the other: in one with the passes it was compiled again for each
@@ -200,7 +204,7 @@ def run(p, depth, rest, values, kept, held):
     _run(p, laid_out(p), depth, rest, values, kept, held)
 
 
-def go_on(p, past, values, kept, held):
+def go_on(p: Program, past: int, values: Array, kept: Array, held: Held) -> None:
     """Run all members from a row on, whatever stands in the rows before it.
 
     Args:
