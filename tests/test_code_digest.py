@@ -300,13 +300,16 @@ def test_a_kernel_concerns_the_fits_that_run_it() -> None:
 @pytest.mark.parametrize("root", ["sysid.estimation:fit_narx", "sysid.export:export_bundle"])
 def test_it_is_quick(root: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "kept_or_taken", lambda _home, _asked, take: take())  # however often it is needed
-    look_again()
-    module._parsed.cache_clear()
     gc.collect()
     gc.freeze()  # what ten thousand tests have left in the process is not searched for garbage meanwhile
+    taken = []
     try:
-        began = time.thread_time()  # nor counts what threads of other tests still do
-        code_digest(root)
-        assert time.thread_time() - began < 1.0  # some 0.2 s on a quiet machine
+        for _ in range(3):  # the least: what else runs on the machine can only add
+            look_again()
+            module._parsed.cache_clear()
+            began = time.thread_time()  # nor counts what threads of other tests still do
+            code_digest(root)
+            taken.append(time.thread_time() - began)
     finally:
         gc.unfreeze()
+    assert min(taken) < 1.0  # some 0.2 s on a quiet machine

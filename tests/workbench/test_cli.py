@@ -174,7 +174,9 @@ def test_a_workspace_of_ones_own_from_first_to_last(
     run = sysid(mine, "run", "tank", "--no-tracking")
     assert (run.returncode, run.stderr) == (0, "")
     lines = run.stdout.splitlines()
-    assert [line.split()[1] for line in lines if line.startswith("│") and "closed" in line] == ["free"]
+    assert [line.split("│")[1].strip() for line in lines if line.startswith("│") and "closed" in line] == [
+        "network, closed loop"
+    ]
     assert "Report:  runs/tank/report/index.html" in lines
     assert (mine / "runs/tank/report/index.html").is_file()
     assert not (mine / "mlflow.db").exists()
