@@ -23,7 +23,7 @@ from sysid.estimation.grey_box.by_case import for_case
 from sysid.estimation.grey_box.profile import Profile
 from sysid.ingest.arrays import inputs_of
 from sysid.ingest.frames import as_array
-from sysid.models import BuiltModel, Cascade, History, Start
+from sysid.models import Cascade, History, Start
 from sysid.models.curve_values import curve_values
 from sysid.models.form import unheeded
 from sysid.traces import Role, TraceSet
@@ -179,14 +179,6 @@ class Fit(FitResult):
         """
         from sysid.reporting.figures.curves_figure import curves_figure
 
-        if not isinstance(self.model, BuiltModel):
-            raise ConfigError(
-                "the model has no static curves",
-                where="structure",
-                expected="a HammersteinWiener or WienerHammerstein model with a curve",
-                got=self.model.structure.label,
-                remedy="plot its free run in place of them: fit.plot()",
-            )
         records = tuple(traces) if traces is not None else self.traces.with_role(Role.ESTIMATION)
         runs = [Experiment.for_model(trace, self.model, self.start) for trace in records]
         curves = curve_values(self.model, [(run.inputs, run.history) for run in runs])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +82,7 @@ class CurvePoints:
         }  # fmt: skip
 
 
-def curve_values(model: BuiltModel, records: Sequence[tuple[Array, History]]) -> tuple[CurveValues, ...]:
+def curve_values(model: AbstractModel, records: Sequence[tuple[Array, History]]) -> tuple[CurveValues, ...]:
     """The curves of a Hammerstein-Wiener or Wiener-Hammerstein model over some records.
 
     Args:
@@ -95,8 +95,7 @@ def curve_values(model: BuiltModel, records: Sequence[tuple[Array, History]]) ->
     Raises:
         ConfigError: If the model has no curves.
     """
-    wanted = _wanted(model)
-    if not wanted:
+    if not has_curves(model):
         raise ConfigError(
             "the model has no static curves",
             where="structure",
@@ -106,11 +105,11 @@ def curve_values(model: BuiltModel, records: Sequence[tuple[Array, History]]) ->
         )
     return tuple(
         CurveValues(title=title, before=before, behind=behind, x=_run(model, x, records), y=_run(model, y, records))
-        for title, before, behind, x, y in wanted
+        for title, before, behind, x, y in _wanted(model)
     )
 
 
-def has_curves(model: AbstractModel) -> bool:
+def has_curves(model: AbstractModel) -> TypeGuard[BuiltModel]:
     """Whether a model has static curves that can be drawn."""
     return isinstance(model, BuiltModel) and bool(_wanted(model))
 

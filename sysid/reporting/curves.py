@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 
-from sysid.bounded_text import read_json
-from sysid.errors import ConfigError
 from sysid.models.curve_values import CurvePoints
-from sysid.reporting.records import Number
+from sysid.reporting.records import Number, parse_record, read_document
 
 CURVES_FILE: Final = "curves.json"
+_ARRAYS: Final = ("x", "y", "edges", "counts")
 
 
 class _Curve(BaseModel):
@@ -28,11 +27,15 @@ class _Curve(BaseModel):
     edges: list[Number]
     counts: list[Number]
 
+    @model_validator(mode="after")
+    def _fit_together(self) -> Self:
+        if len(self.x) != len(self.y) or len(self.edges) != len(self.counts) + 1:
+            raise ValueError("the numbers of one curve do not belong together")
+        return self
+
     def points(self) -> CurvePoints:
         """As the picture takes it."""
-        arrays = {name: np.array(getattr(self, name), dtype=np.float64) for name in ("x", "y", "edges", "counts")}
-        if arrays["x"].shape != arrays["y"].shape or len(arrays["edges"]) != len(arrays["counts"]) + 1:
-            raise ValueError("the numbers of one curve do not belong together")
+        arrays = {name: np.array(getattr(self, name), dtype=np.float64) for name in _ARRAYS}
         return CurvePoints(title=self.title, before=self.before, behind=self.behind, **arrays)
 
 
@@ -54,15 +57,7 @@ def read_curves(folder: Path) -> list[CurvePoints]:
         ConfigError: If the file is damaged.
     """
     path = Path(folder) / CURVES_FILE
-    try:
-        return [curve.points() for curve in _Curves.model_validate(read_json(path)).curves]
-    except FileNotFoundError:
+    if not path.is_file():
         return []
-    except (OSError, ValueError, RecursionError) as error:
-        raise ConfigError(
-            "the stored curves cannot be read",
-            where=path,
-            expected="curves with as many values as points",
-            got=f"{error!s:.200}",
-            remedy="run the pipeline again; it resumes from what is finished",
-        ) from error
+    stored = parse_record(_Curves, read_document(path), where=path, what="the stored curves")
+    return [curve.points() for curve in stored.curves]

@@ -7,9 +7,7 @@ from typing import Final
 
 from pydantic import BaseModel, ConfigDict
 
-from sysid.bounded_text import read_json
-from sysid.errors import ConfigError
-from sysid.reporting.records import Number
+from sysid.reporting.records import Number, parse_record, read_document
 
 RESIDUALS_FILE: Final = "residuals.json"
 
@@ -68,15 +66,6 @@ def read_residuals(folder: Path) -> dict[str, GroupRecord]:
         ConfigError: If the file is damaged.
     """
     path = Path(folder) / RESIDUALS_FILE
-    try:
-        return _Residuals.model_validate(read_json(path)).groups
-    except FileNotFoundError:
+    if not path.is_file():
         return {}
-    except (OSError, ValueError, RecursionError) as error:
-        raise ConfigError(
-            "the stored residuals cannot be read",
-            where=path,
-            expected="groups of cases with their analyses",
-            got=f"{error!s:.200}",
-            remedy="run the pipeline again; it resumes from what is finished",
-        ) from error
+    return parse_record(_Residuals, read_document(path), where=path, what="the stored residuals").groups

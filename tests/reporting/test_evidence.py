@@ -134,10 +134,19 @@ def test_a_run_that_stored_none_has_none(run_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["fit.json", "residuals.json", "curves.json"])
-@pytest.mark.parametrize("content", ["", "[]", '{"groups": 1, "model": 2}'], ids=["empty", "a list", "wrong types"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "[]",
+        '{"groups": 1, "model": 2}',
+        '{"curves": [{"title": "", "before": "", "behind": "", "x": [1], "y": [], "edges": [0], "counts": []}]}',
+    ],
+    ids=["empty", "a list", "wrong types", "a point without a value"],
+)
 def test_damage_is_refused_with_the_file(run: Path, name: str, content: str) -> None:
     (run / "fits" / "arx" / name).write_text(content)
-    with pytest.raises(ConfigError, match="cannot be read") as refusal:
+    with pytest.raises(ConfigError, match=r"cannot be read|are damaged") as refusal:
         evidence_sections(run, read_results(run))
     assert refusal.value.where == run / "fits" / "arx" / name
 

@@ -128,10 +128,10 @@ def fit_narx(
             posterior, chosen.model, [Experiment.for_model(t, chosen.model, start) for t in selection]
         )
     seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
-    fit = multistart_result(choice, list(tasks), training, status, seconds)
-    model = template  # whose limits all of them have
-    notes = [told(model.between, mapping.output, model.output_unit)] * bool(model.limits)
-    return replace(with_note(fit, windows), posterior=posterior, notes=(*with_note(fit, windows).notes, *notes))
+    fit = with_note(multistart_result(choice, list(tasks), training, status, seconds), windows)
+    # All of them have the template's limits.
+    held = (told(template.between, mapping.output, template.output_unit),) if template.limits else ()
+    return replace(fit, posterior=posterior, notes=(*fit.notes, *held))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,7 +9,6 @@ from sysid.errors import TraceError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.experiment import Experiment
-from sysid.models.built_model import BuiltModel
 from sysid.models.curve_values import curve_values, has_curves
 from sysid.traces import Role
 from sysid.validation import Linearity, analyse_residuals, judge_linearity
@@ -60,7 +59,7 @@ def curves(fit: FitResult, data: Data, config: PipelineConfig) -> dict[str, Any]
     Returns:
         The contents of ``curves.json``; ``None`` for a model without curves.
     """
-    if not (isinstance(fit.model, BuiltModel) and has_curves(fit.model)):
+    if not has_curves(fit.model):
         return None
     runs = [Experiment.for_model(trace, fit.model, config.start) for trace in data.traces.with_role(Role.ESTIMATION)]
     found = curve_values(fit.model, [(run.inputs, run.history) for run in runs])
