@@ -27,7 +27,7 @@ class Flag(enum.IntFlag):
     NOT_A_NUMBER = 4
     """An input is infinite or not a number, or an output is none: set the state anew before relying on what follows."""
     AT_LIMIT = 8
-    """An output is held at a limit that was declared for it, such as a pressure that cannot be below atmosphere."""
+    """An output is held at a limit, declared or found in the records, as a pressure that cannot be below atmosphere."""
     IN_DOUBT = 16
     """The models of a committee are further apart than they are where their answer is right: it may be wrong."""
 
@@ -36,7 +36,7 @@ MEANING = {
     Flag.OUTSIDE_RANGE: "an input is outside its declared range; the accuracy is unknown",
     Flag.AT_BOUND: "an output is held at one of its bounds; it is wrong",
     Flag.NOT_A_NUMBER: "an input is infinite or not a number, or an output is none; set the state anew",
-    Flag.AT_LIMIT: "an output is held at a limit that was declared for it",
+    Flag.AT_LIMIT: "an output is held at one of its limits, declared or found in the records",
     Flag.IN_DOUBT: "the models of the committee disagree; the answer may be wrong",
 }
 """Each flag as a sentence, for the files and the model card."""

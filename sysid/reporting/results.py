@@ -154,6 +154,9 @@ class StabilityRecord(Record):
     source: str = Field(description="Where the sequences come from.")
     seed: int = Field(description="Of the sequences.")
     sequences: int = Field(description="How many were run.")
+    asked: int | None = Field(
+        default=None, description="How many were to be run, where the time ended before; null where all were."
+    )
     unbounded: int = Field(description="How many left the bounds.")
     beyond: int = Field(
         default=0, description="How many took a linear model of the records out of the bounds too; not judged."

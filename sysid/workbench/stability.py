@@ -23,6 +23,8 @@ class ExcursionConfig(BaseModel):
         seed: Seed of the sequences.
         choose: Whether the best start gives way to the best stable one. It never does in a fit of the open loop, which
             is not made to run free.
+        time_share: Share of the fit's own time that its checks may take together, and a minute in any case; on how
+            many sequences the verdict then rests is said.
     """
 
     model_config = STRICT
@@ -31,10 +33,11 @@ class ExcursionConfig(BaseModel):
     tolerance: float = Field(default=_DEFAULT.tolerance, gt=0.0)
     seed: int = Field(default=_DEFAULT.seed, ge=0)
     choose: bool = _DEFAULT.choose
+    time_share: float = Field(default=_DEFAULT.time_share, gt=0.0)
 
     def options(self) -> StabilityOptions:
         """What is asked."""
-        return StabilityOptions(count=self.count, tolerance=self.tolerance, seed=self.seed, choose=self.choose)
+        return StabilityOptions(**{name: getattr(self, name) for name in ExcursionConfig.model_fields})
 
 
 class StabilityConfig(ExcursionConfig):

@@ -68,8 +68,8 @@ def test_figures_are_told_by_case_and_output(bundle, card):
     "text",
     [
         "Outputs: BP [psi], AR [psi], ER [psi], V [psi], W [psi], BC [psi gauge], X [psi].",
-        "- BP is held at or above 0.0 and at or below STP: a limit that was declared for it.",
-        "8 (an output is held at a limit that was declared for it)",
+        "- BP is held at or above 0.0 and at or below STP: a limit that was declared for it or found in the records.",
+        "8 (an output is held at one of its limits, declared or found in the records)",
         "5 models, run one after the other within a sample",
         "In float32 files the state has",
     ],

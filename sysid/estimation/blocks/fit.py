@@ -23,6 +23,9 @@ from sysid.traces import Trace
 STARTS = 4
 """Starts of a fit that asks for none: for two blocks, ways to part the linear model; else draws of the curves."""
 
+LINEAR = 0.2
+"""Share of a fit's time that each of its linear models may take."""
+
 check_training = partial(check_hidden_states, "a block-oriented model")
 """Refuses options that do not apply to hidden states."""
 
@@ -60,24 +63,27 @@ def fit_hammerstein_wiener(
         ConfigError: If an option does not apply.
         TraceError: If no sample counts, or there is no linear model to start from.
     """
-    began = time.perf_counter()
+    began, training = time.perf_counter(), (training or Training()).with_starts(STARTS)
     rectified = structure.output.kind == "absolute"
     begun = _begun(
-        traces, mapping, structure, structure.states, start=start, rest_output=rest_output, rectified=rectified
-    )
+        traces, mapping, structure, structure.states, start=start, rest_output=rest_output, rectified=rectified,
+        seconds=LINEAR * training.max_time_s,
+    )  # fmt: skip
     lags, ways = structure.lags(len(mapping.inputs)), [begun]
     if begun.integrates and not rectified:
         late = shifted(traces, mapping, lags)
-        ways.insert(
-            0, integrating_start(late, mapping, structure.states, start=start or Start(), scaling=begun.scaling)
-        )
+        stepping = integrating_start(
+            late, mapping, structure.states, start=start or Start(), scaling=begun.scaling,
+            seconds=LINEAR * training.max_time_s,
+        )  # fmt: skip
+        ways.insert(0, stepping)
     direct = [lag == 0 for lag in lags]
     (grey, curved), *others = [hammerstein_wiener(structure, mapping, one, whole(one, direct=direct)) for one in ways]
     template, experiments = built_template(
         traces, mapping, grey, built_of=structure, start=start or Start(), rest_output=rest_output
     )
     found = fit_equations(
-        template, experiments, (training or Training()).with_starts(STARTS), (traces, selection, start or Start()),
+        template, experiments, training, (traces, selection, start or Start()),
         others=_starts_of([one for one, _ in others]), scattered=curved, began=began, vet=vet, on_progress=on_progress,
     )  # fmt: skip
     return with_equations(found)
@@ -101,7 +107,10 @@ def fit_wiener_hammerstein(
     """
     began = time.perf_counter()
     training = (training or Training()).with_starts(STARTS)
-    begun = _begun(traces, mapping, structure, structure.first + structure.second, start=start, rest_output=rest_output)
+    begun = _begun(
+        traces, mapping, structure, structure.first + structure.second, start=start, rest_output=rest_output,
+        seconds=LINEAR * training.max_time_s,
+    )  # fmt: skip
     direct = [lag == 0 for lag in structure.lags(len(mapping.inputs))]
     longest = max(shifted(traces, mapping, structure.lags(len(mapping.inputs))), key=len)
     signals = (
@@ -141,8 +150,11 @@ def _begun(
     *,
     start: Start | None,
     rest_output: float | None,
+    seconds: float,
     rectified: bool = False,
 ) -> LinearStart:
     late = shifted(traces, mapping, structure.lags(len(mapping.inputs)))
     output = "absolute" if rectified else "plain"
-    return linear_start(late, mapping, states, start=start or Start(), rest_output=rest_output, output=output)
+    return linear_start(
+        late, mapping, states, start=start or Start(), rest_output=rest_output, output=output, seconds=seconds
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -78,8 +79,9 @@ def shifted(traces: Sequence[Trace], mapping: Mapping, lags: Sequence[int]) -> l
 
 
 def linear_start(
-    traces: Sequence[Trace], mapping: Mapping, states: int, *, start: Start, rest_output: float | None, output: str
-) -> LinearStart:
+    traces: Sequence[Trace], mapping: Mapping, states: int, *, start: Start, rest_output: float | None, output: str,
+    seconds: float = math.inf,
+) -> LinearStart:  # fmt: skip
     """The linear model of least error in free run.
 
     Args:
@@ -89,11 +91,12 @@ def linear_start(
         start: What stands before each trace.
         rest_output: Output at rest, in its unit.
         output: ``plain``, or ``absolute``.
+        seconds: Wall time at most.
 
     Returns:
         The start.
     """
-    training = Training(starts=1, max_iterations=ITERATIONS, choose_by="evidence")
+    training = Training(starts=1, max_iterations=ITERATIONS, max_time_s=seconds, choose_by="evidence")
     structure = NeuralStateSpace(states=states, neurons=0, output=output)
     fit = fit_neural_state_space(traces, mapping, structure, training, start=start, rest_output=rest_output)
     model = fit.model
@@ -115,8 +118,9 @@ def linear_start(
 
 
 def integrating_start(
-    traces: Sequence[Trace], mapping: Mapping, states: int, *, start: Start, scaling: Scaling
-) -> LinearStart:
+    traces: Sequence[Trace], mapping: Mapping, states: int, *, start: Start, scaling: Scaling,
+    seconds: float = math.inf,
+) -> LinearStart:  # fmt: skip
     """The linear model of least error with a pole of 1: that of the output's steps, summed up.
 
     The free run's own error says little of the other poles of a plant that integrates: the slow one takes it all.
@@ -127,6 +131,7 @@ def integrating_start(
         states: Number of states, the integrator among them.
         start: What stands before each trace.
         scaling: Of the output itself.
+        seconds: Wall time at most.
 
     Returns:
         The start.
@@ -136,7 +141,9 @@ def integrating_start(
         values, at = trace.values.copy(), [channel.name for channel in trace.channels].index(mapping.output)
         values[1:, at], values[0, at] = np.diff(trace.values[:, at]), 0.0
         stepped.append(replace(trace, values=values))
-    steps = linear_start(stepped, mapping, max(states - 1, 1), start=start, rest_output=0.0, output="plain")
+    steps = linear_start(
+        stepped, mapping, max(states - 1, 1), start=start, rest_output=0.0, output="plain", seconds=seconds
+    )
     ratio = steps.scaling.output_scale / scaling.output_scale
     poles = steps.poles if states > 1 else np.zeros(0, dtype=np.complex128)
     return LinearStart(

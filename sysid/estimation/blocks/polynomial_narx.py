@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 FAR = 10.0
 """Level of a channel, in standard deviations, from which its polynomials are of what is above it."""
 
+CHOOSING, COUNTING = 0.3, 0.6
+"""Shares of a fit's time by whose ends its terms are chosen, and it is known how many of them the free run wants."""
+
 check_training = partial(check_hidden_states, "a polynomial NARX model")
 """Refuses options that do not apply: its terms are chosen one step ahead, and refined for the free run."""
 
@@ -79,9 +82,13 @@ def fit_polynomial_narx(
     origin = _origin(traces, mapping)
     places = [i for i, lags_i in enumerate((*lags.inputs, lags.output)) for _ in lags_i]
     found = choose_terms(
-        X - origin[places][:, None], y - origin[-1], structure.candidates(len(mapping.inputs)), structure.terms
-    )
-    best = _best(found, structure, mapping, data=(traces, selection), start=start, rest=rest, origin=origin)
+        X - origin[places][:, None], y - origin[-1], structure.candidates(len(mapping.inputs)), structure.terms,
+        until=began + CHOOSING * training.max_time_s,
+    )  # fmt: skip
+    best, tried = _best(
+        found, structure, mapping, data=(traces, selection), start=start, rest=rest, origin=origin,
+        until=began + COUNTING * training.max_time_s,
+    )  # fmt: skip
     fitted = fit_equations(
         *built_template(traces, mapping, best.grey, built_of=structure, start=start, rest_output=rest),
         training, (traces, selection, start),
@@ -95,6 +102,11 @@ def fit_polynomial_narx(
         for term, share in zip(found.terms[: best.terms], found.reductions, strict=False)
     )
     told = [f"One step ahead the terms explain, in the order in which they came: {explained}."] * bool(explained)
+    if found.cut or tried < len(found.terms):
+        told.append(
+            f"The time ended before all was tried: {len(found.terms)} terms were chosen one step ahead, of at most "
+            f"{structure.terms}, and {tried} of them were run freely. Allow more time, or ask for fewer terms or lags."
+        )
     return replace(fitted, notes=(*fitted.notes, model.equations, *told))
 
 
@@ -147,8 +159,12 @@ def _best(
     start: Start,
     rest: float,
     origin: Array,
-) -> _Candidate:
-    """The number of terms whose free run is best, over the traces that choose where there are any."""
+    until: float,
+) -> tuple[_Candidate, int]:
+    """The number of terms whose free run is best, over the traces that choose where there are any.
+
+    And how many numbers there was time for; until one has a free run, time does not end it.
+    """
     traces, selection = data
     tried: list[_Candidate] = []
     for n, coefficients in enumerate(found.coefficients, start=1):
@@ -164,13 +180,15 @@ def _best(
         price = 0.0 if selection else n * math.log(max(count, 1)) / max(count, 1)
         value = math.log(max(squares / max(count, 1), 1e-300)) + price if math.isfinite(squares) else math.inf
         tried.append(_Candidate(terms=n, grey=grey, criterion=value))
+        if time.perf_counter() > until and math.isfinite(min(one.criterion for one in tried)):
+            break
     usable = [one for one in tried if math.isfinite(one.criterion)]
     if not usable:
         raise FitDivergedError(
             f"none of the polynomials of up to {len(tried)} terms has a free run that stays finite",
             remedy="use a lower degree or fewer lags, remove what is noise, or fit a neural state space",
         )
-    return min(usable, key=lambda one: one.criterion)
+    return min(usable, key=lambda one: one.criterion), len(tried)
 
 
 def equations(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -29,14 +31,18 @@ class Chosen:
         terms: The terms.
         reductions: Of each the share of the output's energy that it explains: its error reduction ratio.
         coefficients: By number of terms, from 1 on, least squares one step ahead, in units.
+        cut: Whether the time ended before there were as many as were asked for.
     """
 
     terms: tuple[Term, ...]
     reductions: tuple[float, ...]
     coefficients: tuple[tuple[float, ...], ...]
+    cut: bool = False
 
 
-def choose_terms(regressors: Array, output: Array, candidates: Sequence[Term], most: int) -> Chosen:
+def choose_terms(
+    regressors: Array, output: Array, candidates: Sequence[Term], most: int, *, until: float = math.inf
+) -> Chosen:
     """Forward orthogonal least squares (Billings 2013, chapter 3; Chen, Billings and Luo 1989).
 
     Each candidate's energy and agreement with the output, apart from what is chosen already, are brought up to date by
@@ -47,6 +53,7 @@ def choose_terms(regressors: Array, output: Array, candidates: Sequence[Term], m
         output: Shape ``(n_samples,)``.
         candidates: Products of regressors.
         most: Terms at most.
+        until: When it ends with the terms that it has, on the clock of ``time.perf_counter``.
 
     Returns:
         What was chosen.
@@ -63,7 +70,9 @@ def choose_terms(regressors: Array, output: Array, candidates: Sequence[Term], m
     taken: list[int] = []
     reductions: list[float] = []
     basis: list[Array] = []
-    while len(taken) < min(most, len(candidates), output.size - 1):
+    most = min(most, len(candidates), output.size - 1)
+    late = False
+    while len(taken) < most and not late:
         new = energy > LEFT * begun
         new[taken] = False
         gains = np.where(new, agreement**2 / np.maximum(energy, 1e-300), 0.0)
@@ -83,11 +92,13 @@ def choose_terms(regressors: Array, output: Array, candidates: Sequence[Term], m
             along = products(scaled, [candidates[i] for i in part]) @ q
             energy[part] -= along**2
             agreement[part] -= along * shown
+        late = time.perf_counter() > until
     # Where nothing is explained, the constant is what there is.
     terms = [candidates[i] for i in taken] or [()]
     return Chosen(
-        terms=tuple(terms), reductions=tuple(reductions), coefficients=_least_squares(scaled, scale, output, terms)
-    )
+        terms=tuple(terms), reductions=tuple(reductions), coefficients=_least_squares(scaled, scale, output, terms),
+        cut=late and len(taken) < most,
+    )  # fmt: skip
 
 
 def products(regressors: Array, terms: Sequence[Term]) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,13 +94,14 @@ def settled(candidate: starts.Candidate, provider: EquationProvider) -> starts.C
     return replace(candidate, solution=solution)
 
 
-def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stopped: bool) -> Done:
+def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, until: float, stopped: bool) -> Done:
     """The chosen candidate with switches as they are, and with steps that its parameters need.
 
     Args:
         ready: What the fit began with.
         chosen: The candidate.
         training: How it was trained.
+        until: When it has to have ended, on the clock of ``time.perf_counter``.
         stopped: Whether somebody asked it to stop: then nothing is trained any more.
 
     Returns:
@@ -108,11 +110,11 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stop
     provider, solution, stepping = ready.provider, chosen.solution, ready.stepping
     softened = float("nan")
     if provider.form.n_outputs > 1 and not stopped:
-        provider, solution = _weighed(provider, solution, training)
+        provider, solution = _weighed(provider, solution, training, until)
     if any(one.parameter.prior is not None for one in ready.named) and training.regularisation is None and not stopped:
-        solution = _balanced(provider, solution, training)
+        solution = _balanced(provider, solution, training, until)
     if provider.form.lowered.switches and not stopped:
-        provider, solution, softened = _sharpened(provider, solution, training)
+        provider, solution, softened = _sharpened(provider, solution, training, until)
     exact = provider.with_form(replace(provider.form, widths=np.zeros(len(provider.form.widths))))
     if ready.template.grey.substeps is None and not stopped:
         for _ in range(STEP_ROUNDS):
@@ -125,7 +127,7 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stop
             provider, exact = (
                 one.with_form(replace(one.form, substeps=stepping.substeps)) for one in (provider, exact)
             )
-            solution = _gone_on(provider, solution, training)
+            solution = _gone_on(provider, solution, training, until)
     seen, _ = seen_terms(exact, solution.theta)
     model = replace(
         ready.template,
@@ -138,7 +140,9 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, stop
     return Done(candidate=candidate, provider=provider, stepping=stepping, softened=softened)
 
 
-def _weighed(provider: EquationProvider, solution: Solution, training: Training) -> tuple[EquationProvider, Solution]:
+def _weighed(
+    provider: EquationProvider, solution: Solution, training: Training, until: float
+) -> tuple[EquationProvider, Solution]:
     """Outputs over what is left of each: a noisy one does not blur what a clean one shows of the states they share."""
     for _ in range(NOISE_ROUNDS):
         noise = noise_of(provider, solution.theta)
@@ -146,7 +150,7 @@ def _weighed(provider: EquationProvider, solution: Solution, training: Training)
         if np.abs(np.log(noise / before)).max() < ALIKE:
             break
         provider = replace(provider, noise=noise)
-        solution = _gone_on(provider, solution, training)
+        solution = _gone_on(provider, solution, training, until)
     return provider, solution
 
 
@@ -165,12 +169,12 @@ def noise_of(provider: EquationProvider, theta: Array) -> Array:
     return np.asarray(left / np.exp(np.mean(np.log(left))))
 
 
-def _balanced(provider: EquationProvider, solution: Solution, training: Training) -> Solution:
+def _balanced(provider: EquationProvider, solution: Solution, training: Training, until: float) -> Solution:
     """Declared priors weighed against the noise that is left: a fit may converge before its evidence has spoken."""
     for _ in range(PRIOR_ROUNDS):
         state, before = solution.state, solution.at.loss
         prior, _ = update(state.prior, state.theta, state.at, provider.n_samples)
-        solution = _gone_on(provider, replace(solution, state=replace(state, prior=prior)), training)
+        solution = _gone_on(provider, replace(solution, state=replace(state, prior=prior)), training, until)
         if not solution.at.loss < (1.0 - ALIKE) * before:  # what is left says what the noise is
             break
     return solution
@@ -183,7 +187,7 @@ def _accuracy(solution: Solution, provider: EquationProvider) -> float:
 
 
 def _sharpened(
-    provider: EquationProvider, solution: Solution, training: Training
+    provider: EquationProvider, solution: Solution, training: Training, until: float
 ) -> tuple[EquationProvider, Solution, float]:
     """Switches sharper and sharper, as long as the run with exact ones gains by it.
 
@@ -196,7 +200,7 @@ def _sharpened(
     while len(tried) < ROUNDS and not abs(best[0] - best[2].at.loss) <= SAME * best[2].at.loss:
         tried.append(best[0])
         now = now.with_form(replace(now.form, widths=SHARPER * now.form.widths))
-        at = _gone_on(now, at, training)
+        at = _gone_on(now, at, training, until)
         loss = exact.loss(at.theta)
         if loss < best[0]:
             best = (loss, now, at)
@@ -204,9 +208,9 @@ def _sharpened(
     return best[1], best[2], best[0] / soft if soft > 1e-200 else 1.0
 
 
-def _gone_on(provider: EquationProvider, solution: Solution, training: Training) -> Solution:
+def _gone_on(provider: EquationProvider, solution: Solution, training: Training, until: float) -> Solution:
     """The same fit under records that are run otherwise."""
-    seconds = max(training.max_time_s - solution.curve[-1].elapsed_s, 0.0)
+    seconds = max(until - time.perf_counter(), 0.0)
     iterations = max(20, training.max_iterations // 5)
     engine = LevenbergMarquardt(
         termination=Termination(

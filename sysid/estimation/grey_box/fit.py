@@ -255,6 +255,7 @@ def fit_equations(
         initial=None,
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
+        until=starts.deadline(began, training, on_progress),
     )
     # The latest first: of a start that converged, the last look at it is chosen, and not one that saw the same.
     candidates = [settled(one, ready.provider) for one in reversed(starts.run(multistart))]
@@ -263,7 +264,7 @@ def fit_equations(
         race = choice.chosen
         ready, choice = _over_all(ready, multistart, windows, choice)
         candidates = in_place(candidates, race, choice.chosen)
-    done = finished(ready, choice.chosen, training, stopped=multistart.stop.is_set())
+    done = finished(ready, choice.chosen, training, until=multistart.until, stopped=multistart.stop.is_set())
     candidates = [done.candidate if one is choice.chosen else one for one in candidates]
     choice = replace(choice, chosen=done.candidate)
     records = [(e.inputs, e.history) for e in experiments]

@@ -9,7 +9,9 @@ published as one on unseen data.
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -20,7 +22,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.least_squares.checkpoint import Checkpoint
-from sysid.estimation.least_squares.checkpoints import Checkpoints
+from sysid.estimation.least_squares.checkpoints import Checkpoints, checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
@@ -46,6 +48,9 @@ INITIAL_ALPHA = 1e-2
 """Precision of the weights before the evidence has spoken: weak, but enough to keep the first steps of an
 underdetermined network small."""
 
+PRETRAINED = 0.4
+"""Share of a fit's time that its starts may take one step ahead."""
+
 
 Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel | EquationModel
 """What is trained here."""
@@ -68,6 +73,7 @@ class Multistart:
         on_progress: Called after every iteration, from the threads that train.
         resume: Where the first start was put aside; ``None`` to begin it.
         pretraining: Where a random start is drawn and trained one step ahead before anything else; ``None`` for none.
+        until: When the fit has to have ended, on the clock of ``time.perf_counter``; infinity for no limit.
     """
 
     training: Training
@@ -81,6 +87,7 @@ class Multistart:
     on_progress: Callable[[FitProgress], None]
     resume: Checkpoint | None = None
     pretraining: StepSamples | None = None
+    until: float = math.inf
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
     """Where the runs of this multistart, and of others of the same fit, are kept."""
     name: str = ""
@@ -92,6 +99,10 @@ class Multistart:
     def model(self, theta: NDArray[np.float64]) -> Network:
         """The model with these parameters of the basis."""
         return replace(self.template, theta=self.to_plain @ theta)
+
+    def left(self, run: str) -> float:
+        """Seconds that a run may take, what earlier sessions have spent on it included."""
+        return max(0.0, self.until - time.perf_counter()) + self.checkpoints.spent_s(run)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,6 +138,20 @@ class Candidate:
     def loss(self) -> float:
         """Loss on the estimation traces."""
         return self.solution.at.loss
+
+
+def deadline(began: float, training: Training, on_progress: Callable[[FitProgress], None]) -> float:
+    """When a fit has to have ended: its time is that of all that it does, over all its sessions.
+
+    Args:
+        began: When this session of it began, on the clock of ``time.perf_counter``.
+        training: How long it may take.
+        on_progress: Whom it tells, who also knows what earlier sessions have spent.
+
+    Returns:
+        The time on that clock; infinity for no limit.
+    """
+    return began + training.max_time_s - checkpoints_of(on_progress).earlier_s
 
 
 def check_samples(provider: AbstractProvider) -> None:
@@ -167,12 +192,12 @@ def run(multistart: Multistart) -> list[Candidate]:
     numbers = list(range(training.n_starts))
     latest: dict[int, Candidate] = {}
     seen: list[Candidate] = []
-    total = _work(training.n_starts, rungs)
+    total = _turns(training.n_starts, rungs, training.workers)
     # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
     with one_blas_thread():
         for rung, share in enumerate(rungs):
             before = rungs[rung - 1] if rung else 0.0
-            seconds = training.max_time_s * (share - before) * training.workers / total
+            seconds = training.max_time_s * (share - before) / total
             reached = _rung(multistart, numbers, latest, share, seconds)
             seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
             if multistart.stop.is_set():
@@ -239,25 +264,36 @@ def _work(starts: int, rungs: Sequence[float]) -> float:
     return work
 
 
+def _turns(starts: int, rungs: Sequence[float], workers: int) -> float:
+    """How long the whole multistart takes where so many starts run at the same time, in units of one start's run."""
+    turns, before, n = 0.0, 0.0, starts
+    for share in rungs:
+        turns, before, n = turns + math.ceil(n / workers) * (share - before), share, max(1, (n + 1) // 2)
+    return turns
+
+
 def _advance(multistart: Multistart, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
     training = multistart.training
     iterations = max(1, round(share * training.max_iterations))
-    engine, keep = _engine(multistart, number, iterations, seconds), multistart.checkpoints
-    run = f"{multistart.name}start {number + 1}, to {iterations}"
+    run, keep = f"{multistart.name}start {number + 1}, to {iterations}", multistart.checkpoints
+
+    def in_time() -> LevenbergMarquardt:
+        return _engine(multistart, number, iterations, min(seconds, multistart.left(run)))
+
     if before is None and number == 0 and multistart.resume is not None:
         prior = multistart.layout.prior(
             _in_basis(multistart, multistart.layout.centre()), alpha=INITIAL_ALPHA, beta=1.0
         )
         seed: int | None = training.seed
-        solution = keep.resume(run, engine, multistart.provider, multistart.resume.state(multistart.provider, prior))
+        solution = keep.resume(run, in_time(), multistart.provider, multistart.resume.state(multistart.provider, prior))
     elif before is None:
         seed, theta, centre = _begin(multistart, number)
         if multistart.pretraining is not None and seed is not None:
             theta = _pretraining(multistart, multistart.pretraining, number, seed, centre)
         prior = first_prior(training, multistart.layout, multistart.provider, theta, centre)
-        solution = keep.minimise(run, engine, multistart.provider, theta, prior)
+        solution = keep.minimise(run, in_time(), multistart.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
-        seed, solution = before.seed, keep.resume(run, engine, multistart.provider, before.solution.state)
+        seed, solution = before.seed, keep.resume(run, in_time(), multistart.provider, before.solution.state)
     else:
         return before
     multistart.iterations[number] = solution.state.iteration  # one that was taken as it was kept has told nobody
@@ -296,8 +332,7 @@ def advanced(
         prior = first_prior(multistart.training, multistart.layout, provider, theta, centre)
         damping = DAMPINGS[multistart.training.damping]()
         first = replace(state, theta=theta, at=at, prior=prior, losses=(at.loss,), damping=damping)
-        seconds = multistart.training.max_time_s - state.curve[-1].elapsed_s
-        engine = _engine(multistart, before.number, state.iteration + iterations, seconds)
+        engine = _engine(multistart, before.number, state.iteration + iterations, multistart.left(name))
         if engine.evidence_after is not None:
             engine = replace(engine, evidence_after=state.iteration + SETTLED)
         solution = keep.resume(name, engine, provider, first)
@@ -309,8 +344,9 @@ def _pretraining(
     multistart: Multistart, pretraining: StepSamples, number: int, seed: int, centre: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """A random start after its pretraining."""
-    training = multistart.training
+    training, name = multistart.training, f"{multistart.name}start {number + 1}, one step ahead"
     scale = multistart.template.scaling.error_unit
+    turns = math.ceil(training.n_starts / training.workers)
 
     def report(entry: Iteration) -> None:
         multistart.on_progress(
@@ -328,7 +364,10 @@ def _pretraining(
 
     engine = LevenbergMarquardt(
         termination=Termination(
-            max_iterations=training.pretraining_iterations, tolerance=training.tolerance, patience=training.patience
+            max_iterations=training.pretraining_iterations,
+            max_time_s=min(PRETRAINED * training.max_time_s / turns, multistart.left(name)),
+            tolerance=training.tolerance,
+            patience=training.patience,
         ),
         damping=DAMPINGS[training.damping](),
         on_iteration=report,
@@ -336,7 +375,6 @@ def _pretraining(
     )
     theta = pretraining.draw(np.random.default_rng(seed), centre)
     prior = first_prior(training, multistart.layout, pretraining, theta, centre)
-    name = f"{multistart.name}start {number + 1}, one step ahead"
     return multistart.checkpoints.minimise(name, engine, pretraining, theta, prior).theta
 
 

@@ -102,6 +102,7 @@ def fit_narx(
         checkpoints=checkpoints_of(on_progress),
         resume=resume,
         pretraining=_pretraining(training, task, seen),
+        until=starts.deadline(began, training, on_progress),
     )
     tasks = _started(multistart, task, seen)
     on_checkpoint(Checkpoint.of(choose(list(tasks), training.choose_by).chosen.solution.state))

@@ -212,6 +212,7 @@ def _fit(
         initial=None if records.initial is None else records.initial.model.recursion.numbers,
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
+        until=starts.deadline(began, training, on_progress),
     )
     candidates = starts.run(multistart)
     candidates += reweighted(multistart, provider, choose(candidates, training.choose_by).chosen)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -27,6 +29,9 @@ GROWTH = 1e-6
 """By how much a pole's magnitude may exceed 1: an integrator that is estimated has a pole at 1 but for rounding and
 noise, and a free run of 100,000 samples is then off by a tenth at most."""
 
+LEAST_S, TIME_SHARE = 60.0, 1.0
+"""Seconds that a check may take whatever its fit took, and share of the fit's time that it may take beyond these."""
+
 FOLLOWS = 0.1
 """Share of an output that a linear model may leave and still say where the recorded system would go."""
 
@@ -46,6 +51,8 @@ class StabilityOptions:
             is not made to run free.
         sequences: Traces that are run as they are; by default excursions made from the estimation traces.
         source: Where those traces come from, as a sentence.
+        time_share: Share of the fit's own time that its checks may take together, and a minute in any case; on how
+            many sequences the verdict then rests is said. Infinity for no bound.
 
     Raises:
         ConfigError: If a number cannot be used.
@@ -57,6 +64,7 @@ class StabilityOptions:
     choose: bool = True
     sequences: tuple[Trace, ...] = ()
     source: str = "Given traces."
+    time_share: float = TIME_SHARE
 
     def __post_init__(self) -> None:
         if not isinstance(self.sequences, Iterable):
@@ -71,17 +79,21 @@ class StabilityOptions:
                     f"{name} is not a number that can be used", where=name, expected="a whole number, 0 or more",
                     got=shortened(getattr(self, name)), remedy=f"write for example {name}: 100",
                 )  # fmt: skip
-        if not (isinstance(self.tolerance, int | float) and self.tolerance > 0.0):
-            raise ConfigError(
-                "tolerance is not a number that can be used", where="tolerance", expected="a number above 0",
-                got=shortened(self.tolerance), remedy=f"write for example tolerance: {TOLERANCE}",
-            )  # fmt: skip
+        for name, usual in (("tolerance", TOLERANCE), ("time_share", TIME_SHARE)):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and value > 0.0):
+                raise ConfigError(
+                    f"{name} is not a number that can be used", where=name, expected="a number above 0",
+                    got=shortened(value), remedy=f"write for example {name}: {usual}",
+                )  # fmt: skip
 
     @property
     def terms(self) -> dict[str, Any]:
         """JSON values that what is found depends on, beside the model and the estimation traces."""
         numbers = {name: getattr(self, name) for name in ("count", "tolerance", "seed", "choose", "source")}
-        return {**numbers, "sequences": [trace.digest for trace in self.sequences]}
+        # Absent where it is the usual one, so that older files keep their digest.
+        share = {} if self.time_share == TIME_SHARE else {"time_share": self.time_share}
+        return {**numbers, **share, "sequences": [trace.digest for trace in self.sequences]}
 
 
 class AbstractStabilityCheck(ABC):
@@ -171,6 +183,22 @@ class PoleCheck(AbstractStabilityCheck):
         return fit if radius is None or radius <= 1.0 + GROWTH else replace(fit, status=_unstable(fit.status))
 
 
+@dataclass(kw_only=True, eq=False)
+class _Clock:
+    """What the checks of one fit have taken, beside what the fit has."""
+
+    began: float = field(default_factory=time.perf_counter)
+    spent_s: float = 0.0
+
+    @contextmanager
+    def left(self, share: float, trained_s: float) -> Iterator[float]:
+        """Counts what is done in it, which may take so many seconds."""
+        at = time.perf_counter()
+        fitted_s = max(trained_s, at - self.began) - self.spent_s
+        yield max(LEAST_S, share * fitted_s) - self.spent_s
+        self.spent_s += time.perf_counter() - at
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeRunCheck(AbstractStabilityCheck):
     """The free run over random sequences; each model is run once.
@@ -188,6 +216,7 @@ class FreeRunCheck(AbstractStabilityCheck):
     estimation: tuple[Trace, ...] = ()
     found: dict[int, tuple[AbstractModel, Stability]] = field(default_factory=dict)
     """What was found, by the model's identity; the model is kept so that no other takes its place."""
+    clock: _Clock = field(default_factory=_Clock)
 
     @classmethod
     def of(cls, options: StabilityOptions, mapping: Mapping, estimation: Sequence[Trace]) -> FreeRunCheck:
@@ -233,7 +262,7 @@ class FreeRunCheck(AbstractStabilityCheck):
 
     def applied(self, fit: FitResult) -> FitResult:
         """A fit with what the sequences found; the sentence is among its notes."""
-        found = self.finding(fit.model)
+        found = self.finding(fit.model, trained_s=fit.train_time_s)
         if found is None:
             return fit
         status = fit.status if found.stable else _unstable(fit.status)
@@ -270,11 +299,12 @@ class FreeRunCheck(AbstractStabilityCheck):
             return None
         return found if all(_follows(found, trace, start) for trace in self.estimation) else None
 
-    def finding(self, model: AbstractModel) -> Stability | None:
+    def finding(self, model: AbstractModel, *, trained_s: float = 0.0) -> Stability | None:
         """What the sequences say of a model.
 
         Args:
             model: The model; it is run once.
+            trained_s: What its fit took, where that is known; else it is what has passed since the check was made.
 
         Returns:
             The finding; ``None`` where nothing is asked.
@@ -283,10 +313,11 @@ class FreeRunCheck(AbstractStabilityCheck):
             return None
         if id(model) not in self.found:
             asked = self.options
-            found = check_stability(
-                model, self.source, tolerance=asked.tolerance, count=asked.count, seed=asked.seed,
-                reference=lambda: self.reference,
-            )  # fmt: skip
+            with self.clock.left(asked.time_share, trained_s) as seconds:
+                found = check_stability(
+                    model, self.source, tolerance=asked.tolerance, count=asked.count, seed=asked.seed,
+                    reference=lambda: self.reference, seconds=seconds,
+                )  # fmt: skip
             self.found[id(model)] = (model, found)
         return self.found[id(model)][1]
 

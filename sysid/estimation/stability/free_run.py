@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -28,8 +29,11 @@ bounded: networks are held there (``sysid.models.narx.CLAMP``), and a run that i
 TOLERANCE = 0.1
 """How far from its plateau a run may settle, as a share of the output's range in the records."""
 
-AT_ONCE = 50
-"""Sequences that are in memory at the same time."""
+AT_ONCE = 10
+"""Sequences that are in memory at the same time, and that are finished once they are begun."""
+
+FEWEST = 10
+"""Sequences that are run however long they take."""
 
 Run = Callable[[InputSequence], NDArray[np.float64]]
 """The free run over a sequence: outputs of shape ``(n_samples,)`` or ``(n_samples, n_outputs)``."""
@@ -55,6 +59,7 @@ class Stability:
         sample_time: Seconds between samples.
         beyond: On how many a linear model that follows the records left the bounds, or did not settle, either: they
             say nothing, and are neither counted as unbounded nor judged.
+        asked: How many were to be run; more than were, where the time ended. 0 where nobody said.
     """
 
     source: str
@@ -70,6 +75,12 @@ class Stability:
     columns: tuple[tuple[str, ...], tuple[str, ...]]
     sample_time: float
     beyond: int = 0
+    asked: int = 0
+
+    @property
+    def cut(self) -> bool:
+        """Whether the time ended before all sequences were run."""
+        return self.sequences < self.asked
 
     @property
     def stable(self) -> bool:
@@ -81,7 +92,15 @@ class Stability:
         """What was found, for people."""
         runs = f"{self.sequences - self.beyond} random sequences"
         nothing = " more say nothing: a linear model of the records leaves its bounds or its plateau there, too."
-        return f"{self._found(runs)}{f' {self.beyond}{nothing}' if self.beyond else ''}"
+        told = f"{self._found(runs)}{f' {self.beyond}{nothing}' if self.beyond else ''}"
+        return f"{told} {self._time_ended}" if self.cut else told
+
+    @property
+    def _time_ended(self) -> str:
+        return (
+            f"{self.sequences:,} of {self.asked:,} sequences were checked in the time; another machine may come to "
+            "another number. A larger time_share of the check allows more."
+        )
 
     def _found(self, runs: str) -> str:
         if self.unbounded:
@@ -108,6 +127,7 @@ class Stability:
             "tolerance": self.tolerance,
             "largest_plateau_error": None if math.isnan(self.largest_plateau_error) else self.largest_plateau_error,
             "worst": self.worst.name,
+            **({"asked": self.asked} if self.cut else {}),
         }
 
     def worst_csv(self) -> str:
@@ -131,6 +151,7 @@ def check_stability(
     seed: int = SEED,
     tolerance: float = TOLERANCE,
     reference: Callable[[], Run | None] = lambda: None,
+    seconds: float = math.inf,
 ) -> Stability:
     """Run a model over random sequences and see whether it stays bounded and settles where it should.
 
@@ -143,9 +164,10 @@ def check_stability(
         reference: Gives the run of linear models that follow the records, asked for where the free run leaves the
             bounds or does not settle: a sequence on which these do the same says nothing. A sequence asks for more than
             was recorded, or a slow system is not back at its plateau by then.
+        seconds: Wall time after which no further sequence is begun; the first :data:`FEWEST` always are.
 
     Returns:
-        What was found.
+        What was found, and on how many sequences where the time ended before all were run.
 
     Raises:
         TraceError: If there are no sequences.
@@ -164,11 +186,11 @@ def check_stability(
         True
     """
     low, high = sequences.output_range
-    width = np.where(high > low, high - low, 1.0)
+    width, until = np.where(high > low, high - low, 1.0), time.perf_counter() + seconds
     unbounded = judged = unsettled = drawn = further = 0
     largest = np.nan
     worst: tuple[tuple[bool, float], InputSequence, NDArray[np.float64]] | None = None
-    for sequence, output in _runs(model, sequences.draw(count, seed)):
+    for sequence, output in _runs(model, _in_time(sequences.draw(count, seed), until)):
         drawn += 1
         outputs = output.reshape(len(sequence.inputs), -1)
         lost, error = _lost(outputs, low, high), _away(outputs, sequence, width)
@@ -200,7 +222,16 @@ def check_stability(
         columns=(sequences.inputs, sequences.outputs),
         sample_time=sequences.sample_time,
         beyond=further,
+        asked=sequences.available(count),
     )
+
+
+def _in_time(sequences: Iterable[InputSequence], until: float) -> Iterator[InputSequence]:
+    """Sequences for which there is time."""
+    for number, sequence in enumerate(sequences):
+        if number >= FEWEST and time.perf_counter() > until:
+            return
+        yield sequence
 
 
 def _lost(outputs: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:

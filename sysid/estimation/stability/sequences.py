@@ -105,6 +105,10 @@ class AbstractSequences(ABC):
     def output_range(self) -> NDArray[np.float64]:
         """Least and greatest value of each output in the records, shape ``(2, n_outputs)``."""
 
+    def available(self, count: int) -> int:
+        """How many there are where so many are asked for."""
+        return count
+
     @abstractmethod
     def draw(self, count: int, seed: int) -> Iterator[InputSequence]:
         """The sequences, one after the other.
@@ -348,6 +352,10 @@ class TraceSequences(AbstractSequences):
         columns = [trace.columns(self.outputs) for trace in self.traces]
         low, high = np.min([c.min(axis=0) for c in columns], axis=0), np.max([c.max(axis=0) for c in columns], axis=0)
         return np.stack([low, high])
+
+    def available(self, count: int) -> int:
+        """As many as there are traces, at most."""
+        return min(count, len(self.traces))
 
     def draw(self, count: int, seed: int) -> Iterator[InputSequence]:
         """The traces; each is judged where its outputs have stood still."""

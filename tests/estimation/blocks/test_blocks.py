@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult
+from sysid.estimation import FitResult, Status
 from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
 from sysid.estimation.blocks.polynomial_narx import fit_polynomial_narx
 from sysid.estimation.blocks.sections import block_of, responses, sections_of
@@ -248,6 +248,20 @@ def test_a_polynomial_is_found_far_from_zero_and_where_it_integrates(pole: float
     fit = fit_polynomial_narx([a_trace(u, y)], MAPPING, linear, ONE, start=Start(kind=StartKind.ESTIMATED))
     run = fit.model.simulate(u[:, None], History.at_rest(inputs=u[:1], output=y[0]))
     assert np.abs(run - y).max() < 1e-6 * np.ptp(y) + 1e-15 * level * len(y)
+
+
+def test_what_the_time_cuts_is_told() -> None:
+    u = steps(3)
+    y = block(u + 0.4 * u**2)
+    rich = PolynomialNARX(input_delays=4, output_delays=4, degree=3)
+    fit = fit_polynomial_narx([a_trace(u, y)], MAPPING, rich, Training(max_time_s=1e-3))
+    assert "The time ended before all was tried: 1 terms were chosen" in fit.notes[-1]
+    assert fit.status is Status.TIME_LIMIT
+    wiener = fit_hammerstein_wiener(
+        [a_trace(u, y)], MAPPING, HammersteinWiener(states=2, input="polynomial 3"), Training(max_time_s=1e-3)
+    )
+    assert wiener.status is Status.TIME_LIMIT
+    assert wiener.train_time_s < 5.0
 
 
 def test_an_output_that_never_changes_is_a_constant_and_no_power_of_itself() -> None:

@@ -49,6 +49,17 @@ def test_a_stable_fit_keeps_its_status_and_says_what_was_found():
     assert FitResult.from_dict(found.to_dict()).stability == found.stability
 
 
+def test_a_check_takes_no_longer_than_its_fit_and_a_minute_in_any_case(monkeypatch):
+    assert check().applied(fit(model())).stability["sequences"] == 20  # a fit of no time has its minute
+    monkeypatch.setattr("sysid.estimation.stability.check.LEAST_S", 0.0)
+    found = check().applied(fit(model()))
+    assert (found.stability["sequences"], found.stability["asked"]) == (10, 20)
+    assert "10 of 20 sequences were checked in the time" in found.notes[-1]
+    longer = check().applied(replace(fit(model()), train_time_s=100.0))
+    assert "asked" not in longer.stability
+    assert "asked" not in check(time_share=float("inf")).applied(fit(model())).stability
+
+
 def test_an_unstable_fit_says_so_in_its_status():
     found = check().applied(fit(model(1.05)))
     assert found.status is Status.UNSTABLE

@@ -62,6 +62,17 @@ def test_a_run_that_grows_without_bound_is_found():
     assert "leaves its bounds on 20 of 20" in found.sentence
 
 
+def test_where_the_time_ends_it_says_on_how_many_sequences_the_verdict_rests():
+    found = check_stability(model(), excursions(), count=500, seconds=0.0)
+    assert found.stable
+    assert found.sequences == 10  # the first are run however long they take
+    assert found.to_dict()["asked"] == 500
+    assert "10 of 500 sequences were checked in the time" in found.sentence
+    whole = check_stability(model(), excursions(), count=10)
+    assert "asked" not in whole.to_dict()
+    assert "in the time" not in whole.sentence
+
+
 def test_a_run_that_is_not_a_number_has_left_its_bounds():
     found = check_stability(lambda s: np.full(len(s.inputs), np.nan), excursions(), count=3)
     assert found.unbounded == 3
