@@ -88,7 +88,8 @@ def pipeline(name: str, folder: Path, *, minutes: float, workers: int, compiled:
         content["reference"] |= {"python": f"compiled_models:{name}", "files": [str(MODELS / "slow_models.py")]}
     path = folder / f"{name}.yaml"
     path.write_text(
-        yaml.safe_dump({"kind": "experiment", "name": name, "workers": workers, **content}), encoding="utf-8"
+        yaml.safe_dump({"kind": "experiment", "name": name, "workers": workers, **content}, sort_keys=False),
+        encoding="utf-8",
     )
     return path
 

@@ -41,7 +41,9 @@ def test_limits_and_ranges_are_reported(whole, limited, file):
     found = simulate_bundle(whole, file)
     at_limit = (found.flags & Flag.AT_LIMIT) > 0
     assert at_limit.any()
-    (sentence,) = [one for one in found.sentences if "held at one of its limits, declared or found in the records" in one]
+    (sentence,) = [
+        one for one in found.sentences if "held at one of its limits, declared or found in the records" in one
+    ]
     assert sentence.endswith(": " + "; ".join(one.sentence for one in found.held))
     # Which limit, and how long: counted by hand from the channels themselves.
     limits = {(one.output, one.upper): one for one in found.held}
