@@ -128,6 +128,9 @@ def _is_pint(text: str) -> bool:
     return True
 
 
+_IN_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+"""Units that clocks count in: pint, which takes half a second to build, is not asked for what every file has."""
+
 USUAL_UNITS = frozenset(
     {
         "1",
@@ -258,7 +261,8 @@ def convert(
     """
     to_reference = reference if to_reference is None else to_reference
     usual = unit == to_unit and unit in USUAL_UNITS
-    source, target = (None, None) if usual else _alike(unit, to_unit)
+    seconds = _IN_SECONDS.get(unit) if to_unit == "s" else None
+    source, target = (None, None) if usual or seconds is not None else _alike(unit, to_unit)
     if (reference is Reference.NONE) != (to_reference is Reference.NONE):
         raise UnitError(
             "a reference is known on one side of the conversion only",
@@ -267,7 +271,9 @@ def convert(
             remedy="declare reference: gauge or reference: absolute for the channel",
         )
     converted = np.array(values, dtype=np.float64)
-    if source is not None:
+    if seconds is not None:
+        converted *= seconds
+    elif source is not None:
         converted = np.asarray(_registry().Quantity(converted, source).to(target).magnitude)
     if reference is to_reference:
         return converted

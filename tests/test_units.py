@@ -40,3 +40,11 @@ def test_a_reference_is_another_by_the_atmosphere(monkeypatch: pytest.MonkeyPatc
     values = np.array([0.0, 250.5])
     absolute = convert(values, "kPa", "kPa", reference=Reference.GAUGE, to_reference=Reference.ABSOLUTE)
     np.testing.assert_array_equal(absolute, values + 101.325)
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns", "min", "h"])
+def test_stamps_become_seconds_without_pint_and_to_its_last_digit(unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    stamps = np.random.default_rng(0).normal(scale=1e5, size=1_000)
+    monkeypatch.setattr(units, "_registry", lambda: pytest.fail("asked pint"))
+    expected = REGISTRY.Quantity(stamps, REGISTRY.parse_units(unit)).to("s").magnitude
+    assert np.array_equal(convert(stamps, unit, "s"), expected)
