@@ -34,6 +34,9 @@ LAYOUTS = {
     "a comment, a blank line and a footer": "t,u\n"
     + rows(lambda k: f"{TIME[k]!r},{VALUES[k]!r}" + "\n# pause\n" * (k == 4500))
     + "Mean,0.1\n",
+    "a separator at the end of each line": "t,u,\n" + rows(lambda k: f"{TIME[k]!r},{VALUES[k]!r},"),
+    "the same, not in the header": "t,u\n" + rows(lambda k: f"{TIME[k]!r},{VALUES[k]!r},"),
+    "blank lines at the end": "t,u\r\n" + rows(lambda k: f"{TIME[k]!r},{VALUES[k]!r}\r") + "\r\n\r\n",
     "not ASCII": "t,u,Öl\n" + rows(lambda k: f"{TIME[k]!r},{VALUES[k]!r},{'größer' if k % 2 else 'ß'}"),
 }
 
@@ -57,6 +60,11 @@ def test_every_digit_is_read_in_bulk_too(write: Write, monkeypatch: pytest.Monke
     np.testing.assert_array_equal(table.columns[1].values, VALUES)
     assert table.lines is not None
     assert table.lines.tolist() == lines_of(text)
+
+
+def test_blank_lines_at_the_end_do_not_make_a_file_slow(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(csv_body.Body, "_row_by_row", lambda *_, **__: pytest.fail("row by row"))
+    assert len(read_table(write("run.csv", LAYOUTS["blank lines at the end"]))) == N
 
 
 def test_a_block_ends_anywhere(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -244,11 +244,12 @@ class Body:
         except (pa.ArrowInvalid, pa.ArrowKeyError):
             return False
         counted = [table.column(i) for i, column in enumerate(self.columns) if isinstance(column, Counts)]
-        if table.num_rows != block.lines or any(column.null_count for column in counted):
+        blank = data[len(data.rstrip(b"\r\n")) :].count(b"\n") - 1  # lines after the last row
+        if table.num_rows != block.lines - max(blank, 0) or any(column.null_count for column in counted):
             return False
         for index, column in enumerate(self.columns):
             column.add_arrow(table.column(index))
-        self._lines.extend(np.arange(block.line, block.line + block.lines, dtype=np.int32))
+        self._lines.extend(np.arange(block.line, block.line + table.num_rows, dtype=np.int32))
         return True
 
     def _simplified(self, data: bytes) -> bytes:
