@@ -11,6 +11,7 @@ from sysid.composite.active_learning import ActiveLearned, Assessment, learn_act
 from sysid.composite.candidates import Candidate, Candidates, fit_candidates
 from sysid.composite.committee import DoubtFigures, committee, doubt_figures, doubt_threshold
 from sysid.composite.composite import Composite, FixedMember, Member, Standing
+from sysid.composite.fixed_equations import equation_of, fixed_by_equations
 from sysid.composite.fixed_members import fixed_model, with_fixed
 from sysid.composite.keeper import Keeper, MakeAll, Task
 from sysid.composite.limit_check import LimitCheck, check_limits
@@ -58,8 +59,10 @@ __all__ = [
     "dealt",
     "doubt_figures",
     "doubt_threshold",
+    "equation_of",
     "fit_candidates",
     "fit_member",
+    "fixed_by_equations",
     "fixed_model",
     "holding",
     "learn_actively",

@@ -148,7 +148,7 @@ class System:
                     where="equations",
                     expected=f"a state or a definition named {name}",
                     got=", ".join(computed),
-                    remedy=f"add the equation {_written(name)} = {near[0] if near else computed[0]}",
+                    remedy=f"add the equation {written_name(name)} = {near[0] if near else computed[0]}",
                 )
         for name in self.others:
             if name not in inputs:
@@ -283,7 +283,7 @@ class System:
                     self.definitions[name].at,
                     expected="definitions that can be computed one after the other",
                     remedy="solve them for it, make one of them a state, or read it a sample ago, as in "
-                    f"{_written(name)}[k-1]",
+                    f"{written_name(name)}[k-1]",
                 )
             for node in nodes_of(self.definitions[name].right):
                 if isinstance(node, Name) or (isinstance(node, Delayed) and node.lag == 0.0):
@@ -304,8 +304,16 @@ MOST_DEFINITIONS = 300
 """Names that are computed from others: they may need each other in a row."""
 
 
-def _written(name: str) -> str:
-    return name if name.isidentifier() else f'"{name}"'
+def written_name(name: str) -> str:
+    """A name as an equation has it: in double quotes where it is no plain word, or one of the language's own.
+
+    Args:
+        name: The name.
+
+    Returns:
+        It, as it is written.
+    """
+    return name if name.isidentifier() and name not in RESERVED else f'"{name}"'
 
 
 def _in_order(node: Node) -> list[Node]:

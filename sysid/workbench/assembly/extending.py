@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from sysid.errors import ConfigError
 from sysid.models import Mapping
+from sysid.workbench.assembly.fixed_words import fixed_schema, one_by_one
 from sysid.workbench.kinds import DEFAULT
 from sysid.workbench.old_words import ASSEMBLY, with_new_words
 from sysid.workbench.runner.store import write_bytes
@@ -78,6 +79,10 @@ def _read(path: Path, before: tuple[Path, ...]) -> Joined:
     """The same, for a file to which others have led."""
     data, own = with_new_words(read_yaml(path), ASSEMBLY), Origins(file=path)
     text = path.read_bytes()
+    if isinstance(data.get("fixed"), list):
+        fixed = one_by_one(data["fixed"], own)
+        data = {**data, "fixed": [one for one, _ in fixed]}
+        own = Origins(file=path, parts={("fixed", at): (own, loc) for at, (_, loc) in enumerate(fixed)})
     if data.get("extends") is None:
         return Joined(data=data, origins=own, files=(path,), text=text)
     way = (*before, path)
@@ -188,11 +193,12 @@ def _join_limits(theirs: dict[str, Any], ours: dict[str, Any], base: Origins, ow
 
 
 def extending_schema(schema: dict[str, Any]) -> None:
-    """Let editors know that a pipeline with ``extends`` may leave out what the base has, or take it away by null.
+    """Let editors know that ``fixed`` may be equations, and what one with ``extends`` may leave out or take away.
 
     Args:
         schema: The JSON schema of a pipeline that stands alone; changed in place.
     """
+    fixed_schema(schema)
     required, declared, own = schema["required"], schema["properties"], ("kind", "name", "extends")
     limits = {**declared["limits"], "additionalProperties": _or_null(declared["limits"]["additionalProperties"])}
     opened = {**declared, "limits": limits}

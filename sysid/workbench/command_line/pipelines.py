@@ -75,3 +75,13 @@ def publish(
     from sysid.workbench.commands.publish import publish_command
 
     publish_command(run_folder, name=name, into=into, bundle=bundle)
+
+
+@commands.command(epilog="Example: sysid equations service-cascade")
+def equations(
+    pipeline: Annotated[str, typer.Argument(help="Name of a pipeline of kind assembly, or its YAML file.")],
+) -> None:
+    """Print what is fixed in an assembly as equations, for its YAML; weights by name and lag are the older form."""
+    from sysid.workbench.commands.equations import equations_command
+
+    equations_command(pipeline)

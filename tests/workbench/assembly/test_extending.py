@@ -129,11 +129,10 @@ def test_a_pipeline_that_extends_is_the_one_written_out(tmp_path: Path) -> None:
     """The longest that there is, with a limit, a known member and a few keys of its own, both ways."""
     base = content_folders("pipelines")[0] / "combined-brake-held.yaml"
     text = base.read_text(encoding="utf-8")
-    at_rest, held = "low: -2, high: 2, rest: 0, unit: psi}", "low: -3, high: 3, rest: 0, unit: psi}"
     written_out = text.replace("name: combined-brake-held", "name: grown").replace("seed: 0\n", "seed: 4\n")
     written_out = written_out.replace("  BP10: {low: 0, high: BH10}", "  BP10: {low: 1, high: BH10}")
-    written_out = written_out.replace(at_rest, held)
-    known = "fixed: [{mapping: BP+AR -> RM, gains: {BP: 1, AR: -1}, " + held + "]\n"
+    written_out = written_out.replace("RM = clamp(BP - AR, -2, 2)", "RM = clamp(BP - AR, -3, 3)")
+    known = 'fixed: [{equations: "RM = clamp(BP - AR, -3, 3)", unit: psi}]\n'
     extends = HEAD.replace("base.yaml", str(base)) + known + "limits: {BP10: {low: 1, high: BH10}}\nseed: 4\n"
     config = load(write(tmp_path, extends, base=written_out))
     assert config == load(tmp_path / "base.yaml")

@@ -1,0 +1,36 @@
+"""``sysid equations``: what is fixed in an assembly, as equations."""
+
+from __future__ import annotations
+
+import sys
+
+from sysid.errors import ConfigError
+from sysid.workbench.fits.config import find_pipeline
+
+
+def equations_command(pipeline: str) -> None:
+    """Print the fixed submodels of an assembly as equations, for a pipe or its YAML file.
+
+    Args:
+        pipeline: Its name or file.
+
+    Raises:
+        UserError: If it cannot be read, or nothing is fixed in it.
+    """
+    from sysid.workbench.assembly.config import AssemblyConfig
+    from sysid.workbench.assembly.extending import read_joined
+    from sysid.workbench.assembly.fixed_words import equations_text
+    from sysid.yaml_files import check
+
+    path = find_pipeline(pipeline)
+    joined = read_joined(path)
+    fixed = check(AssemblyConfig, joined.data, where=joined.origins).composite.fixed
+    if not fixed:
+        raise ConfigError(
+            "nothing is fixed in the pipeline",
+            where=path,
+            expected="a pipeline of kind assembly with fixed",
+            got="fixed: none",
+            remedy="add what is known: docs/assemblies.md",
+        )
+    sys.stdout.write(equations_text(fixed))

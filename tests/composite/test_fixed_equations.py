@@ -1,0 +1,122 @@
+"""Fixed submodels as equations: the same as the weights that they stand for, and what is no held sum is told."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sysid.composite import FixedMember, equation_of, fixed_by_equations, with_fixed
+from sysid.errors import ConfigError
+from sysid.models import Mapping
+from sysid.traces import Channel, Trace
+
+
+def words(one: FixedMember) -> tuple[Any, ...]:
+    return one.mapping, one.weights, one.memory, one.constant, one.low, one.high, one.rest, one.unit
+
+
+@pytest.mark.parametrize(
+    ("equation", "mapping", "gains", "constant", "bounds"),
+    [
+        ("y = 2*a - b", "a+b -> y", {"a": 2, "b": -1}, 0, (-math.inf, math.inf)),
+        ("y = clamp(-(a - 3*b)/4 + 1, -2, 1e3)", "a+b -> y", {"a": -0.25, "b": 0.75}, 1, (-2, 1000)),
+        ("y = saturate(a, low=-1, high=2*3)", "a -> y", {"a": 1}, 0, (-1, 6)),
+        ("y = switch(a + a[k-2] - 0.5)", "a -> y", {"a": {0: 1, 2: 1}}, -0.5, (0, 1)),
+        ("y[k+1] = 0.9*y[k] + 0.1*a[k]", "a -> y", {"a": {1: 0.1}, "y": 0.9}, 0, (-math.inf, math.inf)),
+        ("y = relay(a, on=1.44, off=-1.01, slope=20)", "a -> y", {"a": 20, "y": 50}, -28.8, (0, 1)),
+        ("y = 0.1*a + 0.2*a", "a -> y", {"a": 0.3}, 0, (-math.inf, math.inf)),
+        ('y = "P 1"*(2 - 1) + 2*3*a', "P 1+a -> y", {"P 1": 1, "a": 6}, 0, (-math.inf, math.inf)),
+    ],
+)  # fmt: skip
+def test_an_equation_is_the_weights_that_it_stands_for(equation, mapping, gains, constant, bounds):
+    (found,) = fixed_by_equations(equation)
+    inputs, output = mapping.split(" -> ")
+    expected = FixedMember(
+        mapping=Mapping(inputs=tuple(inputs.split("+")), outputs=(output,)),
+        gains=gains, constant=constant, low=bounds[0], high=bounds[1], rest=0,
+    )  # fmt: skip
+    assert words(found) == words(expected)
+
+
+NUMBERS = st.one_of(st.floats(-1e6, 1e6), st.integers(-200, 200).map(float), st.just(1.0), st.just(-1.0))
+LAGS = st.dictionaries(st.integers(0, 20), NUMBERS, min_size=1, max_size=3)
+
+
+@given(
+    st.dictionaries(st.sampled_from(["a", "b", "BP10", "dt", "P 1"]), st.one_of(NUMBERS, LAGS), min_size=1),
+    NUMBERS, NUMBERS, st.tuples(st.floats(-1e3, 0), st.floats(1e-3, 1e3)), st.sampled_from(["1", "psi"]),
+)  # fmt: skip
+def test_what_is_written_is_read_as_the_same(gains, memory, constant, bounds, unit):
+    low, high = bounds
+    mapping = Mapping(inputs=tuple(gains), outputs=("y",))
+    one = FixedMember(
+        mapping=mapping, gains={**gains, "y": memory}, constant=constant, low=low, high=high, rest=0, unit=unit
+    )
+    (found,) = fixed_by_equations(equation_of(one), unit={"y": unit})
+    assert words(found) == words(one)
+
+
+def test_units_and_rests_are_for_all_or_by_output_and_a_switch_has_no_unit():
+    text = "p = clamp(2*a, 0, 9); s = switch(a); r = relay(a, on=2, off=1, slope=5)"
+    one = fixed_by_equations(text, unit="psi", rest={"p": 3})
+    assert [(each.output, each.unit, each.rest) for each in one] == [("p", "psi", 3), ("s", "1", 0), ("r", "1", 0)]
+    other = fixed_by_equations(text, unit={"s": "m"}, rest=1)
+    assert [(each.unit, each.rest) for each in other] == [("1", 1), ("m", 1), ("1", 1)]
+
+
+def test_instances_and_shared_inputs_are_those_of_each_equation():
+    one, other = fixed_by_equations("x = a + s; y = 2*a", instances=("", "9"), shared=("s",))
+    assert (one.outputs, one.shared, other.shared) == (["x", "x9"], ("s",), ())
+
+
+def test_a_relay_switches_where_it_says():
+    """Up above ``on``, down below ``off``, to within the slope; between them as it was."""
+    (relay,) = fixed_by_equations("r = relay(a, on=2, off=-1, slope=100)")
+    values = np.concatenate([np.linspace(-3, 1.98, 40), np.full(3, 2.01), np.linspace(2, -0.98, 40), np.full(3, -1.01)])
+    trace = Trace(name="t", sample_time=0.1, channels=(Channel(name="a", unit="1"),), values=values[:, None])
+    (seen,) = with_fixed([relay], [trace])
+    assert (seen["r"] > 0.5).tolist() == [False] * 40 + [True] * 43 + [False] * 3
+
+
+def test_a_sum_of_thousands_of_terms_is_read():
+    (one,) = fixed_by_equations("y = " + " + ".join(["a"] * 3_000))
+    assert one.weights == ({0: 3000.0},)
+
+
+@pytest.mark.parametrize(
+    ("equation", "says"),
+    [
+        ("dy/dt = -y + a", r"(?s)given by its rate.*y\[k\+1\] = y\[k\]"),
+        ("y = a*b", r"(?s)no weighted sum.*clamp.*name in an equation of its own"),
+        ("y = 1/a", "no weighted sum"),
+        ("y = a/0", "no weighted sum"),
+        ("y = a > b", "no weighted sum"),
+        ("y = max(a, 0) + b", r"(?s)max within an expression.*\^"),
+        ("y = a(t - 0.5)", r"(?s)a delay in seconds.*a\[k-5\]"),
+        ("y = clamp(a, 0)", r"(?s)clamp has other arguments.*clamp\(x, low, high\)"),
+        ("y = clamp(a, 0, low=1, high=2)", "clamp has other arguments"),
+        ("y = clamp(a, b, 1)", "hangs on a channel"),
+        ("y = relay(a, on=1, off=2, slope=3)", "the relay has no width"),
+        ("y = relay(a, on=2, off=1)", r"relay\(x, on, off, slope\)"),
+        ("y = y + a", "reads itself now"),
+        ("y = y[k-2] + a", r"(?s)reads itself 2 samples ago.*y\[k-1\]"),
+        ("y = 3 + y[k-1]", "reads no other channel"),
+        ("y = clamp(a, 2, 1)", r"(?s)bounds of y.*low 2, rest 0, high 1"),
+        ("y = " + "2*" * 200 + "a", "factors in a row"),
+        ("y = ", "a value belongs"),
+    ],
+)
+def test_what_is_no_held_sum_is_told(equation, says):
+    with pytest.raises(ConfigError, match=says):
+        fixed_by_equations(equation)
+
+
+@pytest.mark.parametrize("given", [{"rest": {"z": 1}}, {"unit": {"z": "m"}}, {"shared": ("z",)}])
+def test_what_is_said_of_no_equation_is_told(given):
+    with pytest.raises(ConfigError, match=f"{next(iter(given))} names z, which is in none of the equations"):
+        fixed_by_equations("y = a", **given)

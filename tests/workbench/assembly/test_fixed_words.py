@@ -1,0 +1,101 @@
+"""``fixed`` as equations in YAML: the same pipeline as by weights, and printed as what is read."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from jsonschema import validate
+
+from sysid.content import content_folders
+from sysid.errors import ConfigError
+from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.extending import read_joined
+from sysid.workbench.assembly.fixed_words import equations_text
+from sysid.workbench.commands.equations import equations_command
+from sysid.yaml_files import check, read_yaml
+from tests.workbench.assembly.conftest import PIPELINE
+
+WEIGHTS = """\
+fixed:
+  - {mapping: upper -> near, gains: {upper: {0: 2, 1: -1}}, constant: -0.5, low: 0, high: 9, rest: 0, unit: cm}
+  - {mapping: upper+lower -> open, gains: {upper: 20, lower: -20, open: 49.7}, constant: -29, low: 0, high: 1, rest: 1}
+"""
+EQUATIONS = """\
+fixed:
+  - unit: cm
+    rest: {open: 1}
+    equations: |
+      # what upper will be, and whether the valve is open
+      near = clamp(2*upper - upper[k-1] - 0.5, 0, 9)
+      open = relay(upper - lower, on=1.45, off=-0.985, slope=20)
+"""
+
+
+def config(folder: Path, text: str) -> AssemblyConfig:
+    file = folder / "tanks.yaml"
+    file.write_text(text, encoding="utf-8")
+    joined = read_joined(file)
+    return check(AssemblyConfig, joined.data, where=joined.origins)
+
+
+def test_equations_are_the_weights_that_they_stand_for(tmp_path):
+    assert config(tmp_path, PIPELINE + EQUATIONS) == config(tmp_path, PIPELINE + WEIGHTS)
+
+
+def test_who_extends_replaces_one_of_them(tmp_path):
+    (tmp_path / "base.yaml").write_text(PIPELINE + EQUATIONS, encoding="utf-8")
+    own = "kind: assembly\nname: own\nextends: base.yaml\n"
+    own += 'fixed: [{equations: "near = clamp(3*upper, 0, 1); far = 2*lower"}]\n'
+    (tmp_path / "own.yaml").write_text(own, encoding="utf-8")
+    fixed = check(AssemblyConfig, read_joined(tmp_path / "own.yaml").data, where="own").composite.fixed
+    assert [(one.output, one.high) for one in fixed] == [("near", 1.0), ("open", 1.0), ("far", float("inf"))]
+
+
+@pytest.mark.parametrize(
+    ("edit", "line", "field", "says"),
+    [
+        (("*upper - upper", "*upper*lower - upper"), 4, "equations: equations, line 2, column 21", "no weighted sum"),
+        (("0, 9)", "0, -9)"), 4, "equations: low, high", "bounds of near"),
+        (("rest: {open: 1}", "rest: {shut: 1}"), 4, "equations: rest", "rest names shut"),
+        (("unit: cm", "units: cm"), 2, "units", "did you mean unit"),
+        (("rest: {open: 1}", "rest: shut"), 3, "rest.float", "number"),
+    ],
+)
+def test_what_is_wrong_names_its_line(tmp_path, edit, line, field, says):
+    with pytest.raises(ConfigError, match=says) as caught:
+        config(tmp_path, PIPELINE + EQUATIONS.replace(*edit))
+    place = f"tanks.yaml, line {PIPELINE.count(chr(10)) + line}, field fixed[0].{field}"
+    assert str(caught.value.where).endswith(place)
+
+
+def test_the_command_prints_what_is_read_as_the_same(tmp_path, capsys):
+    given = config(tmp_path, PIPELINE + WEIGHTS)
+    equations_command(str(tmp_path / "tanks.yaml"))
+    printed = capsys.readouterr().out
+    assert printed == EQUATIONS.replace(EQUATIONS.splitlines(keepends=True)[4], "").replace(
+        "relay(upper - lower, on=1.45, off=-0.985, slope=20)", "switch(20*upper - 20*lower + 49.7*open[k-1] - 29)"
+    )
+    assert config(tmp_path, PIPELINE + printed) == given
+    config(tmp_path, PIPELINE)
+    with pytest.raises(ConfigError, match="nothing is fixed"):
+        equations_command(str(tmp_path / "tanks.yaml"))
+
+
+BUILT_IN = [
+    one
+    for one in sorted(content_folders("pipelines")[0].glob("*.yaml"))
+    if re.search("^fixed:", one.read_text("utf-8"), re.M)
+]
+
+
+@pytest.mark.parametrize("pipeline", BUILT_IN, ids=lambda one: one.stem)
+def test_what_is_built_in_is_written_by_equations_and_printed_as_the_same(tmp_path, pipeline):
+    assert all("equations" in one for one in read_yaml(pipeline)["fixed"])
+    validate(read_yaml(pipeline), AssemblyConfig.model_json_schema())
+    data = read_joined(pipeline).data
+    (tmp_path / "printed.yaml").write_text(equations_text(check(AssemblyConfig, data, where=pipeline).composite.fixed))
+    assert check(AssemblyConfig, {**data, **read_joined(tmp_path / "printed.yaml").data}, where=pipeline) == check(
+        AssemblyConfig, data, where=pipeline
+    )
