@@ -255,7 +255,7 @@ class EquationProvider(AbstractProvider):
         for number in range(len(self.records)):
             errors = []
             for error, J, places in self._blocks(theta, number):
-                flat = J.reshape(-1, J.shape[2])
+                flat = J.reshape(J.shape[0] * J.shape[1], J.shape[2])  # of none, too
                 loss += 0.5 * float(np.vdot(error, error))
                 gradient[places] += flat.T @ error.ravel()
                 matrix[np.ix_(places, places)] += flat.T @ flat

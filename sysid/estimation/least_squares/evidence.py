@@ -117,7 +117,7 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     Returns:
         The prior with new precisions, and the evidence found.
     """
-    tau = min(at.correlation_time, max(1.0, n_samples / (SAMPLES_PER_PARAMETER * len(theta))))
+    tau = min(at.correlation_time, max(1.0, n_samples / (SAMPLES_PER_PARAMETER * max(len(theta), 1))))
     independent = n_samples / tau
     root = np.sqrt(prior.beta / prior.precision)
     M = at.gauss_newton * root[:, None] * root[None, :]

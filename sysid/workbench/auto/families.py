@@ -126,7 +126,7 @@ def _narx_at_ends(looked: Looked) -> list[Try]:
     outputs do not show what goes on behind it, a pump that runs down: past inputs do, over as long as that takes.
     """
     found = []
-    for lags, own, neurons in ((3, 3, 8), (5, 3, 14), (8, 2, 12)):
+    for lags, own, neurons in ((3, 3, 8), (5, 3, 14), (12, 1, 12)):
         first = min(looked.delay, 1)
         inputs = f"{first}:{first + lags - 1}"
         network = NARX(input_delays=inputs, output_delays=own, neurons=neurons, limits=FOUND)

@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
+from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.old_words import STRICT
 from sysid.yaml_files import FieldError
 
@@ -57,6 +58,8 @@ class ExperimentConfig(BaseModel):
         experiment: What is run.
         workers: Processes that run it.
         grow: How ``sysid surrogate`` adds experiments where its model is worst; ``null`` adds none.
+        fits: What ``sysid surrogate`` fits in place of a search, as in a pipeline of kind ``fits``: equations that are
+            known, or a structure. The best of them on the selection runs is the surrogate.
     """
 
     model_config = STRICT
@@ -68,3 +71,13 @@ class ExperimentConfig(BaseModel):
     experiment: Design
     workers: int = Field(default=2, ge=1, le=256)
     grow: GrowConfig | None = None
+    fits: tuple[FitConfig, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_way(self) -> ExperimentConfig:
+        if self.grow is not None and self.fits:
+            raise FieldError(
+                "experiments grow around what a search has chosen", expected="grow or fits", got="both",
+                remedy="leave one of them out",
+            )  # fmt: skip
+        return self

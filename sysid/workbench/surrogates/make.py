@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +13,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sysid.bounded_text import read_bounded
+from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.models import Mapping, Start
+from sysid.references.config import ReferenceConfig
 from sysid.references.runs import ReferenceRuns
 from sysid.reporting.growth import FILE
 from sysid.reporting.judging.results import FOLDER
@@ -22,17 +25,21 @@ from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.traces import Role, Trace
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import MOVED, in_motion, span_of
 from sysid.workbench.auto.run import Searched, auto_of
 from sysid.workbench.auto.run import program_of as search_program
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
 from sysid.workbench.experiments.run import DATASET, Experimented
 from sysid.workbench.experiments.run import program_of as experiment_program
+from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.runner.program import Program
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.surrogates.grown import GROWN, Ground, grow
 from sysid.workbench.surrogates.grown import program_of as grown_program
+from sysid.workbench.surrogates.known import pipeline_of
+from sysid.workbench.surrogates.known import program_of as known_program
 from sysid.workbench.surrogates.plan import PROOF, RUNNING, search_share
 from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
 from sysid.yaml_files import check, read_yaml
@@ -78,7 +85,7 @@ def make_surrogate(
     seed: int = 0,
     say: Callable[[str], None] = lambda _: None,
 ) -> Made:
-    """Run experiments, find a model of them, export it with the reference's ports, and prove it.
+    """Run experiments, find a model of them, or fit the given ones, export it with the reference's ports, and prove it.
 
     Args:
         pipeline: YAML of kind ``experiment``. **What it names is run.**
@@ -98,33 +105,40 @@ def make_surrogate(
         UserError: If the pipeline or its reference cannot be used.
     """
     config = check(ExperimentConfig, read_yaml(pipeline), where=pipeline)
-    text = pipeline.read_text(encoding="utf-8-sig")
     growth = config.grow if rounds is None else (config.grow or GrowConfig()).model_copy(update={"rounds": rounds})
-    run_in, reference = folder / "experiment", config.reference.at(pipeline.resolve().parent)
-    found: Experimented = perform(experiment_program(config, text=text, folder=pipeline.resolve().parent), run_in)
+    reference = config.reference.at(pipeline.resolve().parent)
     mapping = Mapping(inputs=(*reference.inputs, *reference.parameters), outputs=tuple(reference.outputs))
-    begins = restless(found, mapping)
-    for note in begins:  # before an hour is spent
+    work = _Work(
+        pipeline=pipeline, config=config, reference=reference, mapping=mapping, folder=folder, perform=perform,
+        seed=seed, iterations=iterations,
+    )  # fmt: skip
+    if config.fits:
+        work.known(Path(DATASET), {}, None)  # what does not go together is refused before anything is run
+        if rounds is not None:
+            raise ConfigError(
+                "experiments grow around what a search has chosen", where=pipeline, expected="rounds, or fits",
+                got="both", remedy="leave rounds out, or the fits of the pipeline",
+            )  # fmt: skip
+    found = work.experimented()
+    # What a search has to learn; of fits that are asked for somebody knows it.
+    begins = [] if config.fits else restless(found, mapping)
+    jumps = [] if config.fits else jumps_told(found.traces.with_role(Role.ESTIMATION), mapping)
+    notes = [*begins, *jumps]
+    for note in notes:  # before an hour is spent
         say(f"note: {note}")
     runs = ReferenceRuns(config=reference)
     share = _share(folder / TIMES, runs, len(found.traces), minutes=minutes, workers=config.workers)
     share -= 0.0 if growth is None else GROWING
-    fields: dict[str, Any] = {
-        **{"kind": "auto", "name": "model", "data": str((run_in / DATASET).resolve()), "mapping": mapping},
-        **{"start": Start(), "rest": dict(found.before), "seed": seed, "workers": config.workers},
-        **({"iterations": iterations} if iterations else {"minutes": share * minutes}),
-        "export": {"formats": FORMATS},
-    }
-    search = check(AutoConfig, fields, where=pipeline)
-    searched: Searched = perform(
-        search_program(auto_of(search, load=lambda: data_of(found.traces, mapping))), folder / "model"
-    )
-    place, notes = folder / "model", list(begins)
-    if growth is not None:
-        ground = Ground(config=config, reference=reference, found=found, folder=folder)
-        seconds = None if iterations else GROWING * 60.0 * minutes
-        place, said = _grown(ground, growth, searched, seconds=seconds, perform=perform, say=say)
-        notes.append(said)
+    place = folder / "model"
+    if config.fits:
+        work.fitted(found, share * minutes)
+    else:
+        searched = work.searched(found, share * minutes)
+        if growth is not None:
+            ground = Ground(config=config, reference=reference, found=found, folder=folder)
+            seconds = None if iterations else GROWING * 60.0 * minutes
+            place, said = _grown(ground, growth, searched, seconds=seconds, perform=perform, say=say)
+            notes.append(said)
     bundle = read_bundle(place / "bundle")
     notes += beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if begins else []
     count = proof or _affordable(config, reference_runs=runs, minutes=minutes)
@@ -140,6 +154,57 @@ def make_surrogate(
     if len(shown.errors) < PROOF:
         notes.append(f"the proof is of {len(shown.errors)} experiments; --proof 1000 makes it of 1,000")
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Work:
+    """The parts of a surrogate that are programs, each kept in a folder of its own."""
+
+    pipeline: Path
+    config: ExperimentConfig
+    reference: ReferenceConfig
+    mapping: Mapping
+    folder: Path
+    perform: Perform
+    seed: int
+    iterations: int | None
+
+    @property
+    def _experiment(self) -> Path:
+        return self.folder / "experiment"
+
+    def experimented(self) -> Experimented:
+        """The experiments."""
+        text, beside = self.pipeline.read_text(encoding="utf-8-sig"), self.pipeline.resolve().parent
+        found: Experimented = self.perform(experiment_program(self.config, text=text, folder=beside), self._experiment)
+        return found
+
+    def searched(self, found: Experimented, minutes: float) -> Searched:
+        """A model that is looked for."""
+        fields: dict[str, Any] = {
+            **{"kind": "auto", "name": "model", "data": str((self._experiment / DATASET).resolve())},
+            **{"mapping": self.mapping, "start": Start(), "rest": dict(found.before), "seed": self.seed},
+            **({"iterations": self.iterations} if self.iterations else {"minutes": minutes}),
+            **{"workers": self.config.workers, "export": {"formats": FORMATS}},
+        }
+        search = check(AutoConfig, fields, where=self.pipeline)
+        auto = auto_of(search, load=lambda: data_of(found.traces, self.mapping))
+        done: Searched = self.perform(search_program(auto), self.folder / "model")
+        return done
+
+    def known(self, data: Path, rest: Dict[str, float], minutes: float | None) -> PipelineConfig:
+        """The fits that are asked for in place of a search."""
+        seconds = None if minutes is None or self.iterations else 60.0 * minutes
+        return pipeline_of(
+            self.config, self.mapping, where=self.pipeline, data=data, rest=rest, seconds=seconds, seed=self.seed,
+            formats=FORMATS,
+        )  # fmt: skip
+
+    def fitted(self, found: Experimented, minutes: float) -> None:
+        """They are fitted, scored and exported."""
+        place = self.folder / "model"
+        known = self.known((self._experiment / DATASET).resolve(), found.before, minutes)
+        self.perform(known_program(known, place), place)
 
 
 def _grown(
