@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment
-from sysid.models.output_limits import FOUND, Between
+from sysid.models.output_limits import FOUND, Between, Named
 
 Array = NDArray[np.float64]
 Records = Sequence[tuple[Array, Array]]
@@ -97,14 +97,51 @@ def ends_of(limits: str | Between | None, experiments: Sequence[Experiment], out
     kept = [(e.inputs, e.output) if e.usable is None else (e.inputs[e.usable], e.output[e.usable]) for e in experiments]
     found = found_ends(kept)
     if found == (None, None):
-        raise ConfigError(
-            f"{output} stands at no end",
-            where="limits",
-            expected=f"an output that stands at its least or greatest value for {SHARE:.0%} of the samples, while an "
-            f"input goes over {DRIVEN:.0%} of its range",
-            got=FOUND,
-            remedy="write limits: [low, high] where you know them, or leave limits out",
-        )
+        raise _no_end(output)
+    return found
+
+
+def _no_end(output: str) -> ConfigError:
+    return ConfigError(
+        f"{output} stands at no end",
+        where="limits",
+        expected=f"an output that stands at its least or greatest value for {SHARE:.0%} of the samples, while an "
+        f"input goes over {DRIVEN:.0%} of its range",
+        got=FOUND,
+        remedy="write limits: [low, high] where you know them, or leave limits out",
+    )
+
+
+def ends_of_several(
+    limits: str | Named | None, records: Sequence[tuple[Array, Array]], outputs: Sequence[str]
+) -> tuple[Between, ...]:
+    """The limits of several outputs: none, given ones, or those that the records show.
+
+    Args:
+        limits: As a structure has them.
+        records: Of each record the inputs, and the outputs, shape ``(n_samples, n_outputs)``; samples that count.
+        outputs: Their names.
+
+    Returns:
+        Both sides of each, in its unit; empty where none is asked for.
+
+    Raises:
+        ConfigError: If they are to be found, and no output stands at an end; or a name is no output.
+    """
+    if limits is None:
+        return ()
+    if not isinstance(limits, str):
+        strangers = [name for name, _ in limits if name not in outputs]
+        if strangers:
+            raise ConfigError(
+                f"limits name {', '.join(strangers)}, which is no output", where="limits",
+                expected=", ".join(outputs), got=", ".join(strangers), remedy="correct the name",
+            )  # fmt: skip
+        given = dict(limits)
+        return tuple(given.get(name, (None, None)) for name in outputs)
+    found = tuple(found_ends([(u, y[:, j]) for u, y in records]) for j in range(len(outputs)))
+    if all(one == (None, None) for one in found):
+        raise _no_end(" and ".join(outputs))
     return found
 
 

@@ -49,6 +49,44 @@ def parse_limits(value: object) -> str | Between | None:
     )
 
 
+Named = tuple[tuple[str, Between], ...]
+"""Limits of some of several outputs, by name."""
+
+
+def parse_several(value: object) -> str | Named | None:
+    """Limits of several outputs as people write them.
+
+    Args:
+        value: ``None``, ``"found"``, or the limits of some outputs by name, each as for one output; or what this gives.
+
+    Returns:
+        ``None``, ``"found"``, or names with both sides.
+
+    Raises:
+        ConfigError: If it is none of these.
+
+    Example:
+        >>> parse_several({"place": [0, 80], "speed": {"low": -1}})
+        (('place', (0.0, 80.0)), ('speed', (-1.0, None)))
+    """
+    if value is None or value == FOUND:
+        return value
+    named: Any = value
+    if isinstance(value, tuple) and all(isinstance(one, tuple) and len(one) == 2 for one in value):
+        named = dict(value)
+    if isinstance(named, Mapping) and named and all(isinstance(name, str) for name in named):
+        sides = {name: parse_limits(one) for name, one in named.items()}
+        if all(isinstance(one, tuple) for one in sides.values()):
+            return tuple((name, one) for name, one in sides.items() if isinstance(one, tuple))
+    raise ConfigError(
+        "not limits of several outputs",
+        where="limits",
+        expected="found, or limits by the output's name: {position: [0, 300]}",
+        got=shortened(value),
+        remedy="write limits: found, or for example limits: {position: [0, 300]}",
+    )
+
+
 def written(limits: str | Between) -> str:
     """Limits in a label.
 

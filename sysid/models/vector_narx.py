@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError
 from sysid.models.activations import PLAIN, Activation
 from sysid.models.base import AbstractStructure, SeveralOutputs
+from sysid.models.cascade_program import Limit
 from sysid.models.history import History
 from sysid.models.lags import Lags, LagSpec
 from sysid.models.mapping import Mapping
 from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP, NARX
+from sysid.models.output_limits import Between, parse_several, written
 from sysid.models.scaling import VectorScaling
 from sysid.models.vector_recursion import VectorRecursion
 
@@ -36,9 +38,11 @@ class VectorNARX(AbstractStructure):
         neurons: Number of neurons.
         feedthrough: A linear part from all regressors to the outputs beside the neurons.
         activation: The kind of the neurons, as in :class:`~sysid.models.NARX`.
+        limits: Values between which outputs are held inside the recursion: by name, as ``{"position": [0, 300]}``, or
+            ``found`` where the records show them; outputs that stand at no end are free.
 
     Raises:
-        ConfigError: If a set of lags or the number of neurons cannot be used.
+        ConfigError: If a set of lags, the limits or the number of neurons cannot be used.
 
     Example:
         >>> VectorNARX(input_delays="0:2", output_delays=[1, 2, 4], neurons=20).label
@@ -52,6 +56,7 @@ class VectorNARX(AbstractStructure):
     neurons: int
     feedthrough: bool = True
     activation: Activation = PLAIN
+    limits: Any = None
 
     kind = "VectorNARX"
     several_outputs = True
@@ -64,6 +69,7 @@ class VectorNARX(AbstractStructure):
         neurons: int,
         feedthrough: bool = True,
         activation: str = PLAIN,
+        limits: Any = None,
     ) -> None:
         several = not isinstance(output_delays, (int, str)) and not all(isinstance(e, int) for e in output_delays)
         sets = list(output_delays) if several and not isinstance(output_delays, int) else [output_delays]
@@ -83,6 +89,7 @@ class VectorNARX(AbstractStructure):
         object.__setattr__(self, "neurons", neurons)
         object.__setattr__(self, "feedthrough", feedthrough)
         object.__setattr__(self, "activation", activation)
+        object.__setattr__(self, "limits", parse_several(limits))
 
     @property
     def label(self) -> str:
@@ -92,6 +99,9 @@ class VectorNARX(AbstractStructure):
             for one in self.output_delays
         )
         word = f" {self.activation}" * (self.activation != PLAIN)
+        if self.limits:
+            found = isinstance(self.limits, str)
+            word += f" limits {self.limits if found else ', '.join(f'{n} {written(b)}' for n, b in self.limits)}"
         return f"{self.kind} {', '.join(labels)}{word}"
 
     def resized(self, neurons: int) -> VectorNARX:
@@ -148,7 +158,11 @@ class VectorNARX(AbstractStructure):
             "neurons": self.neurons,
             "feedthrough": self.feedthrough,
             **({"activation": self.activation} if self.activation != PLAIN else {}),
+            **({"limits": self.limits if isinstance(self.limits, str) else self._sides()} if self.limits else {}),
         }
+
+    def _sides(self) -> dict[str, list[float | None]]:
+        return {name: list(sides) for name, sides in self.limits}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,6 +182,7 @@ class VectorNARXModel(SeveralOutputs):
         output_units: Unit of each output.
         rest_outputs: Each output at rest, in its unit.
         clamp: Bound of every output in scaled numbers.
+        between: Limits between which each output is held, in its unit; empty where none is.
 
     Raises:
         TraceError: If the parameters do not fit the structure.
@@ -182,8 +197,10 @@ class VectorNARXModel(SeveralOutputs):
     output_units: tuple[str, ...]
     rest_outputs: tuple[float, ...]
     clamp: float = CLAMP
+    between: tuple[Between, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "between", tuple(tuple(sides) for sides in self.between))
         theta = np.array(self.theta, dtype=np.float64)
         theta.setflags(write=False)
         object.__setattr__(self, "theta", theta)
@@ -213,6 +230,12 @@ class VectorNARXModel(SeveralOutputs):
         """The regressors over inputs and outputs."""
         return self.network.lags(len(self.mapping.inputs), len(self.mapping.outputs))
 
+    @property
+    def limits(self) -> Dict[str, Limit]:
+        """What holds its outputs, as a cascade has it."""
+        sides = zip(self.mapping.outputs, self.between, strict=False)
+        return {name: Limit(low=low, high=high) for name, (low, high) in sides if (low, high) != (None, None)}
+
     @cached_property
     def recursion(self) -> VectorRecursion:
         """The form that is run and exported."""
@@ -225,6 +248,7 @@ class VectorNARXModel(SeveralOutputs):
             scaling=self.scaling,
             low=-self.clamp,
             high=self.clamp,
+            between=self.between,
             activation=self.network.activation,
         )
 
@@ -261,6 +285,7 @@ class VectorNARXModel(SeveralOutputs):
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
             "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
+            **({"between": [list(sides) for sides in self.between]} if self.limits else {}),
         }
 
     @classmethod
@@ -276,4 +301,5 @@ class VectorNARXModel(SeveralOutputs):
             output_units=tuple(fields["output_units"]),
             rest_outputs=tuple(fields["rest_outputs"]),
             clamp=np.inf if fields["clamp"] is None else fields["clamp"],
+            between=tuple(tuple(sides) for sides in fields.get("between", ())),
         )

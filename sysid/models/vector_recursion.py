@@ -13,12 +13,13 @@ from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import Program
 from sysid.kernels.neurons import NEURONS
 from sysid.models.activations import PLAIN
-from sysid.models.cascade_program import program_of
+from sysid.models.cascade_program import Limit, program_of
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends, read_now
 from sysid.models.form import AbstractForm
 from sysid.models.history import History
 from sysid.models.lags import Lags
+from sysid.models.output_limits import Between
 from sysid.models.recursion import gauss_newton
 from sysid.models.scaling import VectorScaling
 
@@ -38,6 +39,7 @@ class VectorRecursion(AbstractForm):
         scaling: Between units and scaled numbers.
         low: Lower bound of the outputs in scaled numbers; ``-inf`` for none.
         high: Upper bound of the outputs in scaled numbers; ``inf`` for none.
+        between: Limits of each output in its unit; empty for none.
         activation: The kind of its neurons, :math:`\sigma`.
     """
 
@@ -49,6 +51,7 @@ class VectorRecursion(AbstractForm):
     scaling: VectorScaling
     low: float = -np.inf
     high: float = np.inf
+    between: tuple[Between, ...] = ()
     activation: str = PLAIN
 
     @property
@@ -104,7 +107,8 @@ class VectorRecursion(AbstractForm):
             rest_outputs=(0.0,) * p,
             direct=frozenset(),
         )
-        return program_of([self.columns], [ends], (*inputs, *outputs), {})
+        limits = {f"y{i}": Limit(low=low, high=high) for i, (low, high) in enumerate(self.between)}
+        return program_of([self.columns], [ends], (*inputs, *outputs), limits)
 
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""
@@ -159,12 +163,12 @@ class VectorRecursion(AbstractForm):
                 known = u[:, channel] if channel < m else ahead[max(0, step - lag)][:, channel - m]
                 columns.append(known[depth - lag : depth - lag + n])
             predicted = y.copy()
-            predicted[depth:] = self._step(np.column_stack(columns))
+            predicted[depth:] = self._held(self._step(np.column_stack(columns)), scaled=True)
             if step > 1:  # a record's first samples are predicted from the history, fewer steps before
                 first = depth + step - 1
                 predicted[depth:first] = ahead[-1][depth:first]
             ahead.append(predicted)
-        return self.scaling.unscale_output(ahead[-1][depth:])
+        return self._held(self.scaling.unscale_output(ahead[-1][depth:]))
 
     def _step(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled outputs of rows of regressors."""
@@ -173,6 +177,18 @@ class VectorRecursion(AbstractForm):
         h = NEURONS[self.activation].value(x @ W.reshape(k, r).T + b)
         y = h @ V.reshape(p, k).T + c
         return np.clip(y + x @ w.reshape(p, r).T if self.linear else y, self.low, self.high)
+
+    def _held(self, y: NDArray[np.float64], *, scaled: bool = False) -> NDArray[np.float64]:
+        """Outputs within their limits."""
+        if not self.between:
+            return y
+        low, high = (
+            np.array([far if sides[k] is None else sides[k] for sides in self.between], dtype=np.float64)
+            for k, far in ((0, -np.inf), (1, np.inf))
+        )
+        if scaled:
+            low, high = self.scaling.scale_output(low), self.scaling.scale_output(high)
+        return np.clip(y, low, high)
 
     def _walk(self, room: NDArray[np.float64], past: int) -> None:
         """Run over the rows from ``past`` on, in units."""

@@ -15,6 +15,7 @@ from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
 from sysid.estimation.networks.member_layout import JointLayout, MemberLayout
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress
+from sysid.estimation.output_ends import ends_of_several, told
 from sysid.estimation.result import FitResult, Loop
 from sysid.models import (
     AbstractStructure,
@@ -116,7 +117,10 @@ def fit_vector_narx(
         scored=scored if from_record else None,
     )
     fit = joint.fit(starts)
-    return replace(_result(fit), posterior=_posterior(fit, layout, traces, selection, begin))
+    found = _result(fit)
+    held = zip(mapping.outputs, template.output_units, template.between, strict=False)  # of none, none
+    notes = [told(sides, name, unit) for name, unit, sides in held if sides != (None, None)]
+    return replace(found, notes=(*found.notes, *notes), posterior=_posterior(fit, layout, traces, selection, begin))
 
 
 def _posterior(
@@ -210,5 +214,9 @@ def _template(
             for name in mapping.outputs
         ),
     )
+    records = [
+        (t.columns(mapping.inputs)[t.usable_samples], t.columns(mapping.outputs)[t.usable_samples]) for t in traces
+    ]
+    model = replace(model, between=ends_of_several(network.limits, records, mapping.outputs))
     columns = ColumnRecursion.of(model)
     return model.with_theta(MemberLayout.of(model, columns).centre()) if columns else model

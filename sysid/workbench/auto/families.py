@@ -16,6 +16,7 @@ from sysid.models import (
     NeuralStateSpace,
     PolynomialNARX,
     TransferFunction,
+    VectorNARX,
 )
 from sysid.models.curves import NONE
 from sysid.models.output_limits import FOUND
@@ -120,18 +121,34 @@ def _narx(looked: Looked) -> list[Try]:
 
 
 def _narx_at_ends(looked: Looked) -> list[Try]:
-    """What is held where the output stands in the records.
+    """What is held where the output stands in the records; of several outputs where each does.
 
     Friction and stops switch within a sample, which a start that is trained one step ahead finds. At a stop past
     outputs do not show what goes on behind it, a pump that runs down: past inputs do, over as long as that takes.
     """
-    found = []
+    found: list[Try] = []
+    if not looked.all_end:
+        return found
     for lags, own, neurons in ((3, 3, 8), (5, 3, 14), (12, 1, 12)):
         first = min(looked.delay, 1)
         inputs = f"{first}:{first + lags - 1}"
         network = NARX(input_delays=inputs, output_delays=own, neurons=neurons, limits=FOUND)
         found.append(Try(structure=network, training=ONE_STEP))
     return found
+
+
+def _vector_at_ends(looked: Looked) -> list[Try]:
+    """Of several outputs one network: a speed reads that the position beside it stands at its stop."""
+    first = min(looked.delay, 1)
+    sizes = ((3, 2, 12), (6, 2, 16)) if looked.n_outputs > 1 else ()
+    return [
+        Try(
+            structure=VectorNARX(
+                input_delays=f"{first}:{first + lags - 1}", output_delays=own, neurons=neurons, limits=FOUND
+            )
+        )
+        for lags, own, neurons in sizes
+    ]
 
 
 def _narx_of(lags: int, neurons: int, looked: Looked) -> Try:
@@ -229,6 +246,7 @@ FAMILIES = (
         in_motion=lambda looked: [_narx_of(1, 10, looked)],
         at_ends=_narx_at_ends,
     ),
+    Family(kind=VectorNARX.kind, linear=False, first=lambda _: [], at_ends=_vector_at_ends),
     Family(kind=HammersteinWiener.kind, linear=False, first=_blocks, around=_around_blocks),
     Family(kind=PolynomialNARX.kind, linear=False, first=_polynomials),
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -38,8 +37,9 @@ class Looked:
         never_negative: Whether no output ever is, so that its sensor may not tell a sign.
         suggested: What ``sysid advise`` suggests.
         cautions: What it asks to be looked at, in words.
-        ends: Whether every output stands at an end while inputs move on, as what integrates until it meets a stop: then
-            what holds its output there is tried first.
+        ends: Whether an output stands at an end while inputs move on, as what integrates until it meets a stop: then
+            what holds outputs there is tried first.
+        all_end: Whether every one does, so that each may have a model of its own.
         in_motion: Whether outputs move before any input does though each run begins as if they had stood: then what
             remembers one sample, or learns where it begins, is tried first.
     """
@@ -52,6 +52,7 @@ class Looked:
     cautions: tuple[str, ...] = ()
     in_motion: bool = False
     ends: bool = False
+    all_end: bool = False
 
     @property
     def lags(self) -> int:
@@ -85,8 +86,9 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         orders=_orders(data, mapping, start),
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(one.structure for one in advice[0].suggestions) if len(advice) == 1 else (),
-        cautions=(*_cautions(advice), *_held_apart(ends)),
-        ends=all(ends.values()),
+        cautions=tuple(_cautions(advice)),
+        ends=any(ends.values()),
+        all_end=all(ends.values()),
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
     )
 
@@ -153,17 +155,6 @@ def _orders(data: Data, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
         return ()  # too short for any: what is tried then says so itself
     structures = [one.fit.model.structure for one in found.finalists if np.isfinite(one.mean_fit)]
     return tuple(replace(one) for one in structures if isinstance(one, ARX))[:ARX_TRIED]
-
-
-def _held_apart(ends: Dict[str, bool]) -> list[str]:
-    """Outputs at ends beside others that are at none: nothing that is tried for all of them is held there."""
-    some = [name for name, stands in ends.items() if stands]
-    if not some or len(some) == len(ends):
-        return []
-    return [
-        f"{', '.join(some)} stands at an end while an input moves on, and nothing that is tried for all outputs "
-        f"together is held there. Search it by itself, without {', '.join(name for name in ends if name not in some)}."
-    ]
 
 
 def _cautions(advice: Sequence[Advice]) -> list[str]:

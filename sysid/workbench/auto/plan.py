@@ -9,7 +9,7 @@ from statistics import median_high
 from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.estimation import Training
+from sysid.estimation import JointTraining, Training
 from sysid.estimation.estimators import estimator_of
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import LINEAR, Budget, size_of
@@ -250,6 +250,8 @@ class Plan:
         self._asked += 1
         row = estimator_of(one.structure)
         training = {**self.training, **one.training} if row.training is Training else dict(one.training)
+        if row.training is JointTraining and "max_time_s" in self.training:
+            training["max_time_s"] = self.training["max_time_s"]
         values = {"structure": one.structure.label, **one.training}
         return Point(number=self._asked, structure=one.structure, training=training, values=values)
 

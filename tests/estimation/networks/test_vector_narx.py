@@ -13,7 +13,7 @@ from sysid.estimation import JointTraining, Loop, fit_vector_narx
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.member_layout import MemberLayout
-from sysid.models import Cascade, Mapping, Start, StartKind, VectorNARX, beginning
+from sysid.models import Cascade, History, Mapping, Start, StartKind, VectorNARX, VectorNARXModel, beginning
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Role, Trace, TraceSet
@@ -41,6 +41,45 @@ def coupled(n: int = 800, seed: int = 0) -> Trace:
 
 
 NETWORK = VectorNARX(input_delays=[0], output_delays=1, neurons=4)
+
+
+def between_stops(n: int = 600, seed: int = 0) -> Trace:
+    """A slide that is pushed through a lag, and stands at its stops; how fast it is pushed is measured beside it."""
+    u = np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, n // 10), 10)
+    x, v, values = 2.0, 0.0, []
+    for push in u:
+        v = 0.8 * v + 0.1 * push
+        x = min(max(x + v, 0.0), 4.0)
+        values.append((push, x, v))
+    channels = tuple(Channel(name=name, unit=unit) for name, unit in (("u", "V"), ("x", "mm"), ("y", "mm/s")))
+    return Trace(name=f"slide {seed}", sample_time=0.1, channels=channels, values=np.array(values))
+
+
+def test_outputs_are_held_at_their_ends_inside_the_recursion_the_others_are_free():
+    held, free = (replace(NETWORK, limits=limits) for limits in ("found", None))
+    rest, options = {"x": 2.0, "y": 0.0}, JointTraining(max_iterations=60)
+    records = [between_stops(), between_stops(seed=1)]
+    fits = [fit_vector_narx(records, MAPPING, one, options, rest_output=rest) for one in (held, free)]
+    assert {name: (one.low, one.high) for name, one in fits[0].model.limits.items()} == {"x": (0.0, 4.0)}
+    assert "The free run of x is held at 0 mm from below and at 4 mm from above." in fits[0].notes
+    unseen = between_stops(seed=5)
+    runs = [fit.model.run_from(unseen.columns(["u"]), np.array([2.0, 0.0])) for fit in fits]
+    off = [np.sqrt(np.mean((run[:, 0] - unseen["x"]) ** 2)) / 4.0 for run in runs]
+    assert off[0] < 0.01 < off[1]
+    assert (runs[0][:, 0].min(), runs[0][:, 0].max()) == (0.0, 4.0)  # to the last bit
+    again = VectorNARXModel.from_dict(fits[0].model.to_dict())
+    assert_array_equal(again.run_from(unseen.columns(["u"]), np.array([2.0, 0.0])), runs[0])
+    before = History.at_rest(inputs=np.zeros(1), output=np.array([2.0, 0.0]))
+    ahead = again.predict(unseen.columns(["u"]), unseen.columns(["x", "y"]), before)
+    assert 0.0 <= ahead[:, 0].min() < ahead[:, 0].max() <= 4.0
+    named = replace(NETWORK, limits={"x": [0, None]})
+    assert VectorNARX(**{k: v for k, v in named.to_dict().items() if k != "kind"}) == named
+    with pytest.raises(ConfigError, match="which is no output"):
+        fit_vector_narx([between_stops()], MAPPING, replace(NETWORK, limits={"z": [0, 1]}), options)
+    with pytest.raises(ConfigError, match="stands at no end"):
+        fit_vector_narx([coupled()], MAPPING, held, options)
+    with pytest.raises(ConfigError, match="not limits of several outputs"):
+        replace(NETWORK, limits=[0, 1])
 
 
 def test_a_coupled_system_is_found_in_free_run():

@@ -9,7 +9,7 @@ import pytest
 
 from sysid.models import Mapping, Start, StartKind
 from sysid.traces import Role, Trace
-from sysid.workbench.auto.look import Looked, _held_apart, at_ends, in_motion, look
+from sysid.workbench.auto.look import Looked, at_ends, in_motion, look
 from tests.workbench.auto.conftest import data, record
 
 MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
@@ -46,9 +46,6 @@ def test_outputs_that_stand_at_an_end_while_an_input_moves_on_are_known() -> Non
     for y, ends in ((np.clip(u[:, 0], -0.5, None), True), (u[:, 0], False)):
         trace = Trace(name="a", sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
         assert set(at_ends([trace], MAPPING).values()) == {ends}
-    assert [bool(_held_apart(found)) for found in ({"y": True}, {"y": False}, {"y": True, "v": False})] == [
-        False, False, True,
-    ]  # fmt: skip
 
 
 def test_what_asks_to_be_looked_at_is_told_in_words(looked: Looked) -> None:

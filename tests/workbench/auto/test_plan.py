@@ -206,12 +206,19 @@ def test_the_median_of_its_errors_is_what_a_point_is_worth() -> None:
 
 def test_what_stands_at_ends_has_first_what_is_held_there() -> None:
     for ends in (False, True):
-        _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, ends=ends))
+        _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, ends=ends, all_end=ends))
         held = [point for points in rounds for point in points if "limits found" in point.structure.label]
         assert bool(held) is ends
         assert ("limits found" in rounds[0][0].structure.label) is ends
         assert all(point.training["pretraining"] for point in held)
         assert len({tuple(map(len, point.structure.input_delays)) for point in held}) > 1 or not ends
+
+
+def test_where_some_of_several_outputs_end_one_network_has_all_of_them() -> None:
+    for all_end in (False, True):
+        _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, ends=True, all_end=all_end, n_outputs=2))
+        kinds = {p.structure.kind for points in rounds for p in points if "limits found" in p.structure.label}
+        assert kinds == ({"NARX", "VectorNARX"} if all_end else {"VectorNARX"})
 
 
 def test_what_begins_in_motion_has_first_what_remembers_one_sample_or_learns_where_it_begins() -> None:
