@@ -42,7 +42,7 @@ class _Made:
     last: str = ""
 
 
-def step_core(nodes: Nodes, form: WideForm, x: str, memory: str) -> Step:
+def step_core(nodes: Nodes, form: WideForm, x: str, memory: str, *, moves: bool = True, laid: str = "") -> Step:
     """Add the nodes of one step.
 
     Args:
@@ -50,6 +50,8 @@ def step_core(nodes: Nodes, form: WideForm, x: str, memory: str) -> Step:
         form: The whole.
         x: Terms of inputs, shape ``(n_terms, batch)``.
         memory: Shape ``(n_memory, batch)``.
+        moves: Whether lines are moved on; else the memory that is given has the newest number of each alone.
+        laid: What is laid before the first group, if it is known.
 
     Returns:
         The names.
@@ -68,11 +70,13 @@ def step_core(nodes: Nodes, form: WideForm, x: str, memory: str) -> Step:
             pieces.append(
                 held if own is None else part.add("Gather", [held, part.integers(own)], f"now{other}", axis=0)
             )
+        if laid and not made:
+            pieces = [laid]
         make = _equations if group.computes else _group
         made.append(make(part, form, group, pieces, memory))
     raw = join(nodes, [one.raw for one in made], "raw")
-    following = _memory(nodes, form, memory, made)
-    if raw == following:  # a loop mixes up what is two of its outputs
+    following = _memory(nodes, form, memory, made, moves=moves)
+    if raw == following and moves:  # a loop mixes up what is two of its outputs
         raw = nodes.add("Identity", [raw], "raw_rows")
     return Step(raw=raw, memory=following)
 
@@ -291,7 +295,7 @@ def _own_limits(nodes: Nodes, group: Group, value: str, parts: dict[str, str], *
     return nodes.add("Concat", rows, "rows_held", axis=0)
 
 
-def _memory(nodes: Nodes, form: WideForm, memory: str, made: Sequence[_Made]) -> str:
+def _memory(nodes: Nodes, form: WideForm, memory: str, made: Sequence[_Made], *, moves: bool) -> str:
     """What the next step begins with: lines moved on by a sample, states, and what rounding took."""
     counts = [len(group.rows) for group in form.groups]
     starts = np.cumsum([0, *counts])
@@ -301,7 +305,7 @@ def _memory(nodes: Nodes, form: WideForm, memory: str, made: Sequence[_Made]) ->
     scatter: list[int] = []
     if form.lines:
         newest = _newest(nodes, form, held, row, sum(counts))
-        pieces, scatter = _moved(nodes, form, memory, newest)
+        pieces, scatter = _moved(nodes, form, memory, newest) if moves else ([newest], [])
     states = [int(starts[g]) + at for g, at in _states(form)]
     if states:
         pieces.append(nodes.add("Gather", [held, nodes.integers(states)], "states_after", axis=0))

@@ -145,8 +145,24 @@ class Nodes:
         )
 
     def graph(self, name: str, inputs: Sequence[Any], outputs: Sequence[Any]) -> Any:
-        """Close the graph."""
-        return helper.make_graph(self.nodes, name, list(inputs), list(outputs), list(self.constants.values()))
+        """Close the graph, without what nobody reads."""
+        needed, nodes = {one.name for one in outputs}, []
+        for node in reversed(self.nodes):
+            if needed.intersection(node.output):
+                nodes.append(node)
+                needed |= _read(node)
+        constants = [one for key, one in self.constants.items() if key in needed]
+        return helper.make_graph(nodes[::-1], name, list(inputs), list(outputs), constants)
+
+
+def _read(node: Any) -> set[str]:
+    """What a node reads, and what bodies inside it do."""
+    found = set(node.input)
+    for attribute in node.attribute:
+        for inner in attribute.g.node:
+            found |= _read(inner)
+        found |= {one.name for one in attribute.g.output}
+    return found
 
 
 def checked_model(graph: Any, surrogate: Surrogate, version: str) -> Any:

@@ -56,7 +56,7 @@ def _channels(ports: tuple[Port, ...]) -> str:
     return ", ".join(f"{port.name} [{port.unit}]" for port in ports)
 
 
-def known_inputs(nodes: Nodes, given: str) -> str:
+def known_inputs(nodes: Nodes, given: str) -> tuple[str, str]:
     """The inputs, with what is infinite as not a number: nothing times it is none, and adds nothing to all others.
 
     Args:
@@ -64,19 +64,22 @@ def known_inputs(nodes: Nodes, given: str) -> str:
         given: The inputs in units.
 
     Returns:
-        The name.
+        Their name, and that of nothing times each.
     """
     nothing = nodes.add("Mul", [given, nodes.numbers("nothing_of", 0.0)], "u_nothing")
-    return nodes.add("Add", [given, nothing], "u_known")
+    return nodes.add("Add", [given, nothing], "u_known"), nothing
 
 
-def scaled_inputs(nodes: Nodes, form: WideForm, u: str) -> tuple[str, dict[tuple[int, float, float, int], int]]:
+def scaled_inputs(
+    nodes: Nodes, form: WideForm, u: str, parts: Sequence[str]
+) -> tuple[str, dict[tuple[int, float, float, int], int]]:
     """Inputs in the numbers of everybody who reads them, and the row of each.
 
     Args:
         nodes: The graph.
         form: The whole.
         u: The inputs in units.
+        parts: What they are the sum of.
 
     Returns:
         The name, and rows by column, offset, scale and delay line; ``""`` where nobody reads an input.
@@ -84,8 +87,12 @@ def scaled_inputs(nodes: Nodes, form: WideForm, u: str) -> tuple[str, dict[tuple
     readers = sorted({reader(one) for one in (*form.inputs, *form.input_lines)})
     if not readers:
         return "", {}
-    values = nodes.rows(u, [one[0] for one in readers], len(form.surrogate.inputs), "u_by_reader")
-    centred = nodes.add("Sub", [values, nodes.column("input_offset", [one[1] for one in readers])], "u_centred")
+    columns, offsets = [one[0] for one in readers], np.array([one[1] for one in readers])
+    if columns == [*range(len(form.surrogate.inputs))]:  # in one node
+        centred = nodes.add("Sum", [*parts, nodes.column("input_offset", -offsets)], "u_centred")
+    else:
+        values = nodes.rows(u, columns, len(form.surrogate.inputs), "u_by_reader")
+        centred = nodes.add("Sub", [values, nodes.column("input_offset", offsets)], "u_centred")
     scaled = nodes.add("Div", [centred, nodes.column("input_scale", [one[2] for one in readers])], "u_scaled")
     return scaled, {one: row for row, one in enumerate(readers)}
 
@@ -103,17 +110,19 @@ class Units:
         outputs: What comes out.
         raw: Rows of all groups, before declared limits.
         at_limit: Rows that are at a declared limit that is told; ``""`` for none.
-        at_bound: Rows that are held at a bound of the model itself; ``""`` for none.
+        at_bound: Rows that are held at a bound of the model itself, by side or both in one.
         limit_flags: What each row that is told raises.
         counts: Numbers of rows of raw, and of those at a bound.
+        alone: Of one output that no declared limit holds: its scaled number, and their offset and scale.
     """
 
     outputs: str
     raw: str
     at_limit: str
-    at_bound: str
+    at_bound: tuple[str, ...]
     limit_flags: tuple[Flag, ...]
     counts: tuple[int, int]
+    alone: tuple[str, float, float] | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,26 +198,38 @@ def in_units(nodes: Nodes, form: WideForm, raw: str, u: str) -> Units:
     outputs = limits.values([order.index(column - n) for column in form.surrogate.columns], "outputs")
     at_limit = limits.reached([i for i, row in enumerate(rows.values()) if row.told], "told")
     bounded = [i for i, row in enumerate(rows.values()) if row.bounded]
-    at_bound = ""
+    at_bound: tuple[str, ...] = ()
     if bounded:
         numbers_held = nodes.rows(numbers, bounded, len(rows), "bounded")
         at_bound = _at_bound(nodes, numbers_held, low[bounded], high[bounded])
         at_limits = limits.reached(bounded, "bounded")
         if at_limits:
-            at_bound = nodes.add("And", [at_bound, nodes.add("Not", [at_limits], "free")], "at_bound")
+            either = at_bound[0] if len(at_bound) == 1 else nodes.add("Or", at_bound, "at_either_bound")
+            at_bound = (nodes.add("And", [either, nodes.add("Not", [at_limits], "free")], "at_bound"),)
     flags = tuple(row.limit_flag for row in rows.values() if row.told)
     count = int(starts[-1])
     if any(group.computes for group in form.groups):  # a state may be lost a sample before it is read
         own = [int(starts[g]) + at for g, group in enumerate(form.groups) for at in range(group.n_outputs)]
         raw, count = nodes.rows(raw, own, count, "raw_outputs"), len(own)
-    counts = (count, len(bounded))
-    return Units(outputs=outputs, raw=raw, at_limit=at_limit, at_bound=at_bound, limit_flags=flags, counts=counts)
+    alone = None
+    if len(rows) == len(form.surrogate.columns) == 1 and not any(row.sides for row in rows.values()):
+        ((row, i),) = zip(rows.values(), at, strict=True)
+        alone = (numbers, float(row.stage.form.offset[i]), float(row.stage.form.scale[i]))
+    return Units(
+        outputs=outputs,
+        raw=raw,
+        at_limit=at_limit,
+        at_bound=at_bound,
+        limit_flags=flags,
+        counts=(count, len(bounded)),
+        alone=alone,
+    )
 
 
-def _at_bound(nodes: Nodes, numbers: str, low: NDArray[np.float64], high: NDArray[np.float64]) -> str:
-    """Where scaled numbers are at a bound of the model."""
+def _at_bound(nodes: Nodes, numbers: str, low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[str, ...]:
+    """Where scaled numbers are at a bound of the model, below and above."""
     sides = {"LessOrEqual": low, "GreaterOrEqual": high}
-    causes = [
+    return tuple(
         nodes.add(
             operator,
             [numbers, nodes.column(f"bound_{operator}", np.where(np.isfinite(side), side, np.nan))],
@@ -216,8 +237,7 @@ def _at_bound(nodes: Nodes, numbers: str, low: NDArray[np.float64], high: NDArra
         )
         for operator, side in sides.items()
         if np.isfinite(side).any()
-    ]
-    return causes[0] if len(causes) == 1 else nodes.add("Or", causes, "at_either_bound")
+    )
 
 
 class _Limits:
@@ -354,11 +374,11 @@ def flags_of(nodes: Nodes, surrogate: Surrogate, inputs: tuple[str, str], units:
     Args:
         nodes: The graph.
         surrogate: The whole.
-        inputs: The inputs in units, as they came and as they are known.
+        inputs: The inputs in units as they came, and nothing times each.
         units: What comes out, and why flags are raised.
 
     Returns:
-        The name.
+        The name of ``flags``: of a step, one row a car; of many samples, one row before them and the cars.
     """
     ports, n = surrogate.inputs, len(surrogate.inputs)
     given, u = inputs
@@ -369,7 +389,7 @@ def flags_of(nodes: Nodes, surrogate: Surrogate, inputs: tuple[str, str], units:
             name = nodes.add(operator, [given, nodes.column(f"declared_{side}", limits)], f"u_{operator}".lower())
             causes.append((name, [Flag.OUTSIDE_RANGE] * n))
     rows, bounds = units.counts
-    causes += [(units.at_bound, [Flag.AT_BOUND] * bounds), (units.at_limit, units.limit_flags)]
+    causes += [(name, [Flag.AT_BOUND] * bounds) for name in units.at_bound] + [(units.at_limit, units.limit_flags)]
     causes.append((nodes.add("IsNaN", [u], "u_lost"), [Flag.NOT_A_NUMBER] * n))
     causes.append((nodes.add("IsNaN", [units.raw], "raw_lost"), [Flag.NOT_A_NUMBER] * rows))
     causes = [cause for cause in causes if cause[0]]
@@ -380,17 +400,21 @@ def flags_of(nodes: Nodes, surrogate: Surrogate, inputs: tuple[str, str], units:
         numbers = nodes.add("Reshape", [numbers, nodes.integers([len(which), -1])], "marks_in_rows")
     table = nodes.numbers("flag_of_cause", [[float(flag is one) for one in which] for flag in present])
     raised = nodes.add("Sign", [nodes.add("MatMul", [table, numbers], "raised")], "raised_or_not")
-    total = nodes.add("MatMul", [nodes.numbers("flag_values", [[float(flag) for flag in present]]), raised], "flag_sum")
-    total = nodes.add("Cast", [total], "flag_row", to=INT32)
+    values = [[float(flag)] for flag in present]
     if nodes.trailing == 1:
-        return total
+        total = nodes.add("Gemm", [raised, nodes.numbers("flag_values", values)], "flag_sum", transA=1)
+        return nodes.add("Cast", [total], "flags", to=INT32)
+    total = nodes.add("MatMul", [nodes.numbers("flag_values", np.transpose(values)), raised], "flag_sum")
+    total = nodes.add("Cast", [total], "flag_row", to=INT32)
     shape = nodes.add(
         "Concat", [nodes.integers([1]), nodes.add("Shape", [u], "u_shape", start=1)], "flag_shape", axis=0
     )
     return nodes.add("Reshape", [total, shape], "flag_rows")
 
 
-def state_after(nodes: Nodes, form: WideForm, memory: str, tails: Sequence[tuple[str, dict[int, int], int]]) -> str:
+def state_after(
+    nodes: Nodes, form: WideForm, memory: str, tails: Sequence[tuple[str, dict[int, int], int]], *, moved: bool = True
+) -> str:
     """The state with its numbers in their places, from the memory and the ends of inputs' lines.
 
     Args:
@@ -398,13 +422,17 @@ def state_after(nodes: Nodes, form: WideForm, memory: str, tails: Sequence[tuple
         form: The whole.
         memory: What the last step hands on.
         tails: More rows: name, row of each column of the state, and how many rows there are.
+        moved: Whether the memory has whole lines, or the newest number of each alone.
 
     Returns:
         The name, of shape ``(n_state, batch)``.
     """
-    places = {column: (0, row) for column, row in form.places.items()}
+    held = form.memory
+    if not moved:
+        held = (*(line.first for line in form.lines), *form.memory[sum(line.length for line in form.lines) :])
+    places = {column: (0, row) for row, column in enumerate(held)}
     for at, (_, own, _) in enumerate(tails, start=1):
         places |= {column: (at, row) for column, row in own.items()}
-    values = [(memory, len(form.memory)), *((name, count) for name, _, count in tails)]
+    values = [(memory, len(held)), *((name, count) for name, _, count in tails)]
     size = form.surrogate.state_length(nodes.dtype)
     return nodes.rows_of(values, [places[column] for column in range(size)], "rows_of_state")

@@ -36,9 +36,9 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     """
     nodes, form = Nodes(dtype, trailing=2), WideForm.of(surrogate, dtype)
     given = nodes.add("Transpose", ["u"], "u_rows", perm=[2, 0, 1])
-    u = known_inputs(nodes, given)
+    u, nothing = known_inputs(nodes, given)
     state = nodes.add("Transpose", ["state"], "state_rows_before", perm=[1, 0])
-    scaled, rows = scaled_inputs(nodes, form, u)
+    scaled, rows = scaled_inputs(nodes, form, u, (given, nothing))
     depth = max((line.length for line in form.input_lines), default=0)
     history = _with_past(nodes, form, (scaled, rows), state, depth) if depth else scaled
     x = _terms(nodes, form, history, rows, depth) if form.inputs else u
@@ -55,7 +55,7 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     nodes.add("Transpose", [units.outputs], "y", perm=[1, 2, 0])
     tails = [_tail(nodes, form, history, rows, depth)] if depth else []
     nodes.add("Transpose", [state_after(nodes, form, made.memory, tails)], "state_out", perm=[1, 0])
-    nodes.add("Transpose", [flags_of(nodes, surrogate, (given, u), units)], "flags", perm=[1, 2, 0])
+    nodes.add("Transpose", [flags_of(nodes, surrogate, (given, nothing), units)], "flags", perm=[1, 2, 0])
     return in_blocks(surrogate, nodes)
 
 

@@ -15,6 +15,9 @@ from sysid.export.onnx_outputs import ends, flags_of, in_units, known_inputs, re
 from sysid.export.surrogate import Surrogate
 from sysid.export.wide_form import WideForm
 
+GATHERED = 100
+"""Numbers of a state up to which gathering all of it is quicker than moving its lines on."""
+
 
 def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     """The graph of one step.
@@ -31,28 +34,49 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     """
     nodes, form = Nodes(dtype), WideForm.of(surrogate, dtype)
     given, state = (nodes.add("Transpose", [name], f"{name}_rows", perm=[1, 0]) for name in ("u", "state"))
-    u = known_inputs(nodes, given)
-    scaled, rows = scaled_inputs(nodes, form, u)
+    u, nothing = known_inputs(nodes, given)
+    scaled, rows = scaled_inputs(nodes, form, u, (given, nothing))
     x = _terms(nodes, form, scaled, rows, state) if form.inputs else u
     memory = nodes.rows(state, form.memory, surrogate.state_length(dtype), "memory")
+    moves = not form.exact or surrogate.state_length(dtype) > GATHERED
 
     def core(part: Nodes, plan: WideForm) -> Step:
-        return step_core(part, plan, x, memory)
+        return step_core(part, plan, x, memory, moves=moves, laid=_laid(part, plan, scaled, rows, state))
 
     made = whole_or_exact(nodes, form, u, core)
     units = in_units(nodes, form, made.raw, u)
-    nodes.add("Transpose", [units.outputs], "y", perm=[1, 0])
-    after = state_after(nodes, form, made.memory, _tails(nodes, form, scaled, rows, state))
+    if units.alone:
+        number, offset, scale = units.alone
+        shares = [number, nodes.numbers("output_share", [[scale]]), nodes.numbers("output_shift", [[offset]])]
+        nodes.add("Gemm", shares, "y", transA=1)
+    else:
+        nodes.add("Transpose", [units.outputs], "y", perm=[1, 0])
+    after = state_after(nodes, form, made.memory, _tails(nodes, form, scaled, rows, state, moves=moves), moved=moves)
     nodes.add("Transpose", [after], "state_out", perm=[1, 0])
-    nodes.add("Transpose", [flags_of(nodes, surrogate, (given, u), units)], "flags", perm=[1, 0])
+    flags_of(nodes, surrogate, (given, nothing), units)
     return nodes.graph("step", *ends(nodes, surrogate, ["batch"]))
+
+
+def _laid(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state: str) -> str:
+    """What is laid before a group that is alone, in one gather; ``""`` where it is not that plain."""
+    group, *more = form.groups
+    if more or group.computes or not (group.past and form.inputs) or any(one.older >= 0 for one in form.inputs):
+        return ""
+    past = [(1, column) for column in group.past]
+    given = [(1, one.first + one.lag - 1) if one.lag else (0, rows[reader(one)]) for one in form.inputs]
+    size = form.surrogate.state_length(nodes.dtype)
+    if all(one.lag for one in form.inputs):
+        return nodes.rows(state, [column for _, column in past + given], size, "laid")
+    return nodes.rows_of([(scaled, len(rows)), (state, size)], past + given, "laid")
 
 
 def _terms(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state: str) -> str:
     """Terms of inputs, from this sample and the state."""
     count = len(rows)
     known = scaled
-    if any(one.lag or one.older > 0 for one in form.inputs):
+    if all(one.lag and one.older for one in form.inputs):
+        known, count, rows = state, form.surrogate.state_length(nodes.dtype), {}
+    elif any(one.lag or one.older > 0 for one in form.inputs):
         known = nodes.add("Concat", [scaled, state], "u_and_state", axis=0)
         count += form.surrogate.state_length(nodes.dtype)
 
@@ -72,13 +96,14 @@ def _terms(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], stat
     return difference if not levels else nodes.add("Concat", [levels, difference], "terms", axis=0)
 
 
-def _tails(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state: str) -> list[Any]:
-    """The inputs' lines after the step: the newest sample of each, and what is older, from the state."""
-    if not form.input_lines:
-        return []
+def _tails(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state: str, *, moves: bool) -> list[Any]:
+    """What the memory does not hold of the state after the step: inputs, and what is older, from the state."""
     newest = {line.first: rows[reader(line)] for line in form.input_lines}
-    tails = [(scaled, newest, len(rows))]
-    older = {line.first + lag: line.first + lag - 1 for line in form.input_lines for lag in range(1, line.length)}
+    tails = [(scaled, newest, len(rows))] if newest else []
+    lines = [(line.first, line.length) for line in form.input_lines]
+    if not moves:
+        lines += [(line.first, line.length) for line in form.lines]
+    older = {first + lag: first + lag - 1 for first, length in lines for lag in range(1, length)}
     return tails + ([(state, older, form.surrogate.state_length(nodes.dtype))] if older else [])
 
 
