@@ -21,6 +21,18 @@ RUNNING = 0.2
 """Share of the time in which the reference is run for data; as much again for the proof."""
 SEARCHING, LONGEST, ELSE = 0.5, 0.75, 0.1
 """Share of the time in which a model is looked for, at least and at most, and what export and report take."""
+KNOWN = """\
+# A model that jumps at events (a velocity that flips, a state that is reset) is no smooth map, and a search finds these.
+# Where you know what happens, write it, and it is fitted in place of the search (docs/how/events.md):
+# fits:
+#   - name: known
+#     structure:
+#       kind: GreyBox
+#       equations: |
+#         y = where(event, reset, next)
+#         before[k+1] = y
+"""
+"""What stands below a proposal."""
 PROOF = 1000
 """New experiments of the proof where there is time for them."""
 FEWEST, ENOUGH, MOST = 8, 12, 60
@@ -84,7 +96,7 @@ def _text(
     }  # fmt: skip
     check(ExperimentConfig, content, where=fmu)
     told = "".join(f"# {one}\n" for one in notes)
-    return f"# Proposed for {fmu.name}. An FMU is code, and is run.\n{told}{yaml_text(content)}"
+    return f"# Proposed for {fmu.name}. An FMU is code, and is run.\n{told}{yaml_text(content)}{KNOWN}"
 
 
 def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, workers: int) -> Counts:
