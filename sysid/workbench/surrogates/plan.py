@@ -22,7 +22,7 @@ RUNNING = 0.2
 SEARCHING, LONGEST, ELSE = 0.5, 0.75, 0.1
 """Share of the time in which a model is looked for, at least and at most, and what export and report take."""
 KNOWN = """\
-# A model that jumps at events (a velocity that flips, a state that is reset) is no smooth map, and a search finds these.
+# A search finds smooth maps, and a model that jumps at events (a velocity that flips, a state that is reset) is none.
 # Where you know what happens, write it, and it is fitted in place of the search (docs/how/events.md):
 # fits:
 #   - name: known
