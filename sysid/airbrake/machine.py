@@ -174,7 +174,8 @@ def _per_sample(values: NDArray[np.float64] | float, count: int, name: str) -> N
             expected=f"one number, or {count} of them, none negative",
             got=f"shape {array.shape}",
         )
-    return np.ascontiguousarray(np.broadcast_to(array, (count,)))
+    # A copy: what cannot be written is another type of argument, for which the kernel would be compiled once more.
+    return np.array(np.broadcast_to(array, (count,)), order="C")
 
 
 class BrakedTrain:

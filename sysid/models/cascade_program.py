@@ -87,9 +87,10 @@ def program_of(
         output_offset=np.concatenate([some[len(end.inputs) :] for some, end in zip(offsets, ends, strict=True)]),
         output_scale=np.concatenate([some[len(end.inputs) :] for some, end in zip(scales, ends, strict=True)]),
         bounds=np.array(
-            [[member.low, member.high] for member, end in zip(members, ends, strict=True) for _ in _range(end)]
+            [[member.low, member.high] for member, end in zip(members, ends, strict=True) for _ in _range(end)],
+            dtype=np.float64,
         ),
-        limits=np.array([values for values, _ in held]),
+        limits=np.array([values for values, _ in held], dtype=np.float64),
         limit_channel=np.array([indices for _, indices in held], dtype=np.int64),
     )
 

@@ -75,11 +75,16 @@ def _sheets(path: Path, engine: str) -> list[Sheet]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about styles and such, which are nothing to us
-            sheets = _modern(path) if engine == "openpyxl" else _old(path)
+            sheets = _modern(path) if engine == "openpyxl" else _counted(path, _old(path))
     except ReaderError:
         raise
     except Exception as error:  # xlrd and openpyxl raise classes of their own and any others on damaged files
         raise (_locked(path) if _is_locked(path) else damaged(path, "Excel", error)) from error
+    return sheets
+
+
+def _counted(path: Path, sheets: list[Sheet]) -> list[Sheet]:
+    """The sheets of a workbook, none of which has so many cells that only to look into each takes a minute."""
     for sheet in sheets:
         cells = len(sheet.rows) * max((len(row) for row in sheet.rows), default=0)
         if cells > _MOST_CELLS:
@@ -104,7 +109,7 @@ def _locked(path: Path) -> ReaderError:
 
 def _modern(path: Path) -> list[Sheet]:
     check_zip(path)
-    sheets = _cells(path, values=True)
+    sheets = _counted(path, _cells(path, values=True))
     if any(_has_bare_header(sheet.rows) for sheet in sheets):
         # A program that writes formulas and does not compute them leaves their cells without values.
         for sheet, formulas in zip(sheets, _cells(path, values=False), strict=True):
