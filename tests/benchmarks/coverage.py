@@ -154,6 +154,8 @@ PLANT, PAIR = [1.0, 0.5, -1.5, 0.7], [1.0, 0.5, 0.4, -1.5, 0.7, -0.9]
 STATES = [*PLANT, -0.6, 0.3]
 WITH_INPUT, OUTPUT_ERROR = ARMAX(na=2, nb=2, nc=0, nk=1), OE(nb=2, nf=2, nk=1)
 MISO = OE(nb=(2, 1), nf=(2, 1), nk=(1, 3))
+COLOURED, TOLD = BJ(nb=2, nc=1, nd=1, nf=2, nk=1), [*PLANT, 0.5, -0.9]
+PAIR_OF_BJ = BJ(nb=(2, 1), nc=1, nd=1, nf=(2, 1), nk=(1, 3))
 STRUCTURES: dict[str, Known] = {
     "ARX": _polynomial(ARX(na=2, nb=2, nk=1), WITH_INPUT, PLANT, told=[1.0, 0.5, 1.5, -0.7]),
     "IV4": replace(
@@ -166,6 +168,16 @@ STRUCTURES: dict[str, Known] = {
         truth=CONTINUOUS,
     ),
     "OE": _polynomial(OUTPUT_ERROR, OUTPUT_ERROR, PLANT),
+    "OE of coloured noise": _polynomial(OUTPUT_ERROR, COLOURED, TOLD, told=PLANT),
+    "TF discrete of coloured noise": _polynomial(
+        TransferFunction(poles=2, zeros=1, delays=1), COLOURED, TOLD, told=PLANT
+    ),
+    "SS without noise model of coloured noise": _polynomial(
+        LinearStateSpace(states=2, noise=False), COLOURED, TOLD, told=PLANT
+    ),
+    "BJ of two inputs": _polynomial(PAIR_OF_BJ, PAIR_OF_BJ, [*PAIR, 0.5, -0.9]),
+    "BJ with dead time 6": _polynomial(replace(COLOURED, nk=6), replace(COLOURED, nk=6), TOLD),
+    "OE with dead time 6": _polynomial(replace(OUTPUT_ERROR, nk=6), replace(OUTPUT_ERROR, nk=6), PLANT),
     "OE of two inputs": _polynomial(MISO, MISO, PAIR),
     "SS": _polynomial(LinearStateSpace(states=2), ARMAX(na=2, nb=2, nc=2, nk=1), STATES),
     "SS with dead time 6": _polynomial(LinearStateSpace(states=2, nk=6), ARMAX(na=2, nb=2, nc=2, nk=6), STATES),

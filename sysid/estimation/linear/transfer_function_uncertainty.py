@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.linear.coloured_errors import colour, information, sandwich
+from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.variable_projection import SeparableProvider, Separated
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import TransferFunctionModel
@@ -18,7 +20,7 @@ from sysid.models.orthonormal_basis import Domain
 def transfer_function_uncertainty(
     model: TransferFunctionModel, provider: SeparableProvider, solution: Separated
 ) -> Uncertainty:
-    """What white simulation errors say about numerators, denominators and the constant, in the channels' units.
+    """What simulation errors say about numerators, denominators and the constant, in the channels' units.
 
     Args:
         model: The fitted model.
@@ -49,6 +51,9 @@ def _uncertainty(model: TransferFunctionModel, provider: SeparableProvider, solu
     sizes = np.concatenate([sizes, np.zeros(J.shape[1] - len(sizes))])
     kept = sizes > 1e-13 * float(sizes[0])
     root = (Vt[kept].T / sizes[kept]) / scale[:, np.newaxis]
+    hang = _coloured(provider, solution.residual, J @ root)
+    if hang is not None:
+        root = root @ sandwich(np.eye(len(hang)), hang)
     names, values, rows = _polynomials(model, J.shape[1])
     spread = rows @ root
     unit = model.scaling.output_scale**2
@@ -57,6 +62,20 @@ def _uncertainty(model: TransferFunctionModel, provider: SeparableProvider, solu
     unknown = lost > 1e-6 * np.linalg.norm(rows / scale, axis=1)
     covariance[unknown] = covariance[:, unknown] = np.nan
     return Uncertainty(names=names, values=values, covariance=covariance, noise_variance=variance * unit)
+
+
+def _coloured(
+    provider: SeparableProvider, residual: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """``J' R J`` over the errors' variance in some directions; ``None`` where they are white, or of spectra."""
+    records = provider.records
+    if not all(isinstance(record, TimeRecord) for record in records) or not np.isfinite(directions).all():
+        return None
+    ends = np.cumsum([len(record.root_weights) for record in records])[:-1]
+    a = colour(np.split(residual, ends), [record.root_weights > 0.0 for record in records])
+    if len(a) == 1:
+        return None
+    return np.asarray(np.sum([information([part], a) for part in np.split(directions, ends)], axis=0))
 
 
 def _polynomials(

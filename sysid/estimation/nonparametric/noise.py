@@ -77,11 +77,26 @@ def persistence(residuals: Sequence[NDArray[np.float64]]) -> float:
     rows = sum(map(len, residuals))
     finite = all(np.isfinite(e).all() for e in residuals)
     a = whitener(residuals, min(LONGEST_MEMORY, rows // 20)) if finite else np.ones(1)
+    found = 1.0 / (float(a.sum()) ** 2 * power(a))
+    return max(found, 1.0) if np.isfinite(found) else 1.0
+
+
+def power(a: NDArray[np.float64]) -> float:
+    """Variance of what an autoregression makes of white noise of variance 1.
+
+    Args:
+        a: Coefficients ``1, a1, ...``, its roots inside the unit circle.
+
+    Returns:
+        At least 1.
+
+    Example:
+        >>> round(power(np.array([1.0, -0.8])), 3)
+        2.778
+    """
     order = len(a) - 1
     if order == 0:
         return 1.0
     driven = np.zeros((order, order))
     driven[0, 0] = 1.0
-    variance = linalg.solve_discrete_lyapunov(linalg.companion(a), driven)[0, 0]
-    found = 1.0 / (float(a.sum()) ** 2 * float(variance))
-    return max(found, 1.0) if np.isfinite(found) else 1.0
+    return float(linalg.solve_discrete_lyapunov(linalg.companion(a), driven)[0, 0])

@@ -19,9 +19,11 @@ from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of
+from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.state_space.search import flat_prior
 from sysid.estimation.result import FitResult, Loop, Status
@@ -107,6 +109,7 @@ def fit_polynomial(
         at = errors.linearise(solution.theta)
         system = errors.chart.system(solution.theta)
         variance = float(errors.covariance(system)[0, 0])
+        hang = None if orders.noise else coloured(errors, solution.theta)
         told, lengths = None if orders.noise else errors.errors(system), [len(one) for one in errors.segments]
     model = PolynomialModel(
         orders=orders,
@@ -128,7 +131,7 @@ def fit_polynomial(
             "mse": unit * np.array([one.mse for one in solution.curve]),
         },
         train_time_s=time.perf_counter() - began,
-        uncertainty=_uncertainty(model, at, errors.n_samples, variance * unit),
+        uncertainty=_uncertainty(model, at, hang, errors.n_samples, variance * unit),
         notes=(*slow_poles.notes(model.pole_radius, lengths, told), slow_poles.stability(model.pole_radius)),
     )
 
@@ -145,7 +148,13 @@ def _search(
         whitening=np.eye(1),
         stable=stable and not orders.drifts,
     )
-    starts = [*_starts(pieces, orders), *_of_fewer(segments, orders, training, until)]
+    looked = _looked_at(pieces, orders)
+    longs = _longs(looked, orders)
+    starts = [*_starts(looked, orders, longs), np.zeros(orders.n_parameters)]  # the last is finite whatever the record
+    straight = _straight(errors, starts, longs[0], training, until) if orders.noise else None
+    if straight is not None:
+        return errors, straight
+    starts += [*_of_state_space(looked, orders), *_of_fewer(segments, orders, training, until)]
     starts = [theta for theta in starts if np.isfinite(theta).all()]
     if not errors.stable or training.stable is not None:
         return errors, _minimum(errors, starts, training, until)
@@ -165,9 +174,30 @@ def _search(
     return (errors, beyond) if better else (bounded, inside)
 
 
+def _straight(
+    errors: PredictionErrors, starts: Sequence[Array], long: LongARX, training: PolynomialTraining, until: float
+) -> Solution | None:
+    """From the best start to its end, if one-step errors are then as small as those of a long ARX model.
+
+    No other start can gain more than chance then. A model without noise has ends next to each other that differ by
+    chance in their errors and by much in their free runs; there the others are tried.
+    """
+    ranked = sorted((loss, at) for at, theta in enumerate(starts) if np.isfinite(loss := errors.loss(theta)))
+    if not ranked or long.yardstick is None:
+        return None
+    solution = _run(errors, starts[ranked[0][1]], _within(training, until))
+    covariance = errors.covariance(errors.chart.system(solution.theta))
+    return solution if long.yardstick.reached(covariance, len(solution.theta)) else None
+
+
+def _within(training: PolynomialTraining, until: float) -> PolynomialTraining:
+    """The same training in what is left of its time."""
+    return replace(training, max_time_s=max(until - time.perf_counter(), 0.0))
+
+
 def _minimum(errors: PredictionErrors, starts: Sequence[Array], training: PolynomialTraining, until: float) -> Solution:
     """Short runs from the best starts, and a long one from the best of their ends."""
-    training = replace(training, max_time_s=max(until - time.perf_counter(), 0.0))
+    training = _within(training, until)
     short = replace(training, max_iterations=min(SHORT, training.max_iterations))
     ranked = sorted((loss, at) for at, theta in enumerate(starts) if np.isfinite(loss := errors.loss(theta)))
     found: list[tuple[float, int, Solution]] = []
@@ -196,10 +226,8 @@ def _limits(training: PolynomialTraining) -> Termination:
     )
 
 
-def _starts(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
-    """Coefficients from long ARX models."""
-    reach = [orders.order("na"), *(nb + nk for nb, nk in zip(orders.nb, orders.nk, strict=True))]
-    least = max(*reach, *orders.denominators, 1) if len(reach) + len(orders.denominators) > 0 else 1
+def _looked_at(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Segment]:
+    """Pieces that a start is looked for in: of drifting noise their changes."""
     looked = [_differenced(piece) for piece in pieces] if orders.drifts else list(pieces)
     looked = [piece for piece in looked if len(piece) >= SHORTEST]
     if not looked:
@@ -210,16 +238,33 @@ def _starts(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Array
             remedy="fill short gaps, with repairs: {nan: interpolate}, use longer records, or fit what needs no past: "
             "a transfer function or a neural state space",
         )
-    longs = [LongARX.of(looked, least), LongARX.of(looked, least, more=2.0)]
-    if orders.order("na") or not orders.nb:
-        found = [armax_start(looked, orders, long) for long in longs]
-    else:
-        kinds = [(long, whitened) for long in longs for whitened in (False, True)]
-        found = [box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
-        same = LongARX.of_state_space(looked, orders)
-        if same is not None:
-            found.append(box_jenkins_start(looked, orders, same, whitened=False))
-    return [*found, np.zeros(orders.n_parameters)]  # the last is finite whatever the record
+    return looked
+
+
+def _longs(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[LongARX]:
+    """Long ARX models: as long as the records ask for, and twice that."""
+    reach = [orders.order("na"), *(nb + nk for nb, nk in zip(orders.nb, orders.nk, strict=True))]
+    least = max(*reach, *orders.denominators, 1) if len(reach) + len(orders.denominators) > 0 else 1
+    return [LongARX.of(looked, least), LongARX.of(looked, least, more=2.0)]
+
+
+def _starts(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequence[LongARX]) -> list[Array]:
+    """Coefficients from long ARX models."""
+    if _common(orders):
+        return [armax_start(looked, orders, long) for long in longs]
+    kinds = [(long, whitened) for long in longs for whitened in (False, True)]
+    return [box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
+
+
+def _of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
+    """Coefficients from a state space of the same order."""
+    same = None if _common(orders) else LongARX.of_state_space(looked, orders)
+    return [] if same is None else [box_jenkins_start(looked, orders, same, whitened=False)]
+
+
+def _common(orders: AbstractPolynomial) -> bool:
+    """Whether inputs and noise, or noise alone, have one denominator."""
+    return bool(orders.order("na")) or not orders.nb
 
 
 def _of_fewer(
@@ -259,7 +304,9 @@ def _differenced(piece: Segment) -> Segment:
     )
 
 
-def _uncertainty(model: PolynomialModel, at: Linearisation, n: int, noise_variance: float) -> Uncertainty:
+def _uncertainty(
+    model: PolynomialModel, at: Linearisation, hang: Array | None, n: int, noise_variance: float
+) -> Uncertainty:
     """What the prediction errors say about the coefficients, in the channels' units."""
     names, P = model.orders.names(model.mapping.inputs), len(model.theta)
     gains = model.gains
@@ -269,7 +316,8 @@ def _uncertainty(model: PolynomialModel, at: Linearisation, n: int, noise_varian
     sizes, vectors = linalg.eigh(scaled)
     covariance = np.full((P, P), np.nan)
     if sizes[0] > 1e-14 * sizes[-1]:
-        half = gains[:, np.newaxis] * (vectors / np.sqrt(sizes)) / root[:, np.newaxis]
+        half = (vectors / np.sqrt(sizes)) / root[:, np.newaxis]
+        half = gains[:, np.newaxis] * (half if hang is None else sandwich(half, hang))
         covariance = 2.0 * at.loss / max(n - P, 1) * (half @ half.T)
     return Uncertainty(names=names, values=values, covariance=covariance, noise_variance=noise_variance)
 

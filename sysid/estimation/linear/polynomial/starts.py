@@ -25,6 +25,7 @@ from sysid.estimation.linear.segments import Segment, delayed_inputs
 from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
 from sysid.estimation.linear.subspace.projections import arx_orders, regress
 from sysid.estimation.linear.subspace.windows import Windows
+from sysid.estimation.linear.subspace.yardstick import Yardstick
 from sysid.models import LinearStateSpace
 from sysid.models.polynomial import AbstractPolynomial
 
@@ -45,11 +46,13 @@ class LongARX:
         A: Of the output, from 1 on, shape ``(order + 1,)``.
         B: Of each input, from lag 0 on.
         constant: On the right side.
+        yardstick: What it leaves unexplained; ``None`` where it was not fitted to that.
     """
 
     A: Array
     B: tuple[Array, ...]
     constant: float
+    yardstick: Yardstick | None = None
 
     @classmethod
     def of(cls, pieces: Sequence[Segment], least: int, *, more: float = 1.0) -> LongARX:
@@ -75,7 +78,7 @@ class LongARX:
         now = theta[1 + order * (m + 1) :]
         A = np.concatenate([[1.0], -lagged[:, m]])
         B = tuple(np.concatenate([[now[j]], lagged[:, j]]) for j in range(m))
-        return cls(A=A, B=B, constant=float(theta[0]))
+        return cls(A=A, B=B, constant=float(theta[0]), yardstick=Yardstick.of(windows, order, feedthrough=True))
 
     @classmethod
     def of_state_space(cls, pieces: Sequence[Segment], orders: AbstractPolynomial) -> LongARX | None:

@@ -10,7 +10,7 @@ likelihood once the covariance has settled.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -82,7 +82,7 @@ class PredictionErrors(AbstractProvider):
         total = 0.0
         with np.errstate(all="ignore"):
             for segment, run in zip(self.segments, self._runs(theta, system), strict=True):
-                total += 0.5 * float(np.sum(self._weighted(run.residual, segment) ** 2))
+                total += 0.5 * float(np.sum(self.weighted(run.residual, segment) ** 2))
         return total if np.isfinite(total) else np.inf
 
     def _runs(self, theta: Array, system: Innovations) -> tuple[Run, ...]:
@@ -105,17 +105,12 @@ class PredictionErrors(AbstractProvider):
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
         system, P = self.chart.system(theta), self.chart.n_parameters
         loss, g, H = 0.0, np.zeros(P), np.zeros((P, P))
-        reach = _Reach.of(self.chart.directions(theta), system)
+        width = system.n_outputs
         with np.errstate(all="ignore"):
-            for segment, run in zip(self.segments, self._runs(theta, system), strict=True):
-                weighted, seen = self._weighted(run.residual, segment), np.zeros((run.span.shape[1], P))
-                z, width = np.zeros((system.n_outputs, reach.n_sources, system.n_state)), system.n_outputs
-                for first in range(0, len(segment), ROWS):
-                    rows = slice(first, min(first + ROWS, len(segment)))
-                    J = reach.jacobian(segment, run, rows, z)
-                    J = np.einsum("ij,tjk->tik", self.whitening, J) if width > 1 else J * self.whitening[0, 0]
-                    J *= segment.root_weights[rows, np.newaxis, np.newaxis]
-                    J = J.reshape(-1, P)
+            for segment, run, blocks in self.jacobians(theta):
+                weighted, seen = self.weighted(run.residual, segment), np.zeros((run.span.shape[1], P))
+                for rows, block in blocks:
+                    J = block.reshape(-1, P)
                     r = weighted[rows].ravel()
                     loss += 0.5 * float(r @ r)
                     g += J.T @ r
@@ -129,6 +124,30 @@ class PredictionErrors(AbstractProvider):
         floor = max(float(diagonal.max(initial=0.0)), np.finfo(np.float64).tiny) * 1e-24
         H[np.diag_indices_from(H)] = np.maximum(diagonal, floor)
         return Linearisation(loss=loss, gradient=g, gauss_newton=H)
+
+    def jacobians(self, theta: Array) -> Iterator[tuple[Segment, Run, Iterator[tuple[slice, Array]]]]:
+        """Derivatives of the weighted errors, record by record and block by block, from initial states that stay.
+
+        Args:
+            theta: The vector.
+
+        Yields:
+            A record, its prediction, and some samples with their derivatives, shape ``(n_rows, n_outputs,
+            n_parameters)``.
+        """
+        system = self.chart.system(theta)
+        reach = _Reach.of(self.chart.directions(theta), system)
+        for segment, run in zip(self.segments, self._runs(theta, system), strict=True):
+            yield segment, run, self._blocks(segment, run, reach)
+
+    def _blocks(self, segment: Segment, run: Run, reach: _Reach) -> Iterator[tuple[slice, Array]]:
+        system, width = reach.system, reach.system.n_outputs
+        z = np.zeros((width, reach.n_sources, system.n_state))
+        for first in range(0, len(segment), ROWS):
+            rows = slice(first, min(first + ROWS, len(segment)))
+            J = reach.jacobian(segment, run, rows, z)
+            J = np.einsum("ij,tjk->tik", self.whitening, J) if width > 1 else J * self.whitening[0, 0]
+            yield rows, J * segment.root_weights[rows, np.newaxis, np.newaxis]
 
     def run(self, system: Innovations, segment: Segment) -> Run:
         """The prediction over a record, from the initial state that fits it best or that was declared."""
@@ -147,7 +166,7 @@ class PredictionErrors(AbstractProvider):
                 U, sizes, Vt = linalg.svd(columns / scale, full_matrices=False)
                 kept = sizes > 1e-11 * max(float(sizes[0]), 1e-300)
                 span = U[:, kept]
-                seen = span.T @ self._weighted(residual, segment)[:n].ravel()
+                seen = span.T @ self.weighted(residual, segment)[:n].ravel()
                 start = -((Vt[kept].T / sizes[kept]) @ seen) / scale
                 # What the state before the record changes is added where it lasts: as exact as another run.
                 residual[:n] += np.einsum("otk,k->to", free, start)
@@ -170,7 +189,8 @@ class PredictionErrors(AbstractProvider):
             found.append(np.where(segment.root_weights[:, np.newaxis] > 0.0, residual, 0.0))
         return found
 
-    def _weighted(self, residual: Array, segment: Segment) -> Array:
+    def weighted(self, residual: Array, segment: Segment) -> Array:
+        """Errors of a record as they count: each of size 1, and independent of the others of its sample."""
         return np.asarray((residual @ self.whitening.T) * segment.root_weights[:, np.newaxis])
 
 

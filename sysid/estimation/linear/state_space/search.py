@@ -23,12 +23,14 @@ from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.segments import Segment
+from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.free_runs import free_run_error
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import ENOUGH, Subspace
 from sysid.estimation.linear.subspace.system import EDGE, stabilised
+from sysid.estimation.linear.subspace.yardstick import clearly_worse
 from sysid.estimation.result import Status
 from sysid.models import LinearStateSpace
 from sysid.models.innovations import Innovations
@@ -46,6 +48,9 @@ POLES, LITTLE, CLEARLY = (0.0, 0.5, 0.9, 0.97, -0.5), 0.1, 1e-6
 """Poles that a further state may begin with, how strongly it is driven and read, and a gain that is one."""
 QUICK = 4
 """Steps after which dead times are compared, from one subspace estimate: that which feedback does not bias."""
+FINE, COARSE, CHART = 1e-9, 1e-4, 1e3
+"""Share of the loss that a step has to gain: of a fit, and where it is asked whether a state less would do; how many
+times that a chart has to gain for another to be laid."""
 CHARTS = 6
 """Charts that are laid at most."""
 
@@ -114,6 +119,7 @@ class Found:
         weighting: The subspace method that it began with.
         singular_values: Canonical correlations of past and future.
         notes: What a reader should know of slow poles.
+        coloured: What its errors say of the parameters where they hang together; ``None`` where they are white.
     """
 
     system: Innovations
@@ -126,6 +132,7 @@ class Found:
     weighting: Weighting
     singular_values: Array
     notes: tuple[str, ...] = ()
+    coloured: Array | None = None
 
 
 def search(segments: Sequence[Segment], orders: LinearStateSpace, training: StateSpaceTraining) -> Found:
@@ -168,6 +175,8 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
             if slow_poles.unseen(found.system.radius, problem.lengths):
                 found = _better(found, found_in(problem), problem)
         errors = None if orders.noise else problem.around_errors(found.system)
+        if iterations:
+            found = problem.with_colour(found)
     told = slow_poles.notes(found.system.radius, problem.lengths, errors)
     return replace(found, singular_values=subspace.singular_values(), notes=told)
 
@@ -209,7 +218,8 @@ def around(system: Innovations, segments: Sequence[Segment], orders: LinearState
         What :func:`search` found, but for how it went.
     """
     with threadpool_limits(1, "blas"):
-        return _Problem(segments=_whole(segments, orders), orders=orders, stable=False).at(system)
+        problem = _Problem(segments=_whole(segments, orders), orders=orders, stable=False)
+        return problem.with_colour(problem.at(system))
 
 
 def _whole(segments: Sequence[Segment], orders: LinearStateSpace) -> tuple[Segment, ...]:
@@ -261,6 +271,9 @@ class _Problem:
     def best(self, subspace: Subspace, weighting: str, iterations: int, until: float) -> Found:
         """From the subspace estimate; and from one state less where that, with another state, is better already.
 
+        Where errors are as small as those of a long ARX model, and a state less is clearly worse, nothing is left to
+        look for.
+
         Args:
             subspace: The decomposition that estimates of all orders are taken from.
             weighting: Of the estimate.
@@ -276,6 +289,8 @@ class _Problem:
             return found
         fewer = replace(self, orders=replace(self.orders, states=self.orders.states - 1))
         try:
+            if fewer.hopeless(found, subspace, weighting, iterations, until):
+                return found
             lower = fewer.best(subspace, weighting, iterations, until)
         except FitDivergedError:
             return found
@@ -285,6 +300,19 @@ class _Problem:
         other = self.refined(wider[1], iterations, until - time.perf_counter())
         better = _size(other.covariance) < _size(found.covariance)
         return replace(other, weighting=lower.weighting) if better else found
+
+    def hopeless(self, found: Found, subspace: Subspace, weighting: str, iterations: int, until: float) -> bool:
+        """Whether these fewer states need not be looked into: what was found with more leaves next to nothing."""
+        if not subspace.yardstick.reached(found.covariance, found.chart.n_parameters):
+            return False
+        start, seconds = self.start(subspace, weighting)[0], until - time.perf_counter()
+        lower = self.refined(start, iterations, seconds, tolerance=COARSE)
+        return clearly_worse(
+            _size(lower.covariance),
+            _size(found.covariance),
+            n_rows=sum(self.lengths),
+            n_parameters=found.chart.n_parameters - lower.chart.n_parameters,
+        )
 
     def _widened(self, system: Innovations) -> tuple[float, Innovations] | None:
         """A system with one more state, of the pole that helps most; and its loss."""
@@ -353,7 +381,7 @@ class _Problem:
         """The part in which its predictions are linear."""
         return Chart.linear(system, feedthrough=self.orders.feedthrough, intercept=self.orders.intercept)
 
-    def refined(self, system: Innovations, iterations: int, seconds: float) -> Found:
+    def refined(self, system: Innovations, iterations: int, seconds: float, *, tolerance: float = FINE) -> Found:
         """The system with the least prediction error nearby."""
         began, status = time.perf_counter(), Status.EXACT if iterations == 0 else Status.MAX_ITERATIONS
         curve: list[Iteration] = []
@@ -367,7 +395,7 @@ class _Problem:
             if left <= 0:
                 break
             spent = time.perf_counter() - began
-            limits = Termination(max_iterations=left, max_time_s=seconds - spent, tolerance=1e-9, patience=2)
+            limits = Termination(max_iterations=left, max_time_s=seconds - spent, tolerance=tolerance, patience=2)
             engine = LevenbergMarquardt(termination=limits, evidence_after=None)
             solution = engine.minimise(errors, zero, flat_prior(len(zero)))
             before = curve[-1].iteration if curve else 0
@@ -375,7 +403,7 @@ class _Problem:
             curve += [replace(one, iteration=one.iteration + before, elapsed_s=one.elapsed_s + spent) for one in steps]
             system, status = errors.chart.system(solution.theta), solution.status
             gained = solution.curve[0].mse - solution.curve[-1].mse
-            if status in {Status.TIME_LIMIT, Status.INTERRUPTED} or gained <= 1e-6 * solution.curve[0].mse:
+            if status in {Status.TIME_LIMIT, Status.INTERRUPTED} or gained <= CHART * tolerance * solution.curve[0].mse:
                 break
             whitening = self._whitening(system)
         if status in {Status.NOT_IMPROVED, Status.STALLED} and curve:
@@ -398,6 +426,13 @@ class _Problem:
             system=system, chart=chart, n_samples=errors.n_samples, at=at, status=Status.EXACT, curve=curve,
             covariance=errors.covariance(system), weighting=Weighting.CVA, singular_values=np.zeros(0),
         )  # fmt: skip
+
+    def with_colour(self, found: Found) -> Found:
+        """What was found, with what its errors say of the parameters where nothing models their colour."""
+        if self.orders.noise:
+            return found
+        errors = self.errors(found.chart, self._whitening(found.system))
+        return replace(found, coloured=coloured(errors, np.zeros(found.chart.n_parameters)))
 
     def _whitening(self, system: Innovations) -> Array:
         """What makes the errors of one sample independent and of size 1."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.state_space.search import Found
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import LinearStateSpaceModel, VectorStateSpaceModel
@@ -39,6 +40,8 @@ def coordinates_covariance(found: Found) -> Array:
 def coordinates_root(found: Found) -> Array:
     """A factor of that covariance, over the directions that the data determine.
 
+    Where errors hang together it is that of the sandwich, see :mod:`sysid.estimation.linear.coloured_errors`.
+
     Args:
         found: The fit.
 
@@ -49,7 +52,8 @@ def coordinates_root(found: Found) -> Array:
     root, scaled = found.at.scaled()
     sizes, vectors = linalg.eigh(scaled)
     kept = sizes > LEFT_OPEN * sizes[-1]
-    return np.asarray(deviation * vectors[:, kept] / np.sqrt(sizes[kept]) / root[:, np.newaxis])
+    half = vectors[:, kept] / np.sqrt(sizes[kept]) / root[:, np.newaxis]
+    return np.asarray(deviation * (half if found.coloured is None else sandwich(half, found.coloured)))
 
 
 def derivatives(found: Found, function: Callable[[Innovations], NDArray[np.complex128]]) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.subspace.projections import Weighting, arx_orders, project
 from sysid.estimation.linear.subspace.system import realise
 from sysid.estimation.linear.subspace.windows import Windows
+from sysid.estimation.linear.subspace.yardstick import Yardstick
 from sysid.models.innovations import Innovations
 
 Array = NDArray[np.float64]
@@ -67,6 +69,11 @@ class Subspace:
             past = future = horizon
         windows = Windows.of(segments, past, future)
         return cls(windows=windows, feedthrough=feedthrough, noise=noise)
+
+    @cached_property
+    def yardstick(self) -> Yardstick:
+        """What the ARX model over the past leaves unexplained."""
+        return Yardstick.of(self.windows, self.windows.past, feedthrough=self.feedthrough)
 
     def singular_values(self) -> Array:
         """Canonical correlations of past and future, descending: those that stand out count the states."""
