@@ -18,6 +18,7 @@ from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLoss
 from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
 from sysid.extras import need
 from sysid.models import ARX, Mapping, Start, StartLike
+from sysid.reporting.numbers import pole
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.metrics import percent
 from sysid.validation.order_finalists import Finalist, run_finalists
@@ -137,7 +138,7 @@ class OrderSearch:
 
         Returns:
             Columns ``structure``, ``parameters``, ``one_step_mse``, ``AIC``, ``AICc``, ``BIC``, ``fit`` (mean over the
-            cases that chose, percent) and ``stable``.
+            cases that chose, percent), ``largest_pole`` (magnitude) and ``stable``.
         """
         need("pandas", "a frame")
         import pandas as pd
@@ -150,7 +151,8 @@ class OrderSearch:
                 "one_step_mse": one.one_step_mse,
                 **{criterion.value: self.score(one, criterion) for criterion in criteria},
                 "fit": one.mean_fit,
-                "stable": bool(np.isfinite(one.mean_fit)),
+                "largest_pole": one.pole_radius,
+                "stable": bool(np.isfinite(one.mean_fit)) and not one.pole_radius >= 1.0,
             }
             for one in self.contenders
         ]
@@ -177,9 +179,11 @@ class OrderSearch:
 
     def __str__(self) -> str:
         head = f"{'structure':<24}{'parameters':>11}{'one-step mse':>14}{'BIC':>12}{'free run, fit %':>17}"
+        head += f"{'largest pole':>14}"
         lines = [
             f"{one.fit.model.structure.label:<24}{one.fit.model.n_parameters:>11}{one.one_step_mse:>14.4g}"
             f"{self.score(one, Criterion.BIC):>12.1f}{percent(one.mean_fit):>17}"
+            f"{pole(one.pole_radius):>14}"
             for one in self.contenders[: 10 if self.others is None else None]
         ]
         return "\n".join([f"{len(self.losses):,} structures; {self.chosen_by}", head, *lines, *self.notes])

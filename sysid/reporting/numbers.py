@@ -81,6 +81,25 @@ def seconds(value: float) -> str:
     return quantity(value / 3600, "h")
 
 
+def pole(radius: float) -> str:
+    """The magnitude of a largest pole, with as many digits as show on which side of 1 it lies.
+
+    Args:
+        radius: The magnitude; NaN for a model that is not linear.
+
+    Returns:
+        It, and a word where it is not stable.
+
+    Example:
+        >>> pole(0.9512), pole(0.99996), pole(1.02), pole(float("nan"))
+        ('0.951', '0.99996', '1.02, unstable', '')
+    """
+    if math.isnan(radius):
+        return ""
+    digits = 3 if abs(radius - 1.0) > 5e-4 else 5
+    return f"{radius:.{digits}g}" if radius < 1.0 else f"{radius:.{digits}g}, unstable"
+
+
 def times(value: float) -> str:
     r"""A ratio.
 

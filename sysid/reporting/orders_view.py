@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sysid.reporting.figures.order_figure import OrderCurve, order_figure, states_figure
+from sysid.reporting.numbers import pole
 from sysid.reporting.parts import Part, Section, picture
 from sysid.reporting.results import OrdersRecord, Results
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
@@ -61,6 +62,7 @@ def _table(found: OrdersRecord) -> Table:
             figure_cell(row.aicc, digits=6),
             figure_cell(row.bic, digits=6),
             figure_cell(row.free_run_fit, digits=4, missing=DIVERGED),
+            Cell(text=pole(row.pole_radius), value=row.pole_radius, mark="number"),
         )
         for row in found.rows
     )
@@ -73,6 +75,7 @@ def _table(found: OrdersRecord) -> Table:
             ("AICc", ""),
             ("BIC", ""),
             ("free run, fit", "%"),
+            ("largest pole", ""),
         ),
         rows=rows,
     )

@@ -270,6 +270,7 @@ class OrderRow(Record):
     aicc: Number = Field(description="AICc; smaller is better.")
     bic: Number = Field(description="BIC; smaller is better.")
     free_run_fit: Number = Field(description="Mean fit of the free run in percent; null where it diverges.")
+    pole_radius: Number = Field(default=math.nan, description="Largest pole's magnitude: stable below 1.")
 
 
 class OrderCurveRecord(Record):

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from pydantic import Field
 
+from sysid.estimation.linear.order_search import Criterion, weighed
 from sysid.reporting.records import Number, Record, parse_record, read_document, write_record
 from sysid.units import squared
 
@@ -28,6 +30,7 @@ class TrialCase(Record):
     free_run_mse: Number = Field(description="In the output's unit squared.")
     one_step_mse: Number = Field(description="In the output's unit squared.")
     run_time_s: Number = Field(description="Seconds of the free run: least of the repeats.")
+    n_samples: int = Field(default=0, description="Measured values that errors count on.")
 
 
 class Trial(Record):
@@ -48,6 +51,7 @@ class Trial(Record):
     parameters: int = Field(default=0, description="Fitted parameters.")
     operations: int = Field(default=0, description="Multiplications of one step.")
     log_evidence: Number = Field(default=math.nan, description="Null where none was computed.")
+    pole_radius: Number = Field(default=math.nan, description="Largest pole's magnitude; null if it is not linear.")
     selection_free_run_mse: Number = Field(
         default=math.nan, description="Mean over the selection traces, unit squared."
     )
@@ -74,6 +78,23 @@ class Trial(Record):
         cases = [case for case in self.cases.values() if on != "estimation" or case.role == "estimation"]
         return sum(float(getattr(case, figure)) for case in cases) / len(cases) if cases else math.nan
 
+    def criterion(self, one: Criterion) -> float:
+        """An information criterion, from the one-step error over the estimation traces as ``sysid orders`` has it.
+
+        Args:
+            one: Which.
+
+        Returns:
+            It; of a model without noise from its free run, which is the same there. NaN where nothing was counted.
+        """
+        cases = [case for case in self.cases.values() if case.role == "estimation"]
+        n = sum(case.n_samples for case in cases)
+        if not n:
+            return math.nan
+        errors = [c.free_run_mse if math.isnan(c.one_step_mse) else c.one_step_mse for c in cases]
+        mse = sum(case.n_samples * error for case, error in zip(cases, errors, strict=True)) / n
+        return float(weighed(np.array([mse]), np.array([self.parameters]), n, one)[0])
+
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
@@ -99,6 +120,8 @@ FIGURES: Final[dict[str, Figure]] = {
     "operations": Figure(words="multiplications a step", unit="", of=lambda trial, _: float(trial.operations)),
     "parameters": Figure(words="parameters", unit="", of=lambda trial, _: float(trial.parameters)),
     "evidence": Figure(words="minus log evidence", unit="", of=lambda trial, _: -trial.log_evidence),
+    "AICc": Figure(words="AICc", unit="", of=lambda trial, _: trial.criterion(Criterion.AICC)),
+    "BIC": Figure(words="BIC", unit="", of=lambda trial, _: trial.criterion(Criterion.BIC)),
     # "Best of both", error times run time: in free run, and one step ahead as in Lopes 2021, section 4.5.
     "BB": Figure(
         words="BB: free-run mse × run time",

@@ -38,6 +38,12 @@ class Finalist:
         return mean_fit(case.nrmse_fit for case in self.cases.values())
 
     @property
+    def pole_radius(self) -> float:
+        """Magnitude of its largest pole from sample to sample: stable below 1; NaN where there is none to tell."""
+        radius = self.fit.model.pole_radius
+        return float("nan") if radius is None else float(radius)
+
+    @property
     def std_fit(self) -> float:
         """Standard deviation of the NRMSE fit over the same cases in percent; NaN where a free run is not finite."""
         fits = np.array([case.nrmse_fit for case in self.cases.values() if not np.isnan(case.nrmse_fit)])

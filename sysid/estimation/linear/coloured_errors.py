@@ -65,18 +65,23 @@ def information(blocks: Iterable[Array], a: Array) -> Array:
     return np.asarray(total / power(a))
 
 
-def sandwich(half: Array, coloured: Array) -> Array:
+def sandwich(half: Array, coloured: Array, n_samples: int) -> Array:
     """A factor of the covariance where errors hang together.
 
     Args:
         half: A factor of the inverse of ``J' J``, shape ``(n_parameters, n_directions)``.
         coloured: ``J' R J`` over the errors' variance.
+        n_samples: Errors that count. As many parameters take more away of slow errors than one each: the trace of the
+            sandwich over that of white errors.
 
     Returns:
-        The factor, over the same directions; times the errors' deviation it is that of the covariance.
+        The factor, over the same directions; times the errors' deviation, as if they were white, it is that of the
+        covariance.
     """
     sizes, vectors = linalg.eigh(half.T @ coloured @ half)
-    return np.asarray(half @ (vectors * np.sqrt(np.maximum(sizes, 0.0))))
+    taken = min(float(sizes.sum()), 0.5 * n_samples)
+    lost = max(n_samples - half.shape[1], 1) / max(n_samples - taken, 1.0)
+    return np.asarray(half @ (vectors * np.sqrt(lost * np.maximum(sizes, 0.0))))
 
 
 def _tail(a: Array) -> int:

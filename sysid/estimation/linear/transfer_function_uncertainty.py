@@ -53,7 +53,7 @@ def _uncertainty(model: TransferFunctionModel, provider: SeparableProvider, solu
     root = (Vt[kept].T / sizes[kept]) / scale[:, np.newaxis]
     hang = _coloured(provider, solution.residual, J @ root)
     if hang is not None:
-        root = root @ sandwich(np.eye(len(hang)), hang)
+        root = root @ sandwich(np.eye(len(hang)), hang, provider.n_samples)
     names, values, rows = _polynomials(model, J.shape[1])
     spread = rows @ root
     unit = model.scaling.output_scale**2

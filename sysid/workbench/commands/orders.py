@@ -17,7 +17,7 @@ from sysid.models import AbstractStructure
 from sysid.names import slug
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import as_file, svg
-from sysid.reporting.numbers import number
+from sysid.reporting.numbers import number, pole
 from sysid.units import squared
 from sysid.validation.metrics import percent
 from sysid.validation.structure_search import KINDS, MOST
@@ -75,7 +75,14 @@ def _table(found: OrderSearch) -> Table:
     title = f"{len(found.losses):,} ARX structures of {found.mapping}, {found.chosen_by}"
     table = Table(title=title, title_justify="left")
     table.add_column("structure")
-    for head in ("parameters", f"one-step mse [{squared(found.unit)}]", "AICc", "BIC", "free run, fit %"):
+    for head in (
+        "parameters",
+        f"one-step mse [{squared(found.unit)}]",
+        "AICc",
+        "BIC",
+        "free run, fit %",
+        "largest pole",
+    ):
         table.add_column(head, justify="right")
     for one in found.contenders[: ROWS if found.others is None else None]:
         aicc, bic = (found.score(one, criterion) for criterion in (Criterion.AICC, Criterion.BIC))
@@ -86,5 +93,6 @@ def _table(found: OrderSearch) -> Table:
             f"{aicc:.1f}",
             f"{bic:.1f}",
             "diverges" if one.mean_fit == -math.inf else percent(one.mean_fit),
+            pole(one.pole_radius),
         )
     return table

@@ -115,6 +115,7 @@ def _record(found: OrderSearch, criterion: str | None) -> dict[str, Any]:
                 "aicc": found.score(one, Criterion.AICC),
                 "bic": found.score(one, Criterion.BIC),
                 "free_run_fit": one.mean_fit if math.isfinite(one.mean_fit) else None,
+                "pole_radius": one.pole_radius if math.isfinite(one.pole_radius) else None,
             }
             for one in found.contenders[: ROWS if found.others is None else None]
         ],

@@ -139,6 +139,7 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
                 "iterations": sum(_iterations(fit) for fit in fits),
                 "parameters": sum(fit.model.n_parameters for fit in fits),
                 "operations": sum(operations(fit.model) for fit in fits),
+                "pole_radius": max((r for fit in fits if (r := fit.model.pole_radius) is not None), default=None),
                 "log_evidence": sum(evidences) if len(evidences) == len(fits) else None,
                 **first,
                 "further": further,
@@ -308,7 +309,7 @@ def _case(
 ) -> dict[str, float]:
     """Means over the outputs, each over the squared error that counts as one."""
     errors: dict[str, list[float]] = {"free_run_mse": [], "one_step_mse": []}
-    seconds = 0.0
+    seconds, n_samples = 0.0, 0
     for model in models:
         inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
         begun = beginning(model, inputs, target, start, trace.usable_samples, case=trace.name)
@@ -318,12 +319,13 @@ def _case(
         if model.recursion.predicts:
             runs["one_step_mse"] = model.predict(inputs, target, history)
         size = np.array([sizes[output] for output in model.mapping.outputs])
+        n_samples += int(np.count_nonzero(counted)) * len(size)
         for name, run in runs.items():
             squared = ((run - target)[counted] ** 2).reshape(-1, len(size))
             errors[name] += list(np.mean(squared, axis=0) / size)
         seconds += _seconds(lambda m=model, u=inputs, h=history: m.simulate(u, h), repeats)  # type: ignore[misc]
     figures = {name: float(np.mean(values)) for name, values in errors.items()}
-    return figures | ({"run_time_s": seconds} if repeats else {})
+    return figures | ({"run_time_s": seconds, "n_samples": n_samples} if repeats else {})
 
 
 def _seconds(run: Callable[[], object], repeats: int) -> float:

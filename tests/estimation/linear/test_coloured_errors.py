@@ -31,8 +31,21 @@ def test_sandwich_is_the_covariance_of_least_squares() -> None:
     J = np.random.default_rng(1).normal(size=(200, 3))
     R = linalg.toeplitz(autocorrelation(A, len(J)))
     inverse = np.linalg.inv(J.T @ J)
-    factor = sandwich(np.linalg.cholesky(inverse), J.T @ R @ J)
-    np.testing.assert_allclose(factor @ factor.T, inverse @ J.T @ R @ J @ inverse, rtol=1e-9)
+    factor, taken = sandwich(np.linalg.cholesky(inverse), J.T @ R @ J, len(J)), np.trace(inverse @ J.T @ R @ J)
+    asked = inverse @ J.T @ R @ J @ inverse * (len(J) - 3) / (len(J) - taken)
+    np.testing.assert_allclose(factor @ factor.T, asked, rtol=1e-9)
+
+
+def test_the_variance_of_coloured_errors_is_that_before_the_fit() -> None:
+    """What parameters take away of slow errors is put back: the mean of many records is the variance that made them."""
+    J, rng, found = np.ones((60, 1)), np.random.default_rng(6), []
+    half, slow = np.array([[60.0**-0.5]]), np.array([1.0, -0.8])
+    R = linalg.toeplitz(autocorrelation(slow, 60))
+    for _ in range(2_000):
+        v = np.linalg.cholesky(R) @ rng.normal(size=60)
+        left = v - v.mean()
+        found.append((left @ left / 59) * float(sandwich(half, J.T @ R @ J, 60)[0, 0]) ** 2)
+    assert np.mean(found) == pytest.approx(R.sum() / 60**2, rel=0.03)  # the variance of a mean
 
 
 def test_no_lag_reaches_over_samples_that_do_not_count() -> None:

@@ -317,7 +317,7 @@ def _uncertainty(
     covariance = np.full((P, P), np.nan)
     if sizes[0] > 1e-14 * sizes[-1]:
         half = (vectors / np.sqrt(sizes)) / root[:, np.newaxis]
-        half = gains[:, np.newaxis] * (half if hang is None else sandwich(half, hang))
+        half = gains[:, np.newaxis] * (half if hang is None else sandwich(half, hang, n))
         covariance = 2.0 * at.loss / max(n - P, 1) * (half @ half.T)
     return Uncertainty(names=names, values=values, covariance=covariance, noise_variance=noise_variance)
 

@@ -53,7 +53,7 @@ def coordinates_root(found: Found) -> Array:
     sizes, vectors = linalg.eigh(scaled)
     kept = sizes > LEFT_OPEN * sizes[-1]
     half = vectors[:, kept] / np.sqrt(sizes[kept]) / root[:, np.newaxis]
-    return np.asarray(deviation * (half if found.coloured is None else sandwich(half, found.coloured)))
+    return np.asarray(deviation * (half if found.coloured is None else sandwich(half, found.coloured, found.n_samples)))
 
 
 def derivatives(found: Found, function: Callable[[Innovations], NDArray[np.complex128]]) -> Array:
