@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from rich.console import Console
 
 from sysid.errors import ConfigError
+from sysid.estimation.linear.order_search import Criterion
 from sysid.reporting.results import read_results
 from sysid.reporting.sweep_record import read_sweep
 from sysid.workbench.cli import run_cli
 from sysid.workbench.runner.events import Event, StepProgress, Warned
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.run import Swept, read_sweep_file, run_sweep
+from sysid.workbench.sweep.table import table_of_trials
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
 from sysid.workbench.tracking.listener import Tracker
@@ -210,3 +215,23 @@ def test_the_states_of_a_state_space_are_swept_without_a_training(workspace: Pat
     assert [trial.label for trial in found.record.trials] == ["SS 1", "SS 2", "SS 3"]
     assert found.record.winning is not None
     assert found.results.fits[0].label == found.record.winning.label
+
+
+def test_orders_of_several_linear_structures_are_one_table_and_bic_chooses(workspace: Path) -> None:
+    """BIC, size and largest pole of ARX and state spaces; criteria are those of the search of orders."""
+    text = SWEEP.split("structure:", maxsplit=1)[0] + (
+        "structure:\n  - {kind: ARX, na: {from: 1, to: 2}, nb: 1, nk: 1}\n  - {kind: SS, states: {from: 1, to: 2}}\n"
+        "choose: {by: BIC, on: estimation}\nexport: null\n"
+    )
+    record = run(workspace, text).record
+    assert len(record.trials) == 4
+    winner = min(record.trials, key=lambda trial: trial.criterion(Criterion.BIC))
+    assert record.winner == winner.number
+    for trial in record.trials:
+        case = next(case for case in trial.cases.values() if case.role == "estimation")
+        expected = case.n_samples * np.log(case.one_step_mse) + trial.parameters * np.log(case.n_samples)
+        assert trial.criterion(Criterion.BIC) == pytest.approx(expected)
+        assert 0.0 < trial.pole_radius < 1.0
+    console = Console(width=200, file=io.StringIO())
+    console.print(table_of_trials(record))
+    assert "largest pole" in console.file.getvalue()  # type: ignore[attr-defined]
