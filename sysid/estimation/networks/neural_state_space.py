@@ -47,6 +47,10 @@ check_training = partial(check_hidden_states, "a neural state space")
 """Refuses options that do not apply to hidden states."""
 
 
+LEAST_FREE = 0.5
+"""Share of a fit's time that its starts have in any case, however long the linear model took that they begin with."""
+
+
 def fit_neural_state_space(
     traces: Sequence[Trace],
     mapping: Mapping,
@@ -212,7 +216,10 @@ def _fit(
         initial=None if records.initial is None else records.initial.model.recursion.numbers,
         on_progress=on_progress,
         checkpoints=checkpoints_of(on_progress),
-        until=starts.deadline(began, training, on_progress),
+        # A fit whose linear start took all of its time would be that start alone.
+        until=max(
+            starts.deadline(began, training, on_progress), time.perf_counter() + LEAST_FREE * training.max_time_s
+        ),
     )
     candidates = starts.run(multistart)
     candidates += reweighted(multistart, provider, choose(candidates, training.choose_by).chosen)
