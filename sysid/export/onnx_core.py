@@ -42,7 +42,16 @@ class _Made:
     last: str = ""
 
 
-def step_core(nodes: Nodes, form: WideForm, x: str, memory: str, *, moves: bool = True, laid: str = "") -> Step:
+def step_core(
+    nodes: Nodes,
+    form: WideForm,
+    x: str,
+    memory: str,
+    *,
+    moves: bool = True,
+    laid: str = "",
+    ring: tuple[str, str] | None = None,
+) -> Step:
     """Add the nodes of one step.
 
     Args:
@@ -52,11 +61,12 @@ def step_core(nodes: Nodes, form: WideForm, x: str, memory: str, *, moves: bool 
         memory: Shape ``(n_memory, batch)``.
         moves: Whether lines are moved on; else the memory that is given has the newest number of each alone.
         laid: What is laid before the first group, if it is known.
+        ring: Where in the memory the past is read and the newest numbers are written, where lines are not moved.
 
     Returns:
         The names.
     """
-    pasts = _pasts(nodes, form, memory)
+    pasts = _pasts(nodes, form, memory, ring)
     made: list[_Made] = []
     for g, group in enumerate(form.groups):
         part = nodes.within(f"{nodes.prefix}group{g}_")
@@ -75,7 +85,7 @@ def step_core(nodes: Nodes, form: WideForm, x: str, memory: str, *, moves: bool 
         make = _equations if group.computes else _group
         made.append(make(part, form, group, pieces, memory))
     raw = join(nodes, [one.raw for one in made], "raw")
-    following = _memory(nodes, form, memory, made, moves=moves)
+    following = _memory(nodes, form, memory, made, moves=moves, ring=ring)
     if raw == following and moves:  # a loop mixes up what is two of its outputs
         raw = nodes.add("Identity", [raw], "raw_rows")
     return Step(raw=raw, memory=following)
@@ -86,13 +96,21 @@ def join(nodes: Nodes, pieces: Sequence[str], name: str, axis: int = 0) -> str:
     return pieces[0] if len(pieces) == 1 else nodes.add("Concat", pieces, name, axis=axis)
 
 
-def _pasts(nodes: Nodes, form: WideForm, memory: str) -> dict[int, str]:
+def past_rows(form: WideForm) -> dict[int, list[int]]:
+    """Which rows of the memory each group reads."""
+    return {g: readings_of(form, group)[0] for g, group in enumerate(form.groups) if group.past}
+
+
+def _pasts(nodes: Nodes, form: WideForm, memory: str, ring: tuple[str, str] | None) -> dict[int, str]:
     """What each group reads of the memory: all of it in one gather, then cut."""
-    rows = {g: readings_of(form, group)[0] for g, group in enumerate(form.groups) if group.past}
+    rows = past_rows(form)
     whole = [row for own in rows.values() for row in own]
     if not whole:
         return {}
-    gathered = nodes.rows(memory, whole, len(form.memory), "past")
+    if ring:
+        gathered = nodes.add("Gather", [memory, ring[0]], "past", axis=0)
+    else:
+        gathered = nodes.rows(memory, whole, len(form.memory), "past")
     names = nodes.cut(gathered, {f"past{g}": len(own) for g, own in rows.items()})
     return dict(zip(rows, names, strict=True))
 
@@ -295,7 +313,15 @@ def _own_limits(nodes: Nodes, group: Group, value: str, parts: dict[str, str], *
     return nodes.add("Concat", rows, "rows_held", axis=0)
 
 
-def _memory(nodes: Nodes, form: WideForm, memory: str, made: Sequence[_Made], *, moves: bool) -> str:
+def _memory(
+    nodes: Nodes,
+    form: WideForm,
+    memory: str,
+    made: Sequence[_Made],
+    *,
+    moves: bool,
+    ring: tuple[str, str] | None,
+) -> str:
     """What the next step begins with: lines moved on by a sample, states, and what rounding took."""
     counts = [len(group.rows) for group in form.groups]
     starts = np.cumsum([0, *counts])
@@ -305,6 +331,8 @@ def _memory(nodes: Nodes, form: WideForm, memory: str, made: Sequence[_Made], *,
     scatter: list[int] = []
     if form.lines:
         newest = _newest(nodes, form, held, row, sum(counts))
+        if ring:
+            return nodes.add("ScatterND", [memory, ring[1], newest], "memory_after")
         pieces, scatter = _moved(nodes, form, memory, newest) if moves else ([newest], [])
     states = [int(starts[g]) + at for g, at in _states(form)]
     if states:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import DTypeLike
 from onnx import helper
 
 from sysid.export.onnx_blocks import in_blocks
-from sysid.export.onnx_core import Step, join, step_core
+from sysid.export.onnx_core import Step, join, past_rows, step_core
 from sysid.export.onnx_nodes import TO_END, Nodes
 from sysid.export.onnx_outputs import flags_of, in_units, known_inputs, reader, scaled_inputs, state_after
 from sysid.export.onnx_step import whole_or_exact
@@ -48,7 +49,7 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         begun = memory
         if plan.memory != form.memory:
             begun = part.add("Gather", [state, part.integers(plan.memory)], "memory_before", axis=0)
-        return _loop(part, plan, x, begun)
+        return (_loop_in_a_ring if _turns(plan) else _loop)(part, plan, x, begun)
 
     made = whole_or_exact(nodes, form, u, core)
     units = in_units(nodes, form, made.raw, u)
@@ -59,15 +60,44 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     return in_blocks(surrogate, nodes)
 
 
-def _loop(nodes: Nodes, form: WideForm, x: str, memory: str) -> Step:
+def _turns(form: WideForm) -> bool:
+    """Whether the memory is delay lines alone, long enough that not moving them is worth it."""
+    lengths = [line.length for line in form.lines]
+    return not form.exact and 1 < len(lengths) < sum(lengths) == len(form.memory) and bool(past_rows(form))
+
+
+def _loop_in_a_ring(nodes: Nodes, form: WideForm, x: str, memory: str) -> Step:
+    """The loop with a memory that lies still: what would move on by a row is counted from one row before.
+
+    Rows are counted around the whole memory. A row that the end of one line would push into the next is where the
+    next one's newest number is written, as when all of it is moved.
+    """
+    part, n = nodes.within(f"{nodes.prefix}ring_"), len(form.memory)
+    one, size = part.integers([1]), part.integers([n])
+    samples = part.add("Shape", [x], "samples", start=1, end=2)
+    count = part.add("Squeeze", [samples], "count")
+    turn = part.add("Range", [part.integers(0), count, part.integers(1)], "sample")
+    turn = part.add("Reshape", [part.add("Mod", [turn, size], "turn"), part.integers([-1, 1])], "turns")
+    rows = part.integers([[row for own in past_rows(form).values() for row in own]])
+    reads = part.add("Sub", [rows, turn], "reads")  # below zero counts from the end
+    firsts = part.integers([np.cumsum([0, *(line.length for line in form.lines)])[:-1].tolist()])
+    before = part.add("Sub", [part.add("Sub", [firsts, one], "before"), turn], "unturned")
+    writes = part.add("Unsqueeze", [part.add("Mod", [before, size], "turned"), part.integers([2])], "writes")
+    made = _loop(nodes, form, x, memory, (reads, writes))
+    last = part.add("Sub", [part.integers([*range(n)]), part.add("Mod", [samples, size], "last")], "last_rows")
+    return Step(raw=made.raw, memory=part.add("Gather", [made.memory, last], "memory_unturned", axis=0))
+
+
+def _loop(nodes: Nodes, form: WideForm, x: str, memory: str, ring: tuple[str, str] | None = None) -> Step:
     """The loop over samples; rows of all samples, shape ``(n_rows, time, batch)``."""
     body = Nodes(nodes.dtype, f"{nodes.prefix}body_")
-    made = step_core(body, form, f"{body.prefix}x", f"{body.prefix}memory")
+    turned = (f"{body.prefix}reads", f"{body.prefix}writes") if ring else None
+    made = step_core(body, form, f"{body.prefix}x", f"{body.prefix}memory", ring=turned)
     n_x = len(form.inputs) or len(form.surrogate.inputs)
     n_rows = sum(len(group.rows) for group in form.groups)
     graph = body.graph(
         "one_step",
-        [body.value("memory", [len(form.memory), "batch"]), body.value("x", [n_x, "batch"])],
+        [body.value("memory", [len(form.memory), "batch"]), body.value("x", [n_x, "batch"]), *_places(body, ring)],
         [
             body.value(made.memory.removeprefix(body.prefix), [len(form.memory), "batch"]),
             body.value(made.raw.removeprefix(body.prefix), [n_rows, "batch"]),
@@ -77,16 +107,22 @@ def _loop(nodes: Nodes, form: WideForm, x: str, memory: str) -> Step:
     nodes.nodes.append(
         helper.make_node(
             "Scan",
-            [memory, x],
+            [memory, x, *(ring or ())],
             outputs,
             name=f"{nodes.prefix}loop",
             body=graph,
-            num_scan_inputs=1,
-            scan_input_axes=[1],
+            num_scan_inputs=3 if ring else 1,
+            scan_input_axes=[1, 0, 0] if ring else [1],
             scan_output_axes=[1],
         )
     )
     return Step(raw=outputs[1], memory=outputs[0])
+
+
+def _places(body: Nodes, ring: tuple[str, str] | None) -> list[Any]:
+    """Descriptions of the places that a body is given."""
+    shapes: dict[str, list[int | str]] = {"reads": ["n_reads"], "writes": ["n_writes", 1]}
+    return [body.value(name, shape, dtype=np.int64) for name, shape in shapes.items()] if ring else []
 
 
 def _with_past(nodes: Nodes, form: WideForm, scaled: tuple[str, dict[Any, int]], state: str, depth: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import onnx
@@ -61,6 +62,35 @@ def test_a_cascade_is_one_loop_and_one_that_keeps_numbers_that_are_none_apart(ca
         _, proto = written(OnnxExporter(), surrogate, tmp_path)[Kind.SEQUENCE]
         onnx.checker.check_model(proto, full_check=True)
         assert operators(proto.graph)["Scan"] == 2
+
+
+@pytest.mark.parametrize("samples", [1, 2, 7, 8, 50])
+def test_a_run_goes_around_its_memory_and_ends_in_the_state_of_as_many_steps(samples, tmp_path):
+    lags = {"input_delays": [[1, 5]], "output_delays": [1, 3], "neurons": 3}
+    names = ["STP", "Y0", "Y1", "Y2"]
+    models = tuple(wired_narx(f"{a} -> {b}", NARX(**lags), i) for i, (a, b) in enumerate(pairwise(names)))
+    surrogate, exporter = Surrogate.of(Cascade(models=models)), OnnxExporter()
+    files = written(exporter, surrogate, tmp_path)
+    step, sequence = (exporter.load(files[kind][0], tmp_path) for kind in (Kind.STEP, Kind.SEQUENCE))
+    loops = [node for node in nodes_of(files[Kind.SEQUENCE][1].graph) if node.op_type == "Scan"]
+    # Memory, terms of inputs, and where to read and to write; the exact form, for numbers that are none, moves its own.
+    assert sorted(len(loop.input) for loop in loops) == [2, 4]
+    u = np.random.default_rng(0).uniform(0.0, 90.0, (samples, 2, 1))
+    state = np.random.default_rng(1).normal(size=(2, surrogate.state_size))
+    whole = sequence(u, state)
+    one_by_one = step(u, state)
+    np.testing.assert_allclose(whole.output, one_by_one.output, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(whole.state, one_by_one.state, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(whole.flags, one_by_one.flags)
+
+
+def nodes_of(graph):
+    """Nodes of a graph, those of bodies after each."""
+    for node in graph.node:
+        yield node
+        for attribute in node.attribute:
+            if attribute.type == onnx.AttributeProto.GRAPH:
+                yield from nodes_of(attribute.g)
 
 
 def side_by_side(count):
