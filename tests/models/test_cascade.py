@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.kernels.cascade_layout import laid_out
 from sysid.models import (
     Cascade,
     Domain,
@@ -109,6 +110,16 @@ def test_a_limit_that_needs_what_it_limits_at_the_same_sample_is_refused():
         replace(service(), limits={"BP": Limit(high="AR")})
     with pytest.raises(ChannelError, match="missing channel BP"):
         replace(service(), limits={"BP": Limit(high="BP")})
+
+
+def test_limits_that_are_whole_numbers_run_what_is_compiled_already():
+    """For another type of number it would all be compiled once more, in ten seconds and more."""
+    runs, compiled = [], []
+    for limits in ({"BP": Limit(low=0.0, high=50.0)}, {"BP": Limit(low=0, high=50)}):
+        runs.append(Cascade(models=service().models[:1], limits=limits).simulate(command()).values)
+        compiled.append(len(laid_out.signatures))
+    assert compiled[0] == compiled[1]
+    assert_array_equal(runs[0], runs[1])
 
 
 def test_an_output_may_limit_the_next_one_of_its_model_and_not_the_one_before():
