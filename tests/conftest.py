@@ -50,7 +50,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Scheduling |
 def pytest_collection() -> Iterator[None]:
     """What is imported and collected stays to the end: it is searched for garbage neither now nor at every test.
 
-    A search of it all takes a second, and one in ten of the tests' seconds was spent on that.
+    A search of it all takes a second, and of tests of reports one second in ten was spent on that.
     """
     gc.disable()
     try:
