@@ -1,4 +1,4 @@
-/* STP -> BP, AR, BC: 26 models with 2200 parameters
+/* STP -> BP, AR, BC: 34 models with 2235 parameters
  *
  * A frozen surrogate: one call of stp_to_bp_ar_bc_step every 0.1 s turns the inputs of a sample into the
  * outputs of that sample. No other rate: the memory is counted in samples. It allocates nothing, keeps nothing but
@@ -32,7 +32,7 @@ typedef double stp_to_bp_ar_bc_real;
 /* Seconds between two calls of stp_to_bp_ar_bc_step. */
 #define STP_TO_BP_AR_BC_SAMPLE_TIME 0.1
 
-enum { STP_TO_BP_AR_BC_N_INPUTS = 1, STP_TO_BP_AR_BC_N_OUTPUTS = 3, STP_TO_BP_AR_BC_N_STATE = 640, STP_TO_BP_AR_BC_N_LOST = 26 };
+enum { STP_TO_BP_AR_BC_N_INPUTS = 1, STP_TO_BP_AR_BC_N_OUTPUTS = 3, STP_TO_BP_AR_BC_N_STATE = 652, STP_TO_BP_AR_BC_N_LOST = 34 };
 
 /* Where each input stands, its unit, and the range that it is declared for. */
 enum {
@@ -51,7 +51,7 @@ enum {
     STP_TO_BP_AR_BC_OUTSIDE_RANGE = 1, /* an input is outside its declared range; the accuracy is unknown */
     STP_TO_BP_AR_BC_AT_BOUND = 2, /* an output is held at one of its bounds; it is wrong */
     STP_TO_BP_AR_BC_NOT_A_NUMBER = 4, /* an input is infinite or not a number, or an output is none; set the state anew */
-    STP_TO_BP_AR_BC_AT_LIMIT = 8, /* an output is held at a limit that was declared for it */
+    STP_TO_BP_AR_BC_AT_LIMIT = 8, /* an output is held at one of its limits, declared or found in the records */
     STP_TO_BP_AR_BC_IN_DOUBT = 16 /* the models of the committee disagree; the answer may be wrong */
 };
 
