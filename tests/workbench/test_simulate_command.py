@@ -40,7 +40,7 @@ def test_a_command_is_simulated_written_and_drawn(bundle, tmp_path, capsys, endi
     assert (tmp_path / "o.png").read_bytes().startswith(b"\x89PNG")
     said = capsys.readouterr().out
     assert "60 samples of a, b written to" in said
-    assert "an output is held at a limit" in said
+    assert "an output is held at one of its limits" in said
 
 
 def test_a_picture_where_it_is_asked_for(bundle, tmp_path):
