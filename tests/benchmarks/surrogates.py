@@ -92,7 +92,8 @@ def pipeline(name: str, folder: Path, *, minutes: float, workers: int, compiled:
         )[0]
     content: dict[str, Any] = {**PYTHON[name], "reference": {"folder": str(MODELS), **PYTHON[name]["reference"]}}
     if compiled:
-        content["reference"] |= {"python": f"compiled_models:{name}", "files": [str(MODELS / "slow_models.py")]}
+        files = [str(MODELS / file) for file in ("slow_models.py", "compiled_thermal.py")]
+        content["reference"] |= {"python": f"compiled_models:{name}", "files": files}
     whole = {"kind": "experiment", "name": name, "workers": workers, **content}
     return _written(whole, folder / f"{name}.yaml", seed)
 

@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 
 Array = NDArray[np.float64]
 STATES = 200
+AREA, FILM = 2.0e-8 * 0.9, 1.5
+"""Of the thermal network: what its cooled face radiates, in W/K⁴, and what both faces lose to the air, in W/K."""
 
 
 def first_order(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
@@ -48,18 +50,25 @@ def thermal(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
 
     Inputs: heat in W, surroundings in K. Outputs: temperature in K of the heated face and of the middle.
     """
-    h, kelvin = time[1] - time[0], 293.15
-    capacity = np.geomspace(1.0, 60.0, STATES)
-    conduct = np.full(STATES - 1, 400.0) * parameters.get("conductivity", 1.0)
-    area, film = 2.0e-8 * 0.9, 1.5
+    return thermal_run(float(time[1] - time[0]), inputs, parameters.get("conductivity", 1.0), 1e-6)
+
+
+def wall(conductivity: float) -> tuple[Array, Array]:
+    """Heat capacity of each layer of the wall in J/K, and what conducts from each to the next in W/K."""
+    return np.geomspace(1.0, 60.0, STATES), np.full(STATES - 1, 400.0) * conductivity
+
+
+def thermal_run(h: float, inputs: Array, conductivity: float, tolerance: float) -> Array:
+    """The same, of any tolerance of the integration."""
+    capacity, conduct = wall(conductivity)
 
     def slope(_: float, x: Array, heat: float, air: float) -> Array:
         flow = conduct * (x[:-1] - x[1:])
         d = np.zeros(STATES)
         d[:-1] -= flow
         d[1:] += flow
-        d[0] += heat - film * (x[0] - air)
-        d[-1] -= film * (x[-1] - air) + area * (x[-1] ** 4 - air**4)
+        d[0] += heat - FILM * (x[0] - air)
+        d[-1] -= FILM * (x[-1] - air) + AREA * (x[-1] ** 4 - air**4)
         return d / capacity
 
     def jacobian(_: float, x: Array, heat: float, air: float) -> Array:
@@ -69,13 +78,13 @@ def thermal(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
         j[i, i + 1] += conduct
         j[i + 1, i + 1] -= conduct
         j[i + 1, i] += conduct
-        j[0, 0] -= film
-        j[-1, -1] -= film + 4.0 * area * x[-1] ** 3
+        j[0, 0] -= FILM
+        j[-1, -1] -= FILM + 4.0 * AREA * x[-1] ** 3
         return j / capacity[:, np.newaxis]
 
-    x, found = np.full(STATES, kelvin), np.empty((len(time), 2))
+    x, found = np.full(STATES, 293.15), np.empty((len(inputs), 2))
     for k, (heat, air) in enumerate(inputs):
-        done = solve_ivp(slope, (0.0, h), x, "BDF", args=(heat, air), jac=jacobian, rtol=1e-6, atol=1e-6)
+        done = solve_ivp(slope, (0.0, h), x, "BDF", args=(heat, air), jac=jacobian, rtol=tolerance, atol=tolerance)
         x = done.y[:, -1]
         found[k] = x[0], x[STATES // 2]
     return found

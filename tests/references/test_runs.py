@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import subprocess
@@ -188,3 +189,15 @@ def test_the_slow_models_rest_where_nothing_moves() -> None:
     np.testing.assert_allclose(wall, 293.15, atol=1e-6)
     rod = slow_models.cylinder(0.02 * np.arange(5), np.zeros((5, 1)), {})
     np.testing.assert_allclose(rod, 150.0, atol=1e-9)
+
+
+def test_the_compiled_thermal_network_is_the_slow_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To a ten-millionth of a kelvin where that is integrated tightly; as users write it, within its own tolerance."""
+    monkeypatch.syspath_prepend(HERE)
+    compiled = importlib.import_module("compiled_models")
+    rng = np.random.default_rng(3)
+    inputs = np.column_stack([rng.uniform(0.0, 100.0, 8), 293.15 + 0.4 * np.cumsum(rng.uniform(-1.0, 1.0, 8))])
+    wall = compiled.thermal(20.0 * np.arange(8), inputs, {"conductivity": 0.7})
+    np.testing.assert_allclose(wall, slow_models.thermal_run(20.0, inputs, 0.7, 1e-10), rtol=0.0, atol=2e-7)
+    slow = slow_models.thermal(20.0 * np.arange(8), inputs, {"conductivity": 0.7})
+    np.testing.assert_allclose(wall, slow, rtol=0.0, atol=5e-4)
