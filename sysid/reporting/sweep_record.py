@@ -56,7 +56,22 @@ class Trial(Record):
         default=math.nan, description="Mean over the selection traces, unit squared."
     )
     selection_one_step_mse: Number = Field(default=math.nan, description="The same one step ahead.")
+    selection_rms_shares: list[Number] = Field(
+        default=[], description="Of each selection trace the free run's rms error, as a share of the output's range."
+    )
     cases: dict[str, TrialCase] = Field(default={})
+
+    def within(self, tolerance: float) -> float:
+        """Share of the traces that choose over which every output's free run stays within a tolerance.
+
+        Args:
+            tolerance: Share of an output's range that the root mean square of its error may come to.
+
+        Returns:
+            The share; 0 without such traces.
+        """
+        stays = [share <= tolerance for share in self.selection_rms_shares]
+        return sum(stays) / len(stays) if stays else 0.0
 
     @property
     def in_full(self) -> bool:

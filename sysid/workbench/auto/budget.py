@@ -14,12 +14,15 @@ from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.sweep.search_space import Point
 
-REFIT = 0.2
-"""Share of the time that is kept for the last fit."""
-TRIAL = 0.15
-"""Share of the time that one trial may take."""
-LINEAR = 0.4
-"""Share of the time by whose end linear structures beyond the first of each kind have to be done."""
+REFIT, TRIAL = 0.2, 0.15
+"""Shares of the time: what is kept for the last fit, and what one trial may take."""
+GOING_ON, TRIAL_OF_MANY = 0.4, 0.1
+"""The same where the chosen network is trained on from where its trial had ended. Trials then have to tell which one is
+worth that, no more; what the others would have got is the chosen one's."""
+UNKNOWN = 0.5
+"""Share of its limit that a trial is taken to last where no other of its kind has told."""
+LINEAR = 0.5
+"""Share of the time of all trials by whose end linear structures beyond the first of each kind have to be done."""
 FINAL = 0.15
 """Share of either that is kept for trying the best once more."""
 
@@ -53,8 +56,10 @@ class Budget:
         side_by_side: Trials that run at the same time.
         folds: Times that a point is trained.
         spent: Iterations so far.
+        refit: Share that is kept for the last fit.
+        trial: Share that one trial may take.
         kept: Share that is not spent yet.
-        most: Share of the time that may be spent by the end of this round.
+        most: Share of the time of all trials that may be spent by the end of this round.
         unlimited: Points of the next round that are tried even so, as long as the time of the last fit is not reached.
     """
 
@@ -65,6 +70,8 @@ class Budget:
     side_by_side: int = 1
     folds: int = 1
     spent: int = 0
+    refit: float = REFIT
+    trial: float = TRIAL
     kept: float = FINAL
     most: float = 1.0
     unlimited: int = 0
@@ -136,18 +143,20 @@ class Budget:
         return paid or self.wall_s is None or self.clock() + seconds <= self._until()
 
     def _before_the_last_fit(self) -> bool:
-        return self.wall_s is not None and self.clock() < (1.0 - REFIT) * self.wall_s
+        return self.wall_s is not None and self.clock() < (1.0 - self.refit) * self.wall_s
 
     def _until(self) -> float:
         """Seconds by which a round of trials has to be over."""
-        return min(self.most, 1.0 - REFIT - self.kept) * (self.wall_s or 0.0)
+        return min(self.most * (1.0 - self.refit), 1.0 - self.refit - self.kept) * (self.wall_s or 0.0)
 
     def _seconds(self, point: Point) -> float:
-        """How long a trial will take; of a kind that was not tried yet, at least something."""
+        """How long a trial will take; of a kind that was not tried yet, a part of its limit, or at least something."""
         if self.wall_s is None:
             return 0.0
-        rate = self._rates.get(point.structure.kind, 0.0)
-        limit = TRIAL * self.wall_s if point.training else self.wall_s
+        limit = self.trial * self.wall_s if point.training else self.wall_s
+        rate = self._rates.get(point.structure.kind)
+        if rate is None:
+            return UNKNOWN * limit if "max_time_s" in point.training else 1e-3
         return min(limit, max(1e-3, rate * price(point, self.folds) * size_of(point.structure)))
 
 

@@ -36,6 +36,8 @@ class AutoConfig(BaseModel):
         iterations: In place of minutes: iterations of training, all starts together. The same search then comes to the
             same result on every machine.
         workers: Processes that train, one thread each; 1 trains in this process.
+        tolerance: Share of each output's range: what chooses is first over how many traces the root mean square error
+            of the free run stays within it, then the error; the error alone where none is given.
         stability: How a network's free run is checked.
         export: What leaves the workbench; ``null`` for nothing.
         report: What the report shows.
@@ -55,6 +57,7 @@ class AutoConfig(BaseModel):
     minutes: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     iterations: int | None = Field(default=None, ge=1)
     workers: int = Field(default=2, ge=1)
+    tolerance: float | None = Field(default=None, gt=0.0, lt=1.0)
     stability: StabilityConfig = StabilityConfig()
     export: ExportConfig | None = ExportConfig()
     report: ReportConfig = ReportConfig()

@@ -25,6 +25,9 @@ FEWEST = 20
 """Usable samples of a part without which nothing can be chosen."""
 SEARCHED = 40_000
 """Samples that are fitted while structures are tried; of a longer record the chosen structure alone sees all."""
+A_SECOND, LEAST_SEARCHED = 200, 8_000
+"""Where selection traces choose, so many for each second of the search, and in any case so many: in a short search a
+network would come to a few iterations on all of them, which tell nothing of it."""
 FEW = 4
 """Whole traces from which on trials see some of them, and not the beginning of all."""
 END = 0.25
@@ -83,12 +86,13 @@ class Parts:
         return {**SEARCH, "starts": 1 if len(self.folds) > 1 else 2, "choose_by": "evidence"}
 
 
-def part(data: Data, start: Start) -> Parts:
+def part(data: Data, start: Start, wall_s: float | None = None) -> Parts:
     """Part the estimation traces into what is fitted and what chooses.
 
     Args:
         data: The traces of the pipeline.
         start: How each free run begins.
+        wall_s: Seconds of the search; ``None`` where iterations are counted.
 
     Returns:
         The parts.
@@ -113,9 +117,12 @@ def part(data: Data, start: Start) -> Parts:
             remedy="record for longer, or fit a structure of few parameters with sysid orders or sysid run",
         )
     sentences, total = [told], max(sum(map(len, fitted)) for fitted, _ in pairs)
-    cut = total > SEARCHED and bool(data.selection)
-    if total > SEARCHED:
-        share, partial = SEARCHED / total, True
+    most = SEARCHED
+    if data.selection and wall_s is not None:
+        most = round(min(SEARCHED, max(LEAST_SEARCHED, A_SECOND * wall_s)))
+    cut = total > most and bool(data.selection)
+    if total > most:
+        share, partial = most / total, True
         seen = [_seen(fitted, share) for fitted, _ in pairs]
         pairs = [(some, rest) for (some, _), (_, rest) in zip(seen, pairs, strict=True)]
         sentences.append(f"Trials saw {seen[0][1]} of what is fitted, and what was chosen all of it.")

@@ -252,6 +252,9 @@ class Plan:
         training = {**self.training, **one.training} if row.training is Training else dict(one.training)
         if row.training is JointTraining and "max_time_s" in self.training:
             training["max_time_s"] = self.training["max_time_s"]
+        n = self.looked.n_outputs
+        if "max_time_s" in training and not one.structure.for_outputs(n).several_outputs:
+            training["max_time_s"] = round(training["max_time_s"] / n, 3)  # a model an output, one after the other
         values = {"structure": one.structure.label, **one.training}
         return Point(number=self._asked, structure=one.structure, training=training, values=values)
 

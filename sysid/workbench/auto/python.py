@@ -111,7 +111,7 @@ def auto(
         seed: Seed of everything random.
         start: How each free run begins.
         rest_output: The output's value at rest, or by name of several.
-        workers: Processes that train, one thread each; a script then needs ``if __name__ == "__main__":``.
+        workers: Processes that train, one thread each.
         folder: Where trials, report and bundle are kept; a search that was stopped goes on there. None are by default.
 
     Returns:

@@ -13,6 +13,7 @@ from sysid.estimation.estimators import estimator_of
 from sysid.models import AbstractStructure
 from sysid.traces import Role, Trace
 from sysid.validation import case_results
+from sysid.workbench.auto.look import span_of
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
@@ -43,8 +44,9 @@ def trains_on(structure: AbstractStructure) -> bool:
 
 
 def refitted(
-    work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult, further: bool
-) -> FitResult:
+    work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult, further: bool,
+    tolerance: float | None = None,
+) -> FitResult:  # fmt: skip
     """Fit the chosen structure once more: to all estimation traces, or on from where its trial had ended.
 
     Args:
@@ -55,6 +57,8 @@ def refitted(
         chosen: The fit that was chosen.
         further: Whether it is trained on from where it is, and selection traces, where there are some, say whether that
             was for the better; else it is fitted anew, and all estimation traces do.
+        tolerance: Share of each output's range: who stays within it over more of these traces is better, whatever the
+            mean error; ``None`` where the error alone says so.
 
     Returns:
         The new fit, or the chosen one where that does better.
@@ -63,16 +67,20 @@ def refitted(
     again = steps.fit_traces(fit, config, data, chosen if further else None, watch)
     judging = (data.selection if further else ()) or data.estimation
     taken, left = (GONE_ON, ENOUGH) if further else (BETTER, KEPT)
-    ours, theirs = (_error(one, judging, config) for one in (again, chosen))
-    better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs))
+    ours, theirs = (_error(one, judging, config, tolerance) for one in (again, chosen))
+    better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs[1]))
     found = again if better else chosen
     return replace(found, notes=(*found.notes, taken if better else left))
 
 
-def _error(fit: FitResult, traces: Sequence[Trace], config: PipelineConfig) -> float:
-    """Mean square of the free run over all traces and outputs, each over its own variance."""
-    found = []
+def _error(
+    fit: FitResult, traces: Sequence[Trace], config: PipelineConfig, tolerance: float | None
+) -> tuple[int, float]:
+    """Traces over which the free run leaves the tolerance, and its mean square, each output's over its own variance."""
+    found, outside = [], set[str]()
     for trace in traces:
         for output, case in case_results(fit.model, trace, Role.ESTIMATION, config.start, 1).items():
             found.append(case.free_run.mse / (float(np.var(trace[output])) or 1.0))
-    return float(np.mean(found))
+            if tolerance is not None and not case.free_run.mse <= (tolerance * span_of(traces, output)) ** 2:
+                outside.add(trace.name)
+    return len(outside), float(np.mean(found))

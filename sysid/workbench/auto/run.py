@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +14,10 @@ from sysid.estimation import FitResult
 from sysid.models.store import structure_from_dict
 from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord, write_sweep
-from sysid.workbench.auto.budget import REFIT
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.parts import FURTHER, LAST
 from sysid.workbench.auto.refit import refitted, trains_on
-from sysid.workbench.auto.search import FOUND, TITLE, Found, Hire, Search, stand_in
+from sysid.workbench.auto.search import FOUND, TITLE, Found, Hire, Search, refit_share, stand_in
 from sysid.workbench.auto.table import table_of_front
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, Pipeline
@@ -32,7 +30,7 @@ from sysid.workbench.runner.program import Closing, Program, carry_out
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
 from sysid.workbench.runner.store import digest, strict, write_bytes
-from sysid.workbench.sweep.store import TRIALS
+from sysid.workbench.sweep.store import TRIALS, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess, LocalWorkers, NoWorkers
 from sysid.yaml_files import check, read_yaml
@@ -64,6 +62,7 @@ class Auto:
         path: Its file, or the one that it would have.
         load: Gives the traces where they are at hand; by default they are loaded as the YAML says.
         page: Whether a page is made of the results.
+        before_page: Writes what the page shows beside the results of the search.
     """
 
     config: AutoConfig
@@ -71,6 +70,7 @@ class Auto:
     path: Path
     load: Callable[[], Data] | None = None
     page: bool = True
+    before_page: Callable[[], object] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -227,15 +227,19 @@ class _AutoSteps:
         """Every step, in order."""
         loaded = run.do(self._loading())
         found = run.do(self._searching(run, loaded)).value
-        fits = [self._fit(name, found) for name in found.shown]
+        spent_s = TrialStore(path=run.store.path / TRIALS).seconds
+        fits = [self._fit(name, found, spent_s) for name in found.shown]
         pipeline, given, parts = self._pipeline(fits), dict[str, GivenFit](), found.parts
         for fit in fits:
             for model, made in zip(models_of(fit, pipeline.config), found.fits[fit.name], strict=True):
                 further = parts.trained_on and trains_on(model.fit.structure)
                 last = parts.partial or further
-                given[model.fit.name] = _again(model, made, loaded.value, further=further) if last else made
+                given[model.fit.name] = self._again(model, made, loaded.value, further=further) if last else made
         choice = steps.Choice(name=FOUND, chosen_by=found.record.chosen_by)
-        results = FitSteps(pipeline=pipeline, given=given, chosen=choice, page=self.auto.page).run(run, loaded)
+        work = FitSteps(
+            pipeline=pipeline, given=given, chosen=choice, page=self.auto.page, before_page=self.auto.before_page
+        )  # fmt: skip
+        results = work.run(run, loaded)
         ready = events.SweepReady(
             record=found.record, folder=run.store.path, command=run.command, data=self.config.data,
             seed=self.config.seed,
@@ -291,29 +295,33 @@ class _AutoSteps:
         write_sweep(run.store.path, found.record)
         return found
 
-    def _fit(self, name: str, found: Found) -> FitConfig:
-        """A trial as a fit of a pipeline; one that is fitted once more has more starts, and a share of the time."""
-        options = dict[str, Any](found.training[name])
+    def _fit(self, name: str, found: Found, spent_s: float) -> FitConfig:
+        """A trial as a fit of a pipeline; one that is fitted once more has more starts, and what time the trials left.
+
+        Where that is no fit of the chosen one, it has the share that was kept, as it is not made again.
+        """
+        options, share = dict[str, Any](found.training[name]), refit_share(found.parts)
         structure: Mapping[str, Any] = found.shown[name].structure
         if found.parts.trained_on and trains_on(structure_from_dict(structure)):
             options |= FURTHER
             if self.config.iterations is not None:
                 options["max_iterations"] = min(
-                    FURTHER["max_iterations"], max(1, round(REFIT * self.config.iterations))
+                    FURTHER["max_iterations"], max(1, round(share * self.config.iterations))
                 )
         elif found.parts.partial and "starts" in options:
             options |= LAST
         if "max_time_s" in options and self.config.wall_s is not None:
-            options["max_time_s"] = round(REFIT * self.config.wall_s, 3)
+            left = max(share, 1.0 - spent_s / self.config.wall_s) if name == FOUND else share
+            options["max_time_s"] = round(left * self.config.wall_s / len(found.fits[name]), 3)
         return FitConfig.model_validate({"name": name, "structure": dict(structure), "training": options or None})
 
+    def _again(self, model: FitModel, made: GivenFit, data: Data, *, further: bool) -> GivenFit:
+        """A model that was chosen on parts of the record, or after few iterations, fitted once more."""
+        how, tolerance = "further" if further else "again", self.config.tolerance
+        key = {"chosen": made.key, how: steps.fit_key(model.fit, model.config, data, None), "tolerance": tolerance}
 
-def _again(model: FitModel, made: GivenFit, data: Data, *, further: bool) -> GivenFit:
-    """A model that was chosen on parts of the record, or after few iterations, fitted once more."""
-    how = "further" if further else "again"
-    key = digest(strict({"chosen": made.key, how: steps.fit_key(model.fit, model.config, data, None)}))
-    return GivenFit(key=key, make=partial(_make_again, model, data, made, further))
+        def make(work: Work) -> FitResult:
+            chosen = made.make(work)
+            return refitted(work, model.fit, model.config, data, chosen=chosen, further=further, tolerance=tolerance)
 
-
-def _make_again(model: FitModel, data: Data, made: GivenFit, further: bool, work: Work) -> FitResult:
-    return refitted(work, model.fit, model.config, data, chosen=made.make(work), further=further)
+        return GivenFit(key=digest(strict(key)), make=make)

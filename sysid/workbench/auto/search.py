@@ -10,7 +10,7 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.models import ARX, AbstractStructure
 from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.auto.budget import FINAL, TRIAL, Budget
+from sysid.workbench.auto.budget import FINAL, GOING_ON, REFIT, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
@@ -44,6 +44,18 @@ def stand_in(config: AutoConfig) -> AbstractStructure:
     """
     m = len(config.mapping.inputs)
     return ARX(na=1, nb=(1,) * m, nk=(1,) * m)
+
+
+def refit_share(parts: Parts) -> float:
+    """Share of the time that is kept for the last fit.
+
+    Args:
+        parts: What is fitted and what chooses.
+
+    Returns:
+        More where the chosen network goes on from where its trial had ended.
+    """
+    return GOING_ON if parts.trained_on else REFIT
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,7 +116,7 @@ class Search:
         Raises:
             ConfigError: If the record is too short.
         """
-        parts = part(data, config.start)
+        parts = part(data, config.start, config.wall_s)
         structure = stand_in(config)
         pipeline = config.sweep(structure).pipeline([FitConfig(name=FOUND, structure=structure)])
         first = parts.folds[0]
@@ -155,9 +167,11 @@ class Search:
             is_stored=trials.is_stored,
             side_by_side=self.config.workers,
             folds=len(self.parts.folds),
+            refit=refit_share(self.parts),
+            trial=TRIAL_OF_MANY if self.parts.trained_on else TRIAL,
             kept=FINAL if again else 0.0,
         )
-        training = {**self.parts.training, **budget.limits(TRIAL / len(self.parts.folds))}
+        training = {**self.parts.training, **budget.limits(budget.trial / len(self.parts.folds))}
         plan = Plan(
             looked=self.looked, budget=budget, error=error, training=training, seed=self.config.seed, again=again
         )
@@ -176,7 +190,7 @@ class Search:
     def _chosen(self, plan: Plan, trials: Trials, wall_s: float) -> Found:
         first = trials.drivers[0]
         checks = Checks(driver=first, bench=self.bench.fold(0))
-        choice = choose(plan.candidates, error, checks.first_stable)
+        choice = choose(plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance)
         shown = {FOUND: choice.chosen}
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear

@@ -24,6 +24,8 @@ class Choice:
         linear: The best linear one; ``None`` where none can be used.
         refused: Trials of less error that were passed over, as their free run is not stable.
         nonlinear: Trials that are no linear model.
+        more_within: Over how many of the traces that choose it stays within the tolerance, in words, where that is
+            why it comes before one of less error; empty elsewhere.
     """
 
     chosen: Trial
@@ -31,10 +33,15 @@ class Choice:
     linear: Trial | None
     refused: int
     nonlinear: int
+    more_within: str = ""
 
 
 def choose(
-    trials: Sequence[Trial], error: Error, first_stable: Callable[[Sequence[Trial]], tuple[Trial, int]]
+    trials: Sequence[Trial],
+    error: Error,
+    first_stable: Callable[[Sequence[Trial]], tuple[Trial, int]],
+    *,
+    tolerance: float | None = None,
 ) -> Choice:
     """The smallest of those whose error is as good as the least.
 
@@ -42,20 +49,28 @@ def choose(
         trials: All of them; at least one can be used.
         error: What chooses, as a mean square.
         first_stable: The first of some whose free run is stable, and how many were passed over.
+        tolerance: Where how many of the traces that choose stay within it comes before the error: a mean hides one
+            trace that fails behind others that are far better than they need to be.
 
     Returns:
         The choice.
     """
-    usable = sorted((t for t in trials if math.isfinite(error(t))), key=lambda t: (error(t), t.number))
+
+    def outside(trial: Trial) -> float:
+        return 0.0 if tolerance is None else 1.0 - trial.within(tolerance)
+
+    usable = sorted((t for t in trials if math.isfinite(error(t))), key=lambda t: (outside(t), error(t), t.number))
     chosen, refused = first_stable(usable)
     limit = error(chosen) * (1.0 + ALIKE) ** 2
-    alike = [t for t in usable if error(t) <= limit and t not in usable[:refused]]
+    alike = [t for t in usable[refused:] if error(t) <= limit and outside(t) <= outside(chosen)]
+    more = tolerance is not None and min(map(error, usable[refused:])) < error(chosen)
     smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
     linear = [t for t in usable if ESTIMATORS[t.structure["kind"]].linear]
     nonlinear = sum(not ESTIMATORS[t.structure["kind"]].linear for t in trials)
     return Choice(
-        chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=nonlinear
-    )
+        chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=nonlinear,
+        more_within=f"{1.0 - outside(chosen):.0%} of what chose within {tolerance:.0%} of its range" if more else "",
+    )  # fmt: skip
 
 
 def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: str, error: Error) -> str:
@@ -78,7 +93,9 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: st
         return number(value) if unit == "1" else quantity(value, unit)
 
     why = f"{choice.chosen.label} has the least free-run error on what chose, {shown(root)} (root mean square)"
-    if choice.least.number != choice.chosen.number:
+    if choice.more_within:
+        why = f"{choice.chosen.label} has {choice.more_within}, more than any of less error than its {shown(root)} has"
+    elif choice.least.number != choice.chosen.number:
         why = (
             f"{choice.chosen.label} is the smallest within {ALIKE:.0%} of the least free-run error on what chose: "
             f"{shown(root)} (root mean square) beside {shown(math.sqrt(error(choice.least)))} of "

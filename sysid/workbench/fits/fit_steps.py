@@ -74,12 +74,14 @@ class FitSteps:
         given: Fits that are made already, by name.
         chosen: The fit that comes first, where it was chosen elsewhere.
         page: Whether a page is made of the results, and the traces are looked at for it.
+        before_page: Writes what the page shows beside the results, once these and the bundle are there.
     """
 
     pipeline: Pipeline
     given: Mapping[str, GivenFit] = field(default_factory=dict)
     chosen: steps.Choice | None = None
     page: bool = True
+    before_page: Callable[[], object] | None = None
 
     @property
     def config(self) -> PipelineConfig:
@@ -148,6 +150,8 @@ class FitSteps:
         results = self._results(run, loaded.value, fitted, choice=choice, exports=exports, advice=advice, orders=found)
         if not self.page:
             return results
+        if self.before_page is not None:
+            run.then(self.before_page)
         page = run.report(results)
         for ready in best.ready:
             written = events.ReportReady(page=page.value, results=run.store.results, of=ready)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,12 +20,13 @@ from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
+from sysid.references.design import Design
 from sysid.references.runs import ReferenceRuns
 from sysid.reporting.growth import FILE
 from sysid.reporting.judging.results import FOLDER
 from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
-from sysid.traces import Role, Trace
+from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import MOVED, in_motion, span_of
@@ -40,7 +43,7 @@ from sysid.workbench.surrogates.grown import GROWN, Ground, grow
 from sysid.workbench.surrogates.grown import program_of as grown_program
 from sysid.workbench.surrogates.known import pipeline_of
 from sysid.workbench.surrogates.known import program_of as known_program
-from sysid.workbench.surrogates.plan import PROOF, RUNNING, search_share
+from sysid.workbench.surrogates.plan import PROOF, RUNNING, Times, times
 from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
 from sysid.yaml_files import check, read_yaml
 
@@ -49,8 +52,10 @@ Perform = Callable[[Program[Any], Path], Any]
 """Carries a program out in a folder, and gives its results."""
 GROWING = 0.25
 """Share of the time in which data grow, where they do; it is taken from the search's."""
-TIMES = "search-share.txt"
-"""The search's share of the time: decided once, so that a run that was killed finds its trials again."""
+TIMES = "search-seconds.txt"
+"""The search's time: decided once, so that a run that was killed finds its trials again."""
+TOLERANCE = 0.01
+"""Share of an output's range: what a proof counts, and what models are chosen by."""
 FORMATS = ("c", "fmi2", "fmi3")
 
 
@@ -119,6 +124,7 @@ def make_surrogate(
                 "experiments grow around what a search has chosen", where=pipeline, expected="rounds, or fits",
                 got="both", remedy="leave rounds out, or the fits of the pipeline",
             )  # fmt: skip
+    began = time.monotonic()
     found = work.experimented()
     # What a search has to learn; of fits that are asked for somebody knows it.
     begins = [] if config.fits else restless(found, mapping)
@@ -126,14 +132,19 @@ def make_surrogate(
     notes = [*begins, *jumps]
     for note in notes:  # before an hour is spent
         say(f"note: {note}")
-    runs = ReferenceRuns(config=reference)
-    share = _share(folder / TIMES, runs, len(found.traces), minutes=minutes, workers=config.workers)
-    share -= 0.0 if growth is None else GROWING
+    plan, count = work.planned(found, minutes=minutes, spent=time.monotonic() - began, proof=proof)
+    if not iterations and not (folder / TIMES).is_file():
+        say(plan.sentence(count))
+    seconds_left = _kept(folder / TIMES, plan.search) - (0.0 if growth is None else GROWING * plan.whole)
+    proving = _Proving(
+        reference=reference, design=config.experiment, taught=found.traces, count=count, workers=config.workers, say=say
+    )
     place = folder / "model"
     if config.fits:
-        work.fitted(found, share * minutes)
+        work.fitted(found, seconds_left / 60.0)
     else:
-        searched = work.searched(found, share * minutes)
+        before_page = partial(proving, place) if growth is None else None
+        searched = work.searched(found, seconds_left / 60.0, before_page)
         if growth is not None:
             ground = Ground(config=config, reference=reference, found=found, folder=folder)
             seconds = None if iterations else GROWING * 60.0 * minutes
@@ -141,14 +152,10 @@ def make_surrogate(
             notes.append(said)
     bundle = read_bundle(place / "bundle")
     notes += beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if begins else []
-    count = proof or _affordable(config, reference_runs=runs, minutes=minutes)
-    shown, section = prove(
-        bundle, reference, config.experiment, found.traces, count=count, workers=config.workers,
-        progress=lambda name, n, of: say(f"proof: {name} ({n} of {of})") if n % max(1, of // 20) == 0 else None,
-    )  # fmt: skip
-    (place / FOLDER).mkdir(exist_ok=True)
-    write_record(place / FOLDER / "proof.json", section)
-    page, fmu = write_report(place), fmu_of(bundle)
+    shown = proving.done.get(place) or proving(place)
+    page, fmu = place / "report" / "index.html", fmu_of(bundle)
+    if page.stat().st_mtime < (place / FOLDER / "proof.json").stat().st_mtime:
+        page = write_report(place)
     if fmu is not None:
         fmu = Path(shutil.copyfile(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu"))
     if len(shown.errors) < PROOF:
@@ -179,16 +186,26 @@ class _Work:
         found: Experimented = self.perform(experiment_program(self.config, text=text, folder=beside), self._experiment)
         return found
 
-    def searched(self, found: Experimented, minutes: float) -> Searched:
+    def planned(self, found: Experimented, *, minutes: float, spent: float, proof: int | None) -> tuple[Times, int]:
+        """How the time is spent, and of how many experiments the proof is."""
+        workers, pictures = self.config.workers, len(found.traces) * len(self.mapping.outputs)
+        with ReferenceRuns(config=self.reference) as runs:
+            each = runs.seconds_each()[0]
+        each = self.reference.time_limit if each is None else max(each, 1e-3)
+        count = proof or int(np.clip(RUNNING * 60.0 * minutes * workers / each, 20, PROOF))
+        found_out = times(each, minutes=minutes, spent=spent, experiments=count, workers=workers, pictures=pictures)
+        return found_out, count
+
+    def searched(self, found: Experimented, minutes: float, before_page: Callable[[], object] | None) -> Searched:
         """A model that is looked for."""
         fields: dict[str, Any] = {
             **{"kind": "auto", "name": "model", "data": str((self._experiment / DATASET).resolve())},
             **{"mapping": self.mapping, "start": Start(), "rest": dict(found.before), "seed": self.seed},
             **({"iterations": self.iterations} if self.iterations else {"minutes": minutes}),
-            **{"workers": self.config.workers, "export": {"formats": FORMATS}},
+            **{"workers": self.config.workers, "export": {"formats": FORMATS}, "tolerance": TOLERANCE},
         }
         search = check(AutoConfig, fields, where=self.pipeline)
-        auto = auto_of(search, load=lambda: data_of(found.traces, self.mapping))
+        auto = replace(auto_of(search, load=lambda: data_of(found.traces, self.mapping)), before_page=before_page)
         done: Searched = self.perform(search_program(auto), self.folder / "model")
         return done
 
@@ -205,6 +222,34 @@ class _Work:
         place = self.folder / "model"
         known = self.known((self._experiment / DATASET).resolve(), found.before, minutes)
         self.perform(known_program(known, place), place)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Proving:
+    """The proof of a model, written beside its results: its report shows it."""
+
+    reference: ReferenceConfig
+    design: Design
+    taught: TraceSet
+    count: int
+    workers: int
+    say: Callable[[str], None]
+    done: dict[Path, Proof] = field(default_factory=dict)
+
+    def __call__(self, place: Path) -> Proof:
+        """Prove the bundle in a folder."""
+        proof, section = prove(
+            read_bundle(place / "bundle"), self.reference, self.design, self.taught, count=self.count,
+            workers=self.workers, tolerance=TOLERANCE, progress=self._progress,
+        )  # fmt: skip
+        (place / FOLDER).mkdir(exist_ok=True)
+        write_record(place / FOLDER / "proof.json", section)
+        self.done[place] = proof
+        return proof
+
+    def _progress(self, name: str, n: int, of: int) -> None:
+        if n % max(1, of // 20) == 0:
+            self.say(f"proof: {name} ({n} of {of})")
 
 
 def _grown(
@@ -226,22 +271,12 @@ def _grown(
     return place, grown.record.sentence
 
 
-def _affordable(config: ExperimentConfig, *, reference_runs: ReferenceRuns, minutes: float) -> int:
-    """New experiments for which there is time, at most 1,000."""
-    with reference_runs as runs:
-        each = runs.seconds_each()[0]
-    each = config.reference.time_limit if each is None else max(each, 1e-3)
-    return int(np.clip(RUNNING * 60.0 * minutes * config.workers / each, 20, PROOF))
-
-
-def _share(kept: Path, runs: ReferenceRuns, count: int, *, minutes: float, workers: int) -> float:
-    """Share of the time for the search, as it was decided first."""
+def _kept(file: Path, seconds: float) -> float:
+    """Seconds of the search, as they were decided first."""
     with suppress(OSError, ValueError, TypeError):
-        return float(read_bounded(kept))
-    with runs as known:
-        share = round(search_share(known.seconds_each()[0], count, minutes=minutes, workers=workers), 3)
-    write_bytes(kept, f"{share}\n".encode())
-    return share
+        return float(read_bounded(file))
+    write_bytes(file, f"{seconds:.1f}\n".encode())
+    return round(seconds, 1)
 
 
 def restless(found: Experimented, mapping: Mapping) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,10 @@ from sysid.yaml_files import check, yaml_text
 
 RUNNING = 0.2
 """Share of the time in which the reference is run for data; as much again for the proof."""
-SEARCHING, LONGEST, ELSE = 0.5, 0.75, 0.1
-"""Share of the time in which a model is looked for, at least and at most, and what export and report take."""
+SEARCHING = 0.4
+"""Share of the time in which a model is looked for at least, whatever the rest takes."""
+FINISHING_S, PICTURE_S = 15.0, 0.25
+"""Seconds that scores, export and what has to be loaded for them take, and each picture of the report."""
 KNOWN = """\
 # A search finds smooth maps, and a model that jumps at events (a velocity that flips, a state that is reset) is none.
 # Where you know what happens, write it, and it is fitted in place of the search (docs/how/events.md):
@@ -120,26 +123,76 @@ def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, wo
     return Counts(estimation=count, selection=max(3, count // 4), test=max(3, count // 4))
 
 
-def search_share(each: float | None, runs: int, *, minutes: float, workers: int) -> float:
-    """Share of the time for the search: all that neither experiments nor proof take, as far as that is known.
+@dataclass(frozen=True, kw_only=True)
+class Times:
+    """How the time of a surrogate is spent, in seconds.
 
     Args:
-        each: Seconds of a run of the reference; ``None`` where nobody knows.
-        runs: Experiments for the data.
+        whole: What was asked for.
+        spent: On experiments, and until they were there.
+        proof: On the proof's experiments.
+        finish: On scores, export and report.
+    """
+
+    whole: float
+    spent: float
+    proof: float
+    finish: float
+
+    @property
+    def search(self) -> float:
+        """What a model is looked for: all that the rest does not take, but a share of the whole in any case."""
+        return max(SEARCHING * self.whole, self.whole - self.spent - self.proof - self.finish)
+
+    def sentence(self, experiments: int) -> str:
+        """What is about to be done, for who waits for it.
+
+        Args:
+            experiments: Of the proof.
+
+        Returns:
+            One sentence; another where it takes longer than was asked for.
+        """
+        said = (
+            f"Time: {_minutes(self.spent)} so far, {_minutes(self.search)} for a model, {_minutes(self.finish)} for "
+            f"scores, export and report, {_minutes(self.proof)} for {experiments:,} experiments of the proof"
+        )
+        whole = self.spent + self.search + self.proof + self.finish
+        if whole <= 1.05 * self.whole:
+            return f"{said}."
+        return (
+            f"{said}: about {_minutes(whole)} in all, more than the {_minutes(self.whole)} that were asked for. Fewer "
+            "experiments of the proof (--proof) and fewer of selection and test, which are drawn, take less."
+        )
+
+
+def _minutes(seconds: float) -> str:
+    return f"{seconds / 60.0:.1f} min" if seconds >= 90.0 else f"{seconds:.0f} s"
+
+
+def times(each: float, *, minutes: float, spent: float, experiments: int, workers: int, pictures: int) -> Times:
+    """How the time of a surrogate is spent, once its experiments are there.
+
+    Args:
+        each: Seconds of a run of the reference.
         minutes: Time for all.
+        spent: Seconds until now.
+        experiments: Of the proof.
         workers: Processes.
+        pictures: Records that the report draws, each output of each for itself.
 
     Returns:
-        The share.
+        The times.
 
     Example:
-        >>> search_share(0.03, 20, minutes=5.0, workers=2), search_share(30.0, 20, minutes=5.0, workers=2)
-        (0.75, 0.5)
+        >>> found = times(0.03, minutes=5.0, spent=4.0, experiments=1000, workers=2, pictures=40)
+        >>> found.search, found.finish, found.proof
+        (246.0, 35.0, 15.0)
+        >>> times(6.0, minutes=5.0, spent=60.0, experiments=1000, workers=2, pictures=40).search
+        120.0
     """
-    if each is None:
-        return SEARCHING
-    whole = 60.0 * minutes * workers / max(each, 1e-6)
-    return float(np.clip(1.0 - ELSE - runs / whole - min(RUNNING, PROOF / whole), SEARCHING, LONGEST))
+    finish = FINISHING_S + 2.0 * PICTURE_S * pictures  # a gallery of all models, and each model by itself
+    return Times(whole=60.0 * minutes, spent=spent, proof=experiments * each / workers, finish=finish)
 
 
 def pairs(options: Sequence[str], flag: str) -> dict[str, tuple[float, float]]:

@@ -27,7 +27,7 @@ from sysid.workbench.sweep.store import Clock, TrialStore
 from sysid.workbench.sweep.trial import FAILED, Bench, Job, forget_checkpoint, run_job
 from sysid.workbench.sweep.workers import AbstractWorkers
 
-FORMAT = 1
+FORMAT = 2
 """Changes when what a trial stores changes, so that older ones are done again."""
 
 LINEAR = {"loop": "open", "max_iterations": 20, "regularisation": 0.0}

@@ -292,22 +292,30 @@ def _scores(bench: Bench, models: Sequence[AbstractModel]) -> dict[str, Any]:
     start: Start = PipelineConfig.model_validate(dict(bench.pipeline)).start
     outputs = [output for model in models for output in model.mapping.outputs]
     sizes = dict(zip(outputs, output_sizes(Data(traces=bench.traces, selection=bench.selection), outputs), strict=True))
+    known = [trace.columns(outputs) for trace in (*bench.traces, *bench.selection)]
+    spans = np.ptp(np.concatenate(known), axis=0)
+    spans = np.where(spans > 0.0, spans, 1.0)
     cases = {
-        trace.name: {"role": bench.traces.roles[trace.name].value, **_case(models, trace, start, sizes, REPEATS)}
+        trace.name: {
+            "role": bench.traces.roles[trace.name].value,
+            **_means(*_case(models, trace, start, sizes, REPEATS)),
+        }
         for trace in bench.traces
     }
-    chosen = [_case(models, trace, start, sizes, 0) for trace in bench.selection]
+    runs = [_case(models, trace, start, sizes, 0) for trace in bench.selection]
+    chosen = [_means(*run) for run in runs]
+    shares = [np.sqrt(np.array(errors["free_run_mse"]) * list(sizes.values())) / spans for errors, _ in runs]
     means = {
         f"selection_{name}": float(np.mean([one[name] for one in chosen])) if chosen else math.nan
         for name in ("free_run_mse", "one_step_mse")
     }
-    return {"cases": cases, **means}
+    return {"cases": cases, "selection_rms_shares": [float(share.max()) for share in shares], **means}
 
 
 def _case(
     models: Sequence[AbstractModel], trace: Trace, start: Start, sizes: Mapping[str, float], repeats: int
-) -> dict[str, float]:
-    """Means over the outputs, each over the squared error that counts as one."""
+) -> tuple[dict[str, list[float]], dict[str, float]]:
+    """Errors of each output, each over the squared error that counts as one; and the time, where it is measured."""
     errors: dict[str, list[float]] = {"free_run_mse": [], "one_step_mse": []}
     seconds, n_samples = 0.0, 0
     for model in models:
@@ -324,8 +332,11 @@ def _case(
             squared = ((run - target)[counted] ** 2).reshape(-1, len(size))
             errors[name] += list(np.mean(squared, axis=0) / size)
         seconds += _seconds(lambda m=model, u=inputs, h=history: m.simulate(u, h), repeats)  # type: ignore[misc]
-    figures = {name: float(np.mean(values)) for name, values in errors.items()}
-    return figures | ({"run_time_s": seconds, "n_samples": n_samples} if repeats else {})
+    return errors, {"run_time_s": seconds, "n_samples": n_samples} if repeats else {}
+
+
+def _means(errors: Mapping[str, list[float]], more: Mapping[str, float]) -> dict[str, float]:
+    return {**{name: float(np.mean(values)) for name, values in errors.items()}, **more}
 
 
 def _seconds(run: Callable[[], object], repeats: int) -> float:

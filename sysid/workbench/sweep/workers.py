@@ -9,6 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
@@ -193,7 +194,7 @@ class LocalWorkers(AbstractWorkers):
 
     def _begin(self, worker: _Worker, job: Job, before: Mapping[str, Any] | None) -> None:
         worker.job, worker.before = job, before
-        with _one_thread():
+        with _one_thread(), _no_script():
             worker.future = worker.executor.submit(_work, job, before)
 
     def _count_death(self, job: Job) -> None:
@@ -228,6 +229,24 @@ def _leave_with(sentinel: int) -> None:
 
 def _work(job: Job, before: Mapping[str, Any] | None) -> dict[str, Any]:
     return run_job(_BENCH[0], job, before)
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """A process that begins now does not run the user's script again: all that it does is in this package.
+
+    ``spawn`` imports the main module of its parent, by its spec or its file, so that a script without
+    ``if __name__ == "__main__":`` would begin anew in each worker, and find its own folder busy.
+    """
+    main = sys.modules["__main__"]
+    kept = {name: value for name in ("__spec__", "__file__") if (value := getattr(main, name, None)) is not None}
+    for name in kept:
+        setattr(main, name, None)
+    try:
+        yield
+    finally:
+        for name, value in kept.items():
+            setattr(main, name, value)
 
 
 @contextmanager

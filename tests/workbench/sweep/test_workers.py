@@ -117,6 +117,23 @@ def test_a_driver_that_is_killed_takes_its_workers_along() -> None:
     assert not alive(worker)
 
 
+def test_a_script_without_a_guard_is_not_run_again_by_its_workers(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        f"import sys; sys.path.insert(0, {os.path.dirname(__file__)!r})\n"  # noqa: PTH120 - a word in a script
+        "from test_workers import bench, job, LocalWorkers\n"
+        "print('begun', flush=True)\n"
+        "crew = LocalWorkers(bench(), 1); crew.submit(job(1), None)\n"
+        "found = []\n"
+        "while not found: found = crew.finished()\n"
+        "crew.close(); print(found[0][1]['usable'], __file__, flush=True)\n",
+        encoding="utf-8",
+    )
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.splitlines() == ["begun", f"True {script}"]
+    assert done.stderr == ""
+
+
 def alive(pid: int) -> bool:
     try:
         with open(f"/proc/{pid}/stat", encoding="utf-8") as stat:  # noqa: PTH123 - not a file that a path names for long
