@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -175,7 +177,7 @@ class NeuralLayout(AbstractLayout):
         return theta
 
 
-def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
+def linear_start(provider: NeuralProvider, *, until: float = math.inf) -> NDArray[np.float64]:
     """The best linear model of the records in free run, in the parameters of a provider with neurons.
 
     A regression of high order gives an impulse response; the largest singular vectors of its Hankel matrix give the
@@ -184,6 +186,8 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
 
     Args:
         provider: The records, and the sizes wanted.
+        until: When it has to have ended, on the clock of ``time.perf_counter``; what is not fitted by then is taken as
+            it is.
 
     Returns:
         Flat parameters, shape ``(provider.n_parameters,)``; the neurons' are zero.
@@ -196,10 +200,12 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
     )
     linear = replace(provider, template=template)
     with one_blas_thread():  # more threads than one cost more than they give at these sizes
-        begun = [_realised(linear, order) for order in ARX_ORDERS]
-        if s.outputs > 1 and not whole.rectified:
-            begun += _by_subspace(linear)
-        fits = [_fitted(linear, theta) for theta in begun]
+        began, fits = time.perf_counter(), list[NDArray[np.float64]]()
+        for left, order in zip(range(len(ARX_ORDERS), 0, -1), ARX_ORDERS, strict=True):
+            fits.append(_fitted(linear, _realised(linear, order), (until - time.perf_counter()) / (left + 1)))
+        # What it takes cannot be bounded closely: it is left out where the others took most of the time.
+        if s.outputs > 1 and not whole.rectified and until - time.perf_counter() >= time.perf_counter() - began:
+            fits += [_fitted(linear, one, until - time.perf_counter()) for one in _by_subspace(linear, until)]
     theta = _levelled(linear, _unit_states(linear, min(fits, key=linear.loss)))
     base = np.zeros(provider.n_parameters)
     for to, of in ((whole.sizes.linear, s.linear), (whole.sizes.output_linear, s.output), (whole.sizes.start, s.start)):
@@ -208,14 +214,16 @@ def linear_start(provider: NeuralProvider) -> NDArray[np.float64]:
     return base
 
 
-def _by_subspace(provider: NeuralProvider) -> list[NDArray[np.float64]]:
+def _by_subspace(provider: NeuralProvider, until: float) -> list[NDArray[np.float64]]:
     """The state space that a linear fit finds; nothing where the records are too short for it."""
     s = provider.template.sizes
     if s.states > MOST_STATES:
         return []
     orders = LinearStateSpace(states=s.states, feedthrough=True, noise=False)
     try:
-        found = search(provider.segments, orders, StateSpaceTraining(max_iterations=LINEAR_ITERATIONS)).system
+        seconds = max(0.5 * (until - time.perf_counter()), 1e-3)
+        training = StateSpaceTraining(max_iterations=LINEAR_ITERATIONS, max_time_s=seconds)
+        found = search(provider.segments, orders, training).system
     except (UserError, np.linalg.LinAlgError):
         return []
     return [_parameters(provider, (found.A, found.B, found.C, found.D, found.constant))]
@@ -339,10 +347,9 @@ def _simulate(matrices: tuple[NDArray[np.float64], ...], u: NDArray[np.float64])
     return y + constant
 
 
-def _fitted(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    engine = LevenbergMarquardt(
-        termination=Termination(max_iterations=LINEAR_ITERATIONS, tolerance=1e-3), evidence_after=None
-    )
+def _fitted(provider: NeuralProvider, theta: NDArray[np.float64], seconds: float) -> NDArray[np.float64]:
+    termination = Termination(max_iterations=LINEAR_ITERATIONS, tolerance=1e-3, max_time_s=max(seconds, 0.0))
+    engine = LevenbergMarquardt(termination=termination, evidence_after=None)
     everything = Group(name="all", members=np.arange(len(theta)))
     prior = Prior(centre=theta, groups=(everything,), alphas=np.array([FLAT_ALPHA]), beta=1.0)
     return engine.minimise(provider, theta, prior).theta

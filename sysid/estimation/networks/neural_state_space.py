@@ -47,6 +47,9 @@ check_training = partial(check_hidden_states, "a neural state space")
 """Refuses options that do not apply to hidden states."""
 
 
+LINEAR_SHARE, LINEAR_SHARE_GIVEN = 0.3, 0.1
+"""Share of a fit's time that its linear start may take; where a fit is given to begin from it is only what weights are
+drawn to."""
 LEAST_FREE = 0.5
 """Share of a fit's time that its starts have in any case, however long the linear model took that they begin with."""
 
@@ -203,7 +206,8 @@ def _fit(
     experiments, windows = records.experiments, Windows.of(records.experiments, training)
     provider = NeuralProvider(template=template.recursion, experiments=windows.experiments)
     starts.check_samples(provider)
-    base = linear_start(provider)
+    share = LINEAR_SHARE if records.initial is None else LINEAR_SHARE_GIVEN
+    base = linear_start(provider, until=time.perf_counter() + share * training.max_time_s)
     provider = weighed(provider, base)
     multistart = starts.Multistart(
         training=training,

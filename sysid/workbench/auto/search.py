@@ -31,6 +31,9 @@ from sysid.workbench.sweep.workers import AbstractWorkers
 FOUND, LINEAR = "best found", "best linear"
 """Names of the fits that a search hands to the pipeline."""
 TITLE = "Searching for a model"
+CHECKED = 50
+"""Sequences over which a trial's free run is checked, or one for each second of the search where that is more: all of
+them took longer than the training of a short search. The last fit is checked over all."""
 
 
 def stand_in(config: AutoConfig) -> AbstractStructure:
@@ -119,6 +122,10 @@ class Search:
         parts = part(data, config.start, config.wall_s)
         structure = stand_in(config)
         pipeline = config.sweep(structure).pipeline([FitConfig(name=FOUND, structure=structure)])
+        if config.wall_s is not None:
+            count = min(config.stability.count, max(CHECKED, round(config.wall_s)))
+            stability = pipeline.stability.model_copy(update={"count": count})
+            pipeline = pipeline.model_copy(update={"stability": stability})
         first = parts.folds[0]
         bench = Bench(
             folder=run.store.path,

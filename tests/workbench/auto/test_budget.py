@@ -44,6 +44,16 @@ def test_time_is_kept_for_the_last_fit() -> None:
     assert budget(100.0, clock=[100.0 * (1.0 - REFIT) + 1.0]).take([LINEAR]) == []
 
 
+def test_a_kind_that_was_not_tried_yet_is_taken_to_need_a_part_of_its_limit() -> None:
+    """Of many that nobody knows, all at once would take more than there is."""
+    limited = [point(n, 4) for n in range(1, 30)]
+    for one in limited:
+        one.training["max_time_s"] = 10.0
+    found = budget(100.0, refit=0.4, trial=0.1)
+    assert len(found.take(limited)) == 12  # of 5 s, until 60 s are spent
+    assert len(budget(100.0, refit=0.4, trial=0.1, most=0.5).take(limited)) == 6
+
+
 def test_what_is_stored_costs_no_time() -> None:
     found = budget(100.0, clock=[1000.0], is_stored=lambda one: one.number == 1)
     assert [one.number for one in found.take([point(1, 5), point(2, 5)])] == [1]

@@ -86,6 +86,18 @@ def test_a_long_record_is_searched_by_a_part_and_fitted_whole() -> None:
     assert (longer.partial, longer.cut, long.cut) == (True, True, False)
 
 
+def test_a_short_search_looks_at_less_where_selection_traces_choose() -> None:
+    """Networks come to some iterations then; the chosen one is trained on, with all that is fitted."""
+    declared = {Role.SELECTION: record("b", 100, seed=1)}
+    known = data(*(record(name, 4000) for name in "cdefghijkl"), others=declared)
+    for seconds, traces in ((10.0, 2), (100.0, 5), (1000.0, 10), (None, 10)):
+        found = part(known, STARTS[0], seconds)
+        assert sum(map(len, found.folds[0].fitted)) == 4000 * traces
+        assert found.trained_on
+    held_out = part(data(record("a", 3 * 8_000)), STARTS[0], 10.0)
+    assert sum(map(len, held_out.folds[0].fitted)) == 3 * 8_000
+
+
 def test_too_short_a_record_says_what_to_do() -> None:
     with pytest.raises(ConfigError, match="too short for a search") as caught:
         part(data(record("a", 30)), STARTS[0])

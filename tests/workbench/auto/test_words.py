@@ -49,6 +49,20 @@ def test_that_no_network_was_tried_is_said() -> None:
     assert "no nonlinear model does better" not in said
 
 
+def test_what_stays_within_the_tolerance_on_more_traces_comes_before_what_has_the_least_mean() -> None:
+    """A mean hides a trace that fails behind others that are better than they need to be."""
+    shares = {2: [0.009, 0.008, 0.009], 3: [0.001, 0.001, 0.02], 4: [0.03, 0.03, 0.03]}
+    trials = [one.model_copy(update={"selection_rms_shares": shares.get(one.number, [])}) for one in TRIALS]
+    found = choose(trials, error, stable, tolerance=0.01)
+    assert (found.chosen.number, found.least.number) == (2, 2)
+    said = sentence(found, 4, unit="V", ended="", error=error)
+    assert said.startswith("NSS 2/2 has 100% of what chose within 1% of its range, more than any of less error")
+    # Where none stays within it, the error alone chooses, and says so.
+    far = choose(trials, error, stable, tolerance=1e-4)
+    assert (far.chosen.number, far.least.number) == (2, 3)
+    assert "is the smallest within 3%" in sentence(far, 4, unit="V", ended="", error=error)
+
+
 def test_unstable_ones_are_passed_over_and_counted() -> None:
     def not_three(trials: Sequence[Trial]) -> tuple[Trial, int]:
         n = next(place for place, one in enumerate(trials) if one.number not in {2, 3})
