@@ -1,5 +1,6 @@
 """Neural state spaces find systems whose truth is known, and say how."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space, fit_vector_neural_state_space
 from sysid.estimation.experiment import experiments_of
+from sysid.estimation.networks import neural_start
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
 from sysid.estimation.networks.neural_state_space import STARTS
@@ -80,6 +82,20 @@ def test_the_linear_start_is_the_best_linear_model():
     theta = linear_start(provider)
     assert 2.0 * provider.loss(theta) / provider.n_samples < 1e-12
     assert np.abs(np.concatenate(provider.states(theta))).max() == pytest.approx(1.0)
+
+
+def test_the_linear_start_ends_in_its_time(monkeypatch):
+    """Each of its fits has a share of what is left, and one for the subspace."""
+    given = []
+    monkeypatch.setattr(neural_start, "_fitted", lambda _, theta, seconds: given.append(seconds) or theta)
+    trace, sizes = linear(0), NeuralStateSpace(states=2, neurons=3).sizes(1)
+    scaling = Scaling.to_unit_range([trace.columns(["u"])], [trace["y"]])
+    form = NeuralForm(sizes=sizes, theta=np.zeros(sizes.count), scaling=scaling)
+    provider = NeuralProvider(template=form, experiments=experiments_of([trace], MAPPING, MEASURED, 0.0))
+    linear_start(provider, until=time.perf_counter() + 12.0)
+    assert all(0.5 * most < seconds <= most for seconds, most in zip(given, (3.0, 4.0, 6.0), strict=True))
+    linear_start(provider)
+    assert given[3:] == [np.inf] * 3
 
 
 @pytest.mark.parametrize("start", [Start(), MEASURED], ids=["at rest", "measured start"])

@@ -12,14 +12,16 @@ import pytest
 
 import sysid
 from sysid.errors import ConfigError
+from sysid.estimation import estimators
 from sysid.ingest import write_csv
 from sysid.reporting.results import read_results
 from sysid.traces import Role
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.refit import ENOUGH, GONE_ON
+from sysid.workbench.auto.refit import ENOUGH, GONE_ON, _error
 from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto
 from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.cli import run_cli
+from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.events import Event, StepProgress
 from sysid.workbench.sweep.trial import Bench
@@ -64,6 +66,18 @@ def first(tmp_path_factory: pytest.TempPathFactory, known: Data, small: None) ->
     """A search with few iterations."""
     folder = tmp_path_factory.mktemp("auto")
     return folder, searched(folder, known, told=TOLD)
+
+
+def test_a_last_fit_is_judged_by_the_traces_on_which_it_leaves_the_tolerance(known: Data) -> None:
+    """Before its mean error, which one trace that fails hardly moves."""
+    structure = sysid.ARX(na=1, nb=(1,), nk=(1,))
+    config = AutoConfig(**FIELDS).sweep(structure).pipeline([FitConfig(name="lag", structure=structure)])
+    judging = [record(f"bent {bend:g}", 80, seed=2, bend=bend) for bend in (0.01, 3.0)]
+    fit = estimators.fit([record("a", 150, bend=0.01)], config.mapping, structure, start=config.start)
+    free, plain = _error(fit, judging, config, None), _error(fit, judging, config, 0.01)
+    assert free == (0, plain[1])
+    assert plain[0] == 1
+    assert _error(fit, judging, config, 0.9)[0] == 0
 
 
 def test_a_network_is_found_and_stands_beside_the_best_linear_model(first: tuple[Path, Searched]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,15 @@ from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish, proposed
 from sysid.references.design import Design, designed
+from sysid.reporting import report
 from sysid.reporting.judging.results import JudgementRecord
+from sysid.reporting.report import write_report
+from sysid.workbench.auto.families import Family, Try
 from sysid.workbench.cli import run_cli
 from sysid.workbench.experiments.run import Experimented
+from sysid.workbench.surrogates import make
 from sysid.workbench.surrogates.make import beginning_of, restless
-from sysid.workbench.surrogates.plan import pairs
+from sysid.workbench.surrogates.plan import pairs, times
 from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
 
 pytest.importorskip("fmpy")
@@ -95,6 +100,40 @@ def test_a_workspace_that_begins_with_an_fmu_runs(
     assert run_cli(["run", pipeline.stem, "--dry-run"]) == 0
     assert "20 of 20 runs to make" in capsys.readouterr().out.replace("\n", " ")
     assert run_cli(begun) != 0
+
+
+def test_a_search_has_the_time_that_experiments_proof_and_report_leave_and_what_takes_longer_is_told() -> None:
+    given = {"minutes": 5.0, "spent": 20.0, "workers": 2, "pictures": 40}
+    plan = times(0.03, experiments=1000, **given)
+    assert plan.spent + plan.search + plan.finish + plan.proof == 300.0
+    assert plan.sentence(1000).endswith("15 s for 1,000 experiments of the proof.")
+    slow = times(6.0, experiments=1000, **given)
+    assert slow.search == 0.4 * 300.0
+    assert "about 52.9 min in all, more than the 5.0 min that were asked for" in slow.sentence(1000)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_page_of_a_search_is_made_once_and_has_the_proof(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its pictures take longer than all else after a short search."""
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
+    lag = Family(kind="ARX", linear=True, first=lambda _: [Try(structure=sysid.ARX(na=1, nb=(1,), nk=(0,)))])
+    monkeypatch.setattr("sysid.workbench.auto.plan.FAMILIES", (lag,))
+    monkeypatch.setattr("sysid.workbench.auto.plan.suggested", lambda *_, **__: [])
+    made_of: list[Path] = []
+    monkeypatch.setattr(report, "write_report", lambda folder: made_of.append(folder) or write_report(folder))
+    monkeypatch.setattr(make, "write_report", report.write_report)
+    runs = {"estimation": 4, "selection": 2, "test": 1}
+    content = {"kind": "experiment", "name": "lag", "workers": 1, "reference": REFERENCE}
+    content["experiment"] = {"duration": 20.0, "runs": runs}
+    (tmp_path / "lag.yaml").write_text(json.dumps(content), encoding="utf-8")
+    made = sysid.surrogate(tmp_path / "lag.yaml", tmp_path / "out", iterations=20, proof=4)
+    assert made.proof.errors.max() < 1e-9
+    assert made_of == [tmp_path / "out" / "model"]
+    assert "Of 4 new random experiments" in made.report.read_text(encoding="utf-8")
+    # Of another proof the page that is there says nothing.
+    more = sysid.surrogate(tmp_path / "lag.yaml", tmp_path / "out", iterations=20, proof=5)
+    assert len(made_of) == 2
+    assert "Of 5 new random experiments" in more.report.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("text", ["u", "u=3:1", "=1:2", "u=a:b"])
