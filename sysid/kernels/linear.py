@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from sysid.kernels.arrays import copy_numbers
+from sysid.kernels.arrays import copy_numbers, read_only
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -36,9 +37,19 @@ def all_pole(x, c1, c2, past, v):
         v1 = new
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
-def state_space(A, B, C, D, u, x, y):
+def state_space(
+    A: NDArray[np.float64],
+    B: NDArray[np.float64],
+    C: NDArray[np.float64],
+    D: NDArray[np.float64],
+    u: NDArray[np.float64],
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+) -> None:
     """Run ``x(t+1) = A x(t) + B u(t)``, ``y(t) = C x(t) + D u(t)``.
+
+    Callers have their matrices in seven ways of lying in memory; they are laid out in one, so that one kernel is
+    compiled for all of them.
 
     Args:
         A: Shape ``(n_state, n_state)``.
@@ -49,6 +60,11 @@ def state_space(A, B, C, D, u, x, y):
         x: State before the first sample, shape ``(n_state,)``; overwritten by the state after the last one.
         y: Shape ``(n_samples, n_outputs)``, written.
     """
+    _state_space(*(read_only(np.ascontiguousarray(array)) for array in (A, B, C, D, u)), x, y)
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def _state_space(A, B, C, D, u, x, y):
     n, m, k = len(x), u.shape[1], y.shape[1]
     following = np.empty(n)
     for t in range(len(u)):
