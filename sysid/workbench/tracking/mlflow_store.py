@@ -33,7 +33,7 @@ from sysid.workbench.tracking.fit_run import Entities
 from sysid.workbench.tracking.landing import VARIABLE, App, leading_to
 from sysid.workbench.tracking.registry import parsed, register
 from sysid.workbench.tracking.served_table import SEQUENCE_FILE, STATE, flags_column, label, rests
-from sysid.workbench.tracking.sqlite_store import SQLITE, held
+from sysid.workbench.tracking.sqlite_store import SQLITE, held, unhurried_disk
 from sysid.workbench.tracking.sweep_run import TRIALS_TAG
 
 QUIET = {
@@ -103,8 +103,9 @@ def page_app() -> App:
 def _make_store(database: Path) -> None:
     from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
 
-    store = SqlAlchemyStore(f"{SQLITE}{database.as_posix()}", "mlartifacts")
-    store.engine.dispose()
+    with unhurried_disk():
+        store = SqlAlchemyStore(f"{SQLITE}{database.as_posix()}", "mlartifacts")
+        store.engine.dispose()
 
 
 @contextmanager
