@@ -3,9 +3,11 @@
 import copy
 import gc
 import os
+import shutil
 import signal
 from collections.abc import Callable, Iterator
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,6 +18,7 @@ from sysid.names import visible
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data
+from sysid.workbench.tracking import mlflow_store
 
 # An FMU for every desk is one compiler run a desk; the test of that asks for it.
 os.environ.setdefault("SYSID_FMU_PLATFORMS", "own")
@@ -50,13 +53,15 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Scheduling |
 def pytest_collection() -> Iterator[None]:
     """What is imported and collected stays to the end: it is searched for garbage neither now nor at every test.
 
-    A search of it all takes a second, and of tests of reports one second in ten was spent on that.
+    A search of it all takes a second. What tests import themselves was searched often enough to take a tenth of the
+    processor time of those of reports: garbage is looked for a thirtieth as often as is usual.
     """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(20_000, 10, 50)
         gc.enable()
 
 
@@ -98,4 +103,24 @@ def looked_at_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(steps, "look", once)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def tracking_store_made_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Runs of one process share the making of an empty MLflow store, which takes seconds, and get copies of it.
+
+    Programs that tests start make theirs, and ``test_processes_may_touch_a_new_store_at_once`` looks at that.
+    """
+    make, made = mlflow_store._make_store, list[Path]()
+
+    def copied(database: Path) -> None:
+        if not made:
+            first = tmp_path_factory.mktemp("store") / "mlflow.db"
+            make(first)
+            made.append(first)
+        shutil.copyfile(made[0], database)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mlflow_store, "_make_store", copied)
         yield
