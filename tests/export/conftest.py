@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from sysid.export import (
     Surrogate,
     export_bundle,
 )
+from sysid.export.parity import RANDOM_SEQUENCES, random_cases
 from sysid.models import NARX, AbstractModel, Cascade, History, NARXModel, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.units import Reference
@@ -278,9 +280,16 @@ def command() -> TraceSet:
 
 @pytest.fixture(scope="session")
 def cascade_bundle(limited: Cascade, command: TraceSet, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    """A whole cascade in every format but those of torch, which take long, and what lacks here; read-only."""
+    """A whole cascade in every format but those of torch, which take long, and what lacks here; read-only.
+
+    Each is run on the cases and on the first tenth of the random sequences that a user's bundle is: Octave needs half
+    a minute for all of them, and what makes and counts them is looked at in ``test_parity`` and ``test_bundle``.
+    """
+    few = partial(random_cases, sequences=RANDOM_SEQUENCES // 10)
     formats = [name for name, one in EXPORTERS.items() if not name.startswith("torch") and not one.lacks()]
     folder = tmp_path_factory.mktemp("cascade") / "b"
-    return export_bundle(
-        limited, command, folder, formats=formats, metrics=evaluate_cascade(limited, command, repeats=1)
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sysid.export.bundle.random_cases", few)
+        return export_bundle(
+            limited, command, folder, formats=formats, metrics=evaluate_cascade(limited, command, repeats=1)
+        )
