@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.estimation.equilibrium import equilibrium_notes
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining
 from sysid.estimation.linear.state_space.search import StateSpaceTraining
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
@@ -202,7 +204,9 @@ class Estimator:
             warned = (*undetermined(traces, mapping), *outnumbered(found.model, traces), *against, *off)
             return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
 
-        return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
+        # Matrices of a linear fit are small: BLAS threads that wake for them cost more than they give.
+        with one_blas_thread() if self.linear else nullcontext():
+            return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
 
     def with_posterior(
         self, fit: FitResult, traces: Sequence[Trace], start: Start, selection: Sequence[Trace]

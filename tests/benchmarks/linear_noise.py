@@ -22,6 +22,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from sysid.estimation import StateSpaceTraining
 from sysid.estimation.estimators import fit
@@ -156,8 +157,9 @@ def option(name: str, default: int) -> int:
 
 def main() -> None:
     """All of them."""
-    million()
-    three_systems(range(11, 11 + option("seeds", 20)), beside="--without-peers" not in sys.argv)
+    with threadpool_limits(1):  # who runs this may have numpy already
+        million()
+        three_systems(range(11, 11 + option("seeds", 20)), beside="--without-peers" not in sys.argv)
 
 
 if __name__ == "__main__":

@@ -10,13 +10,13 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from threadpoolctl import threadpool_limits
 
 from sysid.errors import ConfigError, FitDivergedError, TraceError
 from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.coloured_errors import sandwich
@@ -104,7 +104,7 @@ def fit_polynomial(
     _check(orders, experiments)
     scaling = scaling_of(experiments, constant=orders.intercept or orders.drifts)
     segments = segments_of(experiments, scaling)
-    with threadpool_limits(1, "blas"):  # threads that wake for such small matrices cost more than they give
+    with one_blas_thread():  # threads that wake for such small matrices cost more than they give
         errors, solution = _search(segments, orders, training, began + training.max_time_s)
         at = errors.linearise(solution.theta)
         system = errors.chart.system(solution.theta)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from sysid.errors import TraceError, UserError
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.delay_search import searched_delays
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.search import StateSpaceTraining, quick_size
@@ -43,7 +43,7 @@ def behind_dead_times(
     looked = [segment.first(ENOUGH) for segment in segments]
     most = longest_dead_time([len(one) for one in looked]) if training.max_delay is None else training.max_delay
     least, most = orders.shortest, max(orders.shortest, most)
-    with threadpool_limits(1, "blas"):
+    with one_blas_thread():
 
         def loss(delays: tuple[int, ...], unknown: int) -> float:
             tried = replace(orders, nk=delays)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.state_space.fit import records_of
 from sysid.estimation.linear.subspace.starts import Subspace
 from sysid.models import LinearStateSpace, Mapping, Start, StartKind
@@ -60,6 +60,6 @@ def state_orders(
     _, segments = records_of(
         traces, mapping, structure, start=Start(kind=StartKind.ESTIMATED), rests=(0.0,) * len(mapping.outputs)
     )
-    with threadpool_limits(1, "blas"):
+    with one_blas_thread():
         subspace = Subspace.of(segments, states=most, horizon=horizon, feedthrough=feedthrough, noise=True)
         return StateOrders(correlations=subspace.singular_values(), chosen=subspace.order(most), most=most)

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from threadpoolctl import threadpool_limits
 
 from sysid.errors import ConfigError, FitDivergedError
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.colour import coloured
@@ -30,7 +30,7 @@ from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import ENOUGH, Subspace
 from sysid.estimation.linear.subspace.system import EDGE, stabilised
-from sysid.estimation.linear.subspace.yardstick import clearly_worse
+from sysid.estimation.linear.subspace.yardstick import beyond_chance
 from sysid.estimation.result import Status
 from sysid.models import LinearStateSpace
 from sysid.models.innovations import Innovations
@@ -49,8 +49,8 @@ POLES, LITTLE, CLEARLY = (0.0, 0.5, 0.9, 0.97, -0.5), 0.1, 1e-6
 QUICK = 4
 """Steps after which dead times are compared, from one subspace estimate: that which feedback does not bias."""
 FINE, COARSE, CHART = 1e-9, 1e-4, 1e3
-"""Share of the loss that a step has to gain: of a fit, and where it is asked whether a state less would do; how many
-times that a chart has to gain for another to be laid."""
+"""Share of the loss that a step has to gain: of a fit, and at least where it is asked whether a state less would do;
+how many times that a chart has to gain for another to be laid."""
 CHARTS = 6
 """Charts that are laid at most."""
 
@@ -151,8 +151,7 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         FitDivergedError: If no start gives a finite prediction.
     """
     began, whole = time.perf_counter(), _whole(segments, orders)
-    # BLAS threads that wake for matrices of this size cost more than they give.
-    with threadpool_limits(1, "blas"):
+    with one_blas_thread():
         subspace = Subspace.of(
             segments, states=orders.states, horizon=training.horizon, feedthrough=orders.feedthrough, noise=orders.noise
         )
@@ -217,7 +216,7 @@ def around(system: Innovations, segments: Sequence[Segment], orders: LinearState
     Returns:
         What :func:`search` found, but for how it went.
     """
-    with threadpool_limits(1, "blas"):
+    with one_blas_thread():
         problem = _Problem(segments=_whole(segments, orders), orders=orders, stable=False)
         return problem.with_colour(problem.at(system))
 
@@ -302,17 +301,22 @@ class _Problem:
         return replace(other, weighting=lower.weighting) if better else found
 
     def hopeless(self, found: Found, subspace: Subspace, weighting: str, iterations: int, until: float) -> bool:
-        """Whether these fewer states need not be looked into: what was found with more leaves next to nothing."""
+        """Whether these fewer states need not be looked into: what was found with more leaves next to nothing.
+
+        They are given up where the gap would not be closed in all iterations at the rate of the last steps.
+        """
         if not subspace.yardstick.reached(found.covariance, found.chart.n_parameters):
             return False
         start, seconds = self.start(subspace, weighting)[0], until - time.perf_counter()
-        lower = self.refined(start, iterations, seconds, tolerance=COARSE)
-        return clearly_worse(
-            _size(lower.covariance),
-            _size(found.covariance),
-            n_rows=sum(self.lengths),
-            n_parameters=found.chart.n_parameters - lower.chart.n_parameters,
-        )
+
+        def behind(lower: Found) -> float:
+            fewer = found.chart.n_parameters - lower.chart.n_parameters
+            size, than = _size(lower.covariance), _size(found.covariance)
+            return beyond_chance(size, than, n_rows=sum(self.lengths), n_parameters=fewer)
+
+        missing = -np.expm1(-max(behind(self.at(start)), 0.0) / start.n_outputs)
+        lower = self.refined(start, iterations, seconds, tolerance=max(COARSE, missing / iterations))
+        return behind(lower) > 0.0
 
     def _widened(self, system: Innovations) -> tuple[float, Innovations] | None:
         """A system with one more state, of the pole that helps most; and its loss."""

@@ -76,8 +76,8 @@ class Yardstick:
         return bool(self.n_rows * (size - self.size) <= chdtri(more, CHANCE))
 
 
-def clearly_worse(size: float, than: float, *, n_rows: int, n_parameters: int) -> bool:
-    """Whether a model with fewer coefficients leaves more than chance would take away with the others.
+def beyond_chance(size: float, than: float, *, n_rows: int, n_parameters: int) -> float:
+    """How much more a model with fewer coefficients leaves than chance would take away with the others.
 
     Args:
         size: Logarithm of the determinant of the covariance of its errors.
@@ -86,6 +86,7 @@ def clearly_worse(size: float, than: float, *, n_rows: int, n_parameters: int) -
         n_parameters: How many coefficients it has less.
 
     Returns:
-        Whether it does, by the test of the likelihood ratio.
+        What is left of the difference of the logarithms, by the test of the likelihood ratio; the model is clearly
+        worse where it is positive.
     """
-    return bool(n_rows * (size - than) > chdtri(max(n_parameters, 1), CHANCE))
+    return float(size - than - chdtri(max(n_parameters, 1), CHANCE) / n_rows)

@@ -8,7 +8,7 @@ from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
 from sysid.estimation.linear.subspace.starts import Subspace
 from sysid.estimation.linear.subspace.windows import Windows
-from sysid.estimation.linear.subspace.yardstick import Yardstick, clearly_worse
+from sysid.estimation.linear.subspace.yardstick import Yardstick, beyond_chance
 from sysid.models import LinearStateSpace
 
 
@@ -54,5 +54,6 @@ def test_a_model_as_long_as_the_arx_model_is_never_called_good_enough() -> None:
 
 def test_the_test_of_the_likelihood_ratio_has_its_known_bound() -> None:
     """3.84 is the 95 % point of chi-square with one degree of freedom."""
-    assert not clearly_worse(0.0383, 0.0, n_rows=100, n_parameters=1)
-    assert clearly_worse(0.0386, 0.0, n_rows=100, n_parameters=1)
+    assert beyond_chance(0.0383, 0.0, n_rows=100, n_parameters=1) < 0.0
+    assert beyond_chance(0.0386, 0.0, n_rows=100, n_parameters=1) > 0.0
+    assert beyond_chance(1.0384, 0.0, n_rows=100, n_parameters=1) == pytest.approx(1.0, abs=1e-4)
