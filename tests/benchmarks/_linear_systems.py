@@ -54,6 +54,50 @@ def systems(seed: int) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     return found | {"mimo": (u, y, clean)}
 
 
+REST = 30
+"""Samples at rest that a record for comparison begins with, so that nobody has initial states to argue about."""
+POLYNOMIALS = {"b": [0.0, 1.0, 0.5], "f": [1.0, -1.5, 0.7], "c": [1.0, 0.4]}
+
+THREE_STATES = (
+    np.array([[0.8, 0.3, 0.0], [-0.3, 0.6, 0.1], [0.0, 0.0, 0.4]]),
+    np.array([[1.0, 0.2], [-0.4, 0.9], [0.7, -0.5]]),
+    np.array([[1.0, 0.3, -0.6], [0.2, 1.1, 0.8]]),
+)
+"""``A``, ``B``, ``C`` of two inputs and two outputs."""
+
+
+def same_estimate(seed: int = 0, n: int = 1_000) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Records on which two tools have to find the same, since they define the same estimate there.
+
+    Args:
+        seed: Of inputs and noise.
+        n: Samples.
+
+    Returns:
+        Inputs and outputs, shape ``(n, n_channels)``, by name: systems of the second order with their own noise, and
+        two inputs and two outputs of three states without any.
+    """
+    rng = np.random.default_rng(seed)
+    u, e = np.sign(rng.normal(size=n)), 0.3 * rng.normal(size=n)
+    u[:REST] = e[:REST] = 0.0
+    b, f, c = (POLYNOMIALS[name] for name in "bfc")
+    clean = lfilter(b, f, u)
+    noise = {"ARX": lfilter([1.0], f, e), "OE": e, "ARMAX": lfilter(c, f, e)}
+    found = {name: (u[:, None], (clean + v)[:, None]) for name, v in noise.items()}
+    inputs, y = np.sign(rng.normal(size=(n, 2))), np.zeros((n, 2))
+    A, B, C = THREE_STATES
+    x = np.zeros(3)
+    for t in range(n):
+        y[t] = C @ x
+        x = A @ x + B @ inputs[t]
+    return found | {"2x2": (inputs, y)}
+
+
+def impulse_response(A: np.ndarray, B: np.ndarray, C: np.ndarray, lags: int = 20) -> np.ndarray:
+    """The impulse response of a state space, flat."""
+    return np.ravel([C @ np.linalg.matrix_power(A, k) @ B for k in range(lags)])
+
+
 def fit_percent(clean: np.ndarray, run: np.ndarray) -> float:
     """Fit on the part without noise, in percent; the mean over outputs."""
     y, yh = clean[SAMPLES:], np.asarray(run)[SAMPLES:]
