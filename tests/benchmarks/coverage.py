@@ -175,7 +175,8 @@ STRUCTURES: dict[str, Known] = {
     "SS without noise model of coloured noise": _polynomial(
         LinearStateSpace(states=2, noise=False), COLOURED, TOLD, told=PLANT
     ),
-    "BJ of two inputs": _polynomial(PAIR_OF_BJ, PAIR_OF_BJ, [*PAIR, 0.5, -0.9]),
+    "BJ of two inputs": _polynomial(PAIR_OF_BJ, PAIR_OF_BJ, [*PAIR, 0.5, -0.6]),
+    "BJ of two inputs, plant and noise of one pole": _polynomial(PAIR_OF_BJ, PAIR_OF_BJ, [*PAIR, 0.5, -0.9]),
     "BJ with dead time 6": _polynomial(replace(COLOURED, nk=6), replace(COLOURED, nk=6), TOLD),
     "OE with dead time 6": _polynomial(replace(OUTPUT_ERROR, nk=6), replace(OUTPUT_ERROR, nk=6), PLANT),
     "OE of two inputs": _polynomial(MISO, MISO, PAIR),
