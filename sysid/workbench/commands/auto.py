@@ -10,11 +10,13 @@ from sysid.api.fitting import load
 from sysid.api.looking import mapping_of
 from sysid.names import slug
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.finish import finish_s, span
 from sysid.workbench.auto.run import auto_of, program_of
 from sysid.workbench.commands.simulate import parse_start
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.listeners import perform
+from sysid.workbench.runner.console import console
 from sysid.yaml_files import check
 
 
@@ -42,6 +44,12 @@ def auto_command(source: str, *, given: Mapping[str, Any], fresh: bool, out: Pat
     name = f"auto-{slug(traces.name)}"
     config = check(AutoConfig, {"kind": "auto", "name": name, "data": source, **options}, where="sysid auto")
     data = data_of(traces, config.mapping)
+    if config.wall_s is not None:
+        finish = finish_s(len(data.traces), len(config.mapping.outputs))
+        said = (
+            f"Time: {span(config.wall_s)} for a model at most, then about {span(finish)} for scores, export and report."
+        )
+        console().print(said, soft_wrap=True, markup=False)
     words = [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
     request = RunRequest(path=Path(source), typed=source, options=tuple(words), fresh=fresh, out=out, tracking=tracking)
     return perform(program_of(auto_of(config, load=lambda: data), verb="auto"), request)

@@ -28,6 +28,7 @@ from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.finish import finish_s
 from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import MOVED, in_motion, span_of
 from sysid.workbench.auto.run import Searched, auto_of
@@ -188,12 +189,12 @@ class _Work:
 
     def planned(self, found: Experimented, *, minutes: float, spent: float, proof: int | None) -> tuple[Times, int]:
         """How the time is spent, and of how many experiments the proof is."""
-        workers, pictures = self.config.workers, len(found.traces) * len(self.mapping.outputs)
+        workers, finish = self.config.workers, finish_s(len(found.traces), len(self.mapping.outputs))
         with ReferenceRuns(config=self.reference) as runs:
             each = runs.seconds_each()[0]
         each = self.reference.time_limit if each is None else max(each, 1e-3)
         count = proof or int(np.clip(RUNNING * 60.0 * minutes * workers / each, 20, PROOF))
-        found_out = times(each, minutes=minutes, spent=spent, experiments=count, workers=workers, pictures=pictures)
+        found_out = times(each, minutes=minutes, spent=spent, experiments=count, workers=workers, finish=finish)
         return found_out, count
 
     def searched(self, found: Experimented, minutes: float, before_page: Callable[[], object] | None) -> Searched:

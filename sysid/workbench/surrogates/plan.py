@@ -13,6 +13,7 @@ from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish, proposed
 from sysid.references.design import Counts, Design, drawn
 from sysid.references.runs import ReferenceRuns
+from sysid.workbench.auto.finish import span
 from sysid.workbench.auto.parts import SEARCHED
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.runner.store import write_bytes
@@ -22,8 +23,6 @@ RUNNING = 0.2
 """Share of the time in which the reference is run for data; as much again for the proof."""
 SEARCHING = 0.4
 """Share of the time in which a model is looked for at least, whatever the rest takes."""
-FINISHING_S, PICTURE_S = 15.0, 0.25
-"""Seconds that scores, export and what has to be loaded for them take, and each picture of the report."""
 KNOWN = """\
 # A search finds smooth maps, and a model that jumps at events (a velocity that flips, a state that is reset) is none.
 # Where you know what happens, write it, and it is fitted in place of the search (docs/how/events.md):
@@ -154,23 +153,19 @@ class Times:
             One sentence; another where it takes longer than was asked for.
         """
         said = (
-            f"Time: {_minutes(self.spent)} so far, {_minutes(self.search)} for a model, {_minutes(self.finish)} for "
-            f"scores, export and report, {_minutes(self.proof)} for {experiments:,} experiments of the proof"
+            f"Time: {span(self.spent)} so far, {span(self.search)} for a model, {span(self.finish)} for "
+            f"scores, export and report, {span(self.proof)} for {experiments:,} experiments of the proof"
         )
         whole = self.spent + self.search + self.proof + self.finish
         if whole <= 1.05 * self.whole:
             return f"{said}."
         return (
-            f"{said}: about {_minutes(whole)} in all, more than the {_minutes(self.whole)} that were asked for. Fewer "
-            "experiments of the proof (--proof) and fewer of selection and test, which are drawn, take less."
+            f"{said}: about {span(whole)} in all, more than the {span(self.whole)} that were asked for. Fewer "
+            "experiments of the proof (--proof), and fewer that the report draws, take less."
         )
 
 
-def _minutes(seconds: float) -> str:
-    return f"{seconds / 60.0:.1f} min" if seconds >= 90.0 else f"{seconds:.0f} s"
-
-
-def times(each: float, *, minutes: float, spent: float, experiments: int, workers: int, pictures: int) -> Times:
+def times(each: float, *, minutes: float, spent: float, experiments: int, workers: int, finish: float) -> Times:
     """How the time of a surrogate is spent, once its experiments are there.
 
     Args:
@@ -179,19 +174,18 @@ def times(each: float, *, minutes: float, spent: float, experiments: int, worker
         spent: Seconds until now.
         experiments: Of the proof.
         workers: Processes.
-        pictures: Records that the report draws, each output of each for itself.
+        finish: Seconds of scores, export and report.
 
     Returns:
         The times.
 
     Example:
-        >>> found = times(0.03, minutes=5.0, spent=4.0, experiments=1000, workers=2, pictures=40)
-        >>> found.search, found.finish, found.proof
-        (246.0, 35.0, 15.0)
-        >>> times(6.0, minutes=5.0, spent=60.0, experiments=1000, workers=2, pictures=40).search
+        >>> found = times(0.03, minutes=5.0, spent=4.0, experiments=1000, workers=2, finish=35.0)
+        >>> found.search, found.proof
+        (246.0, 15.0)
+        >>> times(6.0, minutes=5.0, spent=60.0, experiments=1000, workers=2, finish=35.0).search
         120.0
     """
-    finish = FINISHING_S + 2.0 * PICTURE_S * pictures  # a gallery of all models, and each model by itself
     return Times(whole=60.0 * minutes, spent=spent, proof=experiments * each / workers, finish=finish)
 
 

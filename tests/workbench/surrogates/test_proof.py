@@ -103,7 +103,7 @@ def test_a_workspace_that_begins_with_an_fmu_runs(
 
 
 def test_a_search_has_the_time_that_experiments_proof_and_report_leave_and_what_takes_longer_is_told() -> None:
-    given = {"minutes": 5.0, "spent": 20.0, "workers": 2, "pictures": 40}
+    given = {"minutes": 5.0, "spent": 20.0, "workers": 2, "finish": 35.0}
     plan = times(0.03, experiments=1000, **given)
     assert plan.spent + plan.search + plan.finish + plan.proof == 300.0
     assert plan.sentence(1000).endswith("15 s for 1,000 experiments of the proof.")

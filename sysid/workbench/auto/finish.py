@@ -1,0 +1,57 @@
+"""What a search takes once its model is found: scores, export and report. They are not bounded, and told before."""
+
+from __future__ import annotations
+
+import time
+
+FINISHING_S, PICTURE_S = 15.0, 0.25
+"""Processor seconds that scores, export and what has to be loaded for them take, and each picture of the report."""
+PROBE_S, MOST = 0.2, 10.0
+"""Processor seconds for which the machine is looked at, and how much slower it may be found at most."""
+
+
+def finish_s(records: int, outputs: int, *, slowed: float | None = None) -> float:
+    """About how long scores, export and report take.
+
+    Args:
+        records: That the report draws.
+        outputs: Of each.
+        slowed: How many times as long a second of work takes; measured now by default.
+
+    Returns:
+        Seconds by the clock.
+
+    Example:
+        >>> finish_s(20, 2, slowed=1.0)
+        35.0
+    """
+    pictures = 2.0 * records * outputs  # a gallery of all models, and each model by itself
+    return (slowness() if slowed is None else slowed) * (FINISHING_S + PICTURE_S * pictures)
+
+
+def slowness() -> float:
+    """How many seconds by the clock a second of this process's work takes, beside what else the machine does.
+
+    Returns:
+        1 on a quiet machine.
+    """
+    wall, cpu = time.perf_counter(), time.process_time()
+    while (worked := time.process_time() - cpu) < PROBE_S:
+        pass
+    return min(max(1.0, (time.perf_counter() - wall) / worked), MOST)
+
+
+def span(seconds: float) -> str:
+    """A time in words.
+
+    Args:
+        seconds: The time.
+
+    Returns:
+        Minutes, or seconds of less than one and a half.
+
+    Example:
+        >>> span(200.0), span(35.0)
+        ('3.3 min', '35 s')
+    """
+    return f"{seconds / 60.0:.1f} min" if seconds >= 90.0 else f"{seconds:.0f} s"
