@@ -25,10 +25,11 @@ is taken, and records without any can show that a run stays bounded, not where i
 
 from __future__ import annotations
 
+import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
@@ -46,6 +47,9 @@ AT_REST = 0.05
 
 KEPT = 0.1
 """Share of an output's range away from where records began at which it has stood under the same inputs: it stays."""
+
+MOST_KEPT = 32_000_000
+"""Bytes of the sequences of one set of records that are kept for further fits to it."""
 
 CANDIDATES = 128
 """Places that are looked at for the next passage; the closest is taken. More of them make smaller jumps and fewer
@@ -122,6 +126,17 @@ class AbstractSequences(ABC):
         """
 
 
+@lru_cache(maxsize=4)
+def _kept(content: bytes, n_inputs: int, seed: int) -> dict[int, InputSequence]:
+    """Sequences of the same records that were drawn before, by their number.
+
+    Every fit of a pipeline is checked over the same ones, and its export again; to draw 1,000 takes longer than to run
+    a linear model over them.
+    """
+    del content, n_inputs, seed
+    return {}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Excursions(AbstractSequences):
     """Passages of records, joined where they match.
@@ -183,6 +198,25 @@ class Excursions(AbstractSequences):
         )
         object.__setattr__(self, "_firsts", firsts)
         object.__setattr__(self, "_group", self._groups())
+
+    @cached_property
+    def _content(self) -> bytes:
+        """What the sequences depend on, beside their seed and number and which columns are inputs."""
+        content = hashlib.blake2b(repr((self.samples, self.passage, self.hold, self.warp)).encode())
+        for record in self.records:
+            content.update(repr(record.shape).encode() + record.astype("<f8", copy=False).tobytes())
+        return content.digest()
+
+    @cached_property
+    def _places(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Of each group the rows at which a passage may begin, and those from which a plateau is reached."""
+        found = []
+        for group in range(int(self._group.max()) + 1):
+            alike = self._group == group
+            long = alike & (self._left > self.passage[0])
+            long = long if long.any() else alike & (self._left > 1)
+            found.append((np.flatnonzero(long), np.flatnonzero(alike & (self._to_plateau >= 0))))
+        return found
 
     @cached_property
     def _fixed(self) -> list[int]:
@@ -264,23 +298,30 @@ class Excursions(AbstractSequences):
         """The sequences; each depends on the seed and its own number alone."""
         low, high = self._rows.min(axis=0), self._rows.max(axis=0)
         m = len(self.inputs)
+        kept = _kept(self._content, m, seed)
         for number in range(count):
+            if number in kept:
+                yield kept[number]
+                continue
             rows, held = self._sequence(np.random.default_rng([seed, number]))
             rows = np.clip(rows, low, high)
             rows[:, self._fixed] = rows[0, self._fixed]  # to the last bit, whatever interpolation has rounded
             judged = np.zeros(len(rows), dtype=bool)
             if held:
                 judged[len(rows) - max(1, held // 10) :] = True
-            yield InputSequence(name=f"sequence {number + 1}", inputs=rows[:, :m], targets=rows[:, m:], judged=judged)
+            for array in (rows, judged):
+                array.setflags(write=False)
+            drawn = InputSequence(name=f"sequence {number + 1}", inputs=rows[:, :m], targets=rows[:, m:], judged=judged)
+            if (len(kept) + 1) * rows.nbytes <= MOST_KEPT:
+                kept[number] = drawn
+            yield drawn
 
     def _sequence(self, rng: np.random.Generator) -> tuple[NDArray[np.float64], int]:
         """Rows of inputs and outputs, and how many of them at the end are held."""
         at = int(rng.choice(self._firsts))
         parts: list[NDArray[np.float64]] = []
         total = 0
-        alike = self._group == self._group[at]
-        long = alike & (self._left > self.passage[0])
-        long = long if long.any() else alike & (self._left > 1)
+        long, ends = self._places[self._group[at]]
         while total < self.samples:
             if parts:
                 at = self._match(rng, at, long)
@@ -290,8 +331,7 @@ class Excursions(AbstractSequences):
             parts.append(_led_over(parts[-1][-1], part, self.passage[0]) if parts else part)
             at += int(span)
             total += len(part)
-        ends = alike & (self._to_plateau >= 0)
-        if not ends.any():
+        if not len(ends):
             return np.concatenate(parts), 0
         at = self._match(rng, at, ends)
         rest = int(self._to_plateau[at])
@@ -305,9 +345,8 @@ class Excursions(AbstractSequences):
         ]
         return np.concatenate(parts), self.hold
 
-    def _match(self, rng: np.random.Generator, end: int, allowed: NDArray[np.bool_]) -> int:
-        """A place like the one where a passage ended, but not that one."""
-        places = np.flatnonzero(allowed)
+    def _match(self, rng: np.random.Generator, end: int, places: NDArray[np.int64]) -> int:
+        """Of some places one like that where a passage ended, but not that one."""
         drawn = places[rng.integers(0, len(places), CANDIDATES)]
         away = np.sum((self._features[drawn] - self._features[min(end, len(self._features) - 1)]) ** 2, axis=1)
         near = np.abs(drawn - end) < self.passage[0]
@@ -315,7 +354,9 @@ class Excursions(AbstractSequences):
 
     def _passage(self, at: int, span: float, count: int) -> NDArray[np.float64]:
         """Rows from ``at`` over ``span`` samples, read at ``count`` even places."""
-        where = at + np.linspace(0.0, span, count)
+        where = np.arange(count) * (span / (count - 1))  # as linspace has it, which takes twice as long
+        where[-1] = span
+        where += at
         below = np.minimum(where.astype(np.int64), len(self._rows) - 2)
         share = (where - below)[:, None]
         return np.asarray((1.0 - share) * self._rows[below] + share * self._rows[below + 1])
