@@ -7,6 +7,7 @@ import sysid
 
 project = "System-identification workbench"
 author = "The system-identification workbench developers"
+copyright = author  # noqa: A001 - the name that Sphinx asks for
 release = version = sysid.__version__
 extensions = [
     "myst_nb",
@@ -55,6 +56,15 @@ ACCESSIBLE = {
     '<label class="overlay ': '<label aria-hidden="true" class="overlay ',
     '<div class="highlight"><pre>': '<div class="highlight"><pre tabindex="0">',
     '<div class="table-wrapper ': '<div tabindex="0" class="table-wrapper ',
+    '<th class="head"><p></p></th>': "<td></td>",
+    '<div id="search-results"></div>': '<h1>Search</h1>\n<div id="search-results"></div>',
+}
+
+# The same in what notebooks print: text of ours, the corner of a pandas frame, grey words of Rich.
+OUTPUTS = {
+    '<div class="output text_html"><pre': '<div class="output text_html"><pre tabindex="0"',
+    "<th></th>": "<td></td>",
+    "color: #7f7f7f; text-decoration-color: #7f7f7f": "color: inherit",
 }
 
 
@@ -65,7 +75,7 @@ def setup(app):
         if error is None and app.builder.format == "html":
             for page in Path(app.outdir).rglob("*.html"):
                 text = page.read_text(encoding="utf-8")
-                for theirs, ours in ACCESSIBLE.items():
+                for theirs, ours in (ACCESSIBLE | OUTPUTS).items():
                     text = text.replace(theirs, ours)
                 page.write_text(text, encoding="utf-8")
 

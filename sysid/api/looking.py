@@ -6,11 +6,11 @@ import dataclasses
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid import advice as room
+from sysid.api.notebook import html_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.estimation.nonparametric import impulse, response
@@ -84,7 +84,7 @@ class Advice(room.Advice):
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+        return html_of(self)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -114,7 +114,7 @@ class SystemAdvice:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+        return html_of(self)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

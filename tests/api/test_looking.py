@@ -24,6 +24,7 @@ def test_advice_prints_what_was_found_and_draws_it() -> None:
     found = sysid.advise(traces(), "u -> y")
     assert "acts after 2 samples" in str(found)
     assert str(found) in found._repr_html_().replace("&gt;", ">")
+    assert "pre-wrap" in found._repr_html_(), "on a phone nothing is cut off"
     assert set(found.to_frame()["verdict"]) <= {"fine", "worth knowing", "look at this", "cannot be said", ""}
     assert len(found.plot().axes) == 3
 

@@ -92,7 +92,10 @@ def test_two_fits_are_compared_with_their_pictures_side_by_side(page, address, p
         box.check()
     page.get_by_role("button", name="Compare", exact=True).click()
     page.get_by_text("Comparing 2 Runs from 1 Experiment").wait_for()
+    page.locator(".js-plotly-plot .parcoords").first.wait_for()
     picture("comparison")
+    assert not page.get_by_text("unknown", exact=True).first.is_visible(), "an axis that only one of them has"
+    assert page.get_by_text("cm²").first.is_visible(), "the unit of the errors"
     page.get_by_text(f"target and output - {CASE}.png").first.click()
     page.wait_for_function(f"{PICTURES}.length === 2")
     page.get_by_text(f"target and output - {CASE}.png").first.scroll_into_view_if_needed()

@@ -6,12 +6,12 @@ import tempfile
 from collections.abc import Mapping as Dict
 from contextlib import nullcontext
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.api.fits import Fit, SystemFit
 from sysid.api.looking import mapping_of
+from sysid.api.notebook import html_of
 from sysid.errors import ConfigError
 from sysid.extras import need
 from sysid.models import Mapping, Start, StartKind, StartLike
@@ -83,7 +83,7 @@ class AutoSearch:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
+        return html_of(self)
 
 
 def auto(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sysid.names import distinct, markdown_code, markdown_inline, shortened, tracking_key, tracking_text, visible
 from sysid.traces import Role
+from sysid.units import squared
 from sysid.validation.metrics import MERITS, mean_fit
 from sysid.workbench.runner.events import DataLoaded, FitReady, RunStarted
 
@@ -111,7 +112,16 @@ def parameters(ready: FitReady) -> dict[str, str]:
         Texts by name.
     """
     structure = ready.fit.model.structure.to_dict()
-    chosen: dict[str, Any] = {"mapping": ready.pipeline.mapping, "start": ready.pipeline.start.kind.value, **structure}
+    # MLflow's page of a comparison draws the first three names of the alphabet: those stand for every fit, so that none
+    # of them is "unknown" between two structures.
+    chosen: dict[str, Any] = {
+        "data": str(ready.pipeline.data),
+        "error_unit": squared(ready.unit),
+        "estimation_loop": ready.fit.loop.value,
+        "mapping": ready.pipeline.mapping,
+        "start": ready.pipeline.start.kind.value,
+        **structure,
+    }
     training = ready.config.training_options(ready.pipeline.seed)
     if training is not None:
         chosen |= {f"training.{name}": getattr(value, "value", value) for name, value in vars(training).items()}
