@@ -63,7 +63,15 @@ def test_matlab_s_workflow_runs_as_the_page_tells_it(
     assert float(told.splitlines()[-1].split()[-1]) == 100.0
 
 
-@pytest.mark.parametrize("page", sorted(ROOT.glob("docs/gallery/*.md")), ids=name_of)
+LONG = {"sweep", "fmu-surrogate"}
+"""Notebooks that run a whole pipeline, with its report, or compile an FMU twice."""
+GALLERY = [
+    pytest.param(page, id=name_of(page), marks=[pytest.mark.slow] if page.stem in LONG else [])
+    for page in sorted(ROOT.glob("docs/gallery/*.md"))
+]
+
+
+@pytest.mark.parametrize("page", GALLERY)
 def test_a_notebook_of_the_gallery_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.chdir(page.parent)

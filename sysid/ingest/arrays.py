@@ -210,7 +210,7 @@ def inputs_of(values: Any, names: tuple[str, ...], *, sample_time: float | None 
     if bad.any():
         row, column = (int(index) for index in np.argwhere(bad)[0])
         raise TraceError(
-            f"{int(bad.sum())} values are missing",
+            "a value is missing" if bad.sum() == 1 else f"{int(bad.sum())} values are missing",
             where=f"{where}, channel {names[column]}, sample {row}",
             expected="a finite number in each sample: a free run has nothing else to go by",
             got=f"{found[row, column]}",

@@ -38,7 +38,9 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None) -> str:
             or "time alone",
             remedy="choose another file, or read it with other options",
         )
-    name = finding.path.stem
+    # A data set under datasets/ is called by its folder, whatever the file is called.
+    place = finding.path if folder is None else folder.resolve()
+    name = place.name if place.parent.name == "datasets" and folder is not None else finding.path.stem
     lines = [
         f"# Proposed from {_comment(finding.path.name)}. Check what is marked 'guessed' before you rely on it.",
         f"name: {_text(name)}",

@@ -245,7 +245,7 @@ def _check_missing(record: Record, missing: NDArray[np.bool_], name: str, repair
         )
     if repair is None:
         raise TraceError(
-            f"{int(missing.sum())} values are missing",
+            "a value is missing" if missing.sum() == 1 else f"{int(missing.sum())} values are missing",
             where=record.where(first, name),
             expected="a finite number in each sample",
             got=got,

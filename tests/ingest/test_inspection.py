@@ -57,6 +57,12 @@ def test_units_references_and_time_are_guessed_and_marked(write: Write) -> None:
     assert proposed(path)["run"]["valve"].tolist() == [float(i % 3) for i in range(20)]
 
 
+def test_a_data_set_is_called_as_its_folder_is(tmp_path: Path, write: Write) -> None:
+    found = inspect_file(write("run.csv", "t [s],u,y\n" + rows(20, lambda i: f"{i},{i % 3},{i}")))
+    assert "name: rig\n" in propose_dataset(found, folder=tmp_path / "datasets" / "rig"), "as `sysid run` finds it"
+    assert "name: run\n" in propose_dataset(found, folder=tmp_path / "elsewhere")
+
+
 def test_every_problem_is_told_and_its_repair_proposed(write: Write) -> None:
     stamps = [0, 1, 2, 3, 3, 4, 6, 5, 7, 8, 12, 13, 14.3, 15, 16, 17, 18, 19, 20]
     cells = [f"{t};{i};7;{'' if i == 2 else i}" for i, t in enumerate(stamps)]

@@ -54,7 +54,7 @@ REFUSED: dict[str, Refused] = {
     "infinite values": (
         {"values": [float("inf"), *map(float, range(1, N))]},
         TraceError,
-        r"1 values are missing.*sample 0.*finite.*got: +inf",
+        r"a value is missing.*sample 0.*finite.*got: +inf",
     ),
     "missing values at the end": (
         {"values": [*map(float, range(N - 1)), NAN], "repairs": {"nan": "interpolate"}},

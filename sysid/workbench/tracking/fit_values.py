@@ -112,12 +112,15 @@ def parameters(ready: FitReady) -> dict[str, str]:
         Texts by name.
     """
     structure = ready.fit.model.structure.to_dict()
-    # MLflow's page of a comparison draws the first three names of the alphabet: those stand for every fit, so that none
-    # of them is "unknown" between two structures.
+    # MLflow's page of a comparison draws the first three names of the alphabet that differ. These stand for every fit,
+    # so that none of them is "unknown" between two structures.
+    model = ready.fit.model
     chosen: dict[str, Any] = {
-        "data": str(ready.pipeline.data),
+        "chosen_kind": model.structure.kind,
+        "chosen_loop": ready.fit.loop.value,
+        "chosen_parameters": model.n_parameters,
+        "chosen_structure": model.structure.label,
         "error_unit": squared(ready.unit),
-        "estimation_loop": ready.fit.loop.value,
         "mapping": ready.pipeline.mapping,
         "start": ready.pipeline.start.kind.value,
         **structure,
