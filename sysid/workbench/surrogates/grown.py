@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -102,14 +103,14 @@ def grow(
     return grower, grower.grow(found_fits(searched, ground.folder / "model"))
 
 
-def program_of(ground: Ground, grower: Grower, grown: Grown, formats: Sequence[str]) -> Program[Results]:
+def program_of(ground: Ground, grower: Grower, grown: Grown, export: Dict[str, Any]) -> Program[Results]:
     """The model of the chosen round as a pipeline of fits: scored, exported, with a report.
 
     Args:
         ground: What it grew from.
         grower: What grew.
         grown: What came of it.
-        formats: What is exported.
+        export: Fields of the export.
 
     Returns:
         The program.
@@ -123,7 +124,7 @@ def program_of(ground: Ground, grower: Grower, grown: Grown, formats: Sequence[s
     structure: Any = fits[0].model.structure.to_dict()
     fields: dict[str, Any] = {
         "name": GROWN, "data": str(file), "mapping": mapping, "start": Start(), "rest": dict(found.before),
-        "fits": (FitConfig(name=GROWN, structure=structure),), "export": {"formats": tuple(formats)},
+        "fits": (FitConfig(name=GROWN, structure=structure),), "export": dict(export),
     }  # fmt: skip
     checked = PipelineConfig.model_validate(fields)
     text = yaml_text(checked.model_dump(mode="json", exclude_defaults=True))

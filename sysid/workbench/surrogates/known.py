@@ -21,7 +21,7 @@ NAME = "model"
 
 def pipeline_of(
     config: ExperimentConfig, mapping: Mapping, *, where: Path, data: Path, rest: Dict[str, float],
-    seconds: float | None, seed: int, formats: tuple[str, ...],
+    seconds: float | None, seed: int, export: Dict[str, Any],
 ) -> PipelineConfig:  # fmt: skip
     """The fits of a pipeline of experiments as a pipeline of their own.
 
@@ -33,7 +33,7 @@ def pipeline_of(
         rest: Outputs before the first sample, by name.
         seconds: Wall time of all fits together, where they say no time themselves; ``None`` for no limit.
         seed: Of everything random.
-        formats: What is exported.
+        export: Fields of the export.
 
     Returns:
         The pipeline.
@@ -44,7 +44,7 @@ def pipeline_of(
     fits = [_in_time(one, None if seconds is None else seconds / len(config.fits)) for one in config.fits]
     fields: dict[str, Any] = {
         "name": NAME, "data": str(data), "mapping": str(mapping), "start": Start(), "rest": dict(rest), "seed": seed,
-        "fits": [one.model_dump(mode="json", exclude_none=True) for one in fits], "export": {"formats": formats},
+        "fits": [one.model_dump(mode="json", exclude_none=True) for one in fits], "export": dict(export),
     }  # fmt: skip
     return check(PipelineConfig, fields, where=where)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable, Sequence
-from collections.abc import Mapping as Dict
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -58,6 +57,9 @@ TIMES = "search-seconds.txt"
 TOLERANCE = 0.01
 """Share of an output's range: what a proof counts, and what models are chosen by."""
 FORMATS = ("c", "fmi2", "fmi3")
+PARITY = 1e-7
+"""Share of the least output's range that a file may be from its model: a bound in an output's own unit would ask
+another thing of pascals than of bars, and of kelvins more than the rounding of a slow model at 300 of them leaves."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,7 +121,7 @@ def make_surrogate(
         seed=seed, iterations=iterations,
     )  # fmt: skip
     if config.fits:
-        work.known(Path(DATASET), {}, None)  # what does not go together is refused before anything is run
+        work.known(Path(DATASET), None, None)  # what does not go together is refused before anything is run
         if rounds is not None:
             raise ConfigError(
                 "experiments grow around what a search has chosen", where=pipeline, expected="rounds, or fits",
@@ -203,25 +205,27 @@ class _Work:
             **{"kind": "auto", "name": "model", "data": str((self._experiment / DATASET).resolve())},
             **{"mapping": self.mapping, "start": Start(), "rest": dict(found.before), "seed": self.seed},
             **({"iterations": self.iterations} if self.iterations else {"minutes": minutes}),
-            **{"workers": self.config.workers, "export": {"formats": FORMATS}, "tolerance": TOLERANCE},
+            **{"workers": self.config.workers, "tolerance": TOLERANCE},
+            **{"export": exported(found.traces, self.mapping.outputs)},
         }
         search = check(AutoConfig, fields, where=self.pipeline)
         auto = replace(auto_of(search, load=lambda: data_of(found.traces, self.mapping)), before_page=before_page)
         done: Searched = self.perform(search_program(auto), self.folder / "model")
         return done
 
-    def known(self, data: Path, rest: Dict[str, float], minutes: float | None) -> PipelineConfig:
+    def known(self, data: Path, found: Experimented | None, minutes: float | None) -> PipelineConfig:
         """The fits that are asked for in place of a search."""
         seconds = None if minutes is None or self.iterations else 60.0 * minutes
         return pipeline_of(
-            self.config, self.mapping, where=self.pipeline, data=data, rest=rest, seconds=seconds, seed=self.seed,
-            formats=FORMATS,
+            self.config, self.mapping, where=self.pipeline, data=data, rest={} if found is None else found.before,
+            seconds=seconds, seed=self.seed,
+            export={"formats": FORMATS} if found is None else exported(found.traces, self.mapping.outputs),
         )  # fmt: skip
 
     def fitted(self, found: Experimented, minutes: float) -> None:
         """They are fitted, scored and exported."""
         place = self.folder / "model"
-        known = self.known((self._experiment / DATASET).resolve(), found.before, minutes)
+        known = self.known((self._experiment / DATASET).resolve(), found, minutes)
         self.perform(known_program(known, place), place)
 
 
@@ -266,7 +270,8 @@ def _grown(
     grower, grown = grow(ground, how, searched, seconds=seconds, say=say)
     place = ground.folder / (GROWN if grown.best.added else "model")
     if grown.best.added:
-        perform(grown_program(ground, grower, grown, FORMATS), place)
+        leaves = exported(ground.found.traces, tuple(ground.reference.outputs))
+        perform(grown_program(ground, grower, grown, leaves), place)
     else:
         write_record(place / FILE, grown.record)
     return place, grown.record.sentence
@@ -278,6 +283,20 @@ def _kept(file: Path, seconds: float) -> float:
         return float(read_bounded(file))
     write_bytes(file, f"{seconds:.1f}\n".encode())
     return round(seconds, 1)
+
+
+def exported(traces: TraceSet, outputs: Sequence[str]) -> dict[str, Any]:
+    """What leaves the workbench as a surrogate.
+
+    Args:
+        traces: The experiments.
+        outputs: Of the reference.
+
+    Returns:
+        The fields of an export.
+    """
+    spans = [by for by in (span_of(traces.traces, name) for name in outputs) if by > 0.0]
+    return {"formats": FORMATS, "tolerance": PARITY * min(spans, default=1.0)}
 
 
 def restless(found: Experimented, mapping: Mapping) -> list[str]:
