@@ -12,6 +12,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import BrakedTrain, Probe
 from sysid.airbrake.variant import PHYSICAL, Variant
 from sysid.errors import ConfigError
+from sysid.kernels.arrays import read_only
 from sysid.kernels.neurons import code_of
 from sysid.models import AbstractModel, Ends, Recursion, Wiring
 from sysid.rail.dynamics import kernel_bank
@@ -91,7 +92,7 @@ class ModelBank:
         recursions = stage.forms * cars if len(stage.forms) == 1 else stage.forms
         self._lags, self._neurons = recursions[0].lags, recursions[0].neurons
         self._kinds = np.array([code_of(recursion.activation) for recursion in recursions])
-        self._theta = np.array([recursion.theta for recursion in recursions])
+        self._theta = read_only(np.array([recursion.theta for recursion in recursions]))
         self._bounds = np.array([[recursion.low, recursion.high] for recursion in recursions])
         scalings = [recursion.scaling for recursion in recursions]
         self._input_offset = np.array([scaling.input_offset for scaling in scalings])
@@ -115,8 +116,9 @@ class ModelBank:
         """
         samples, depth = len(inputs), self._lags.depth
         scaled = (inputs.transpose(1, 0, 2) - self._input_offset[:, None]) / self._input_scale[:, None]
-        u = np.concatenate([self._inputs, scaled], axis=1)
-        y = np.concatenate([self._outputs, np.zeros((len(u), samples))], axis=1)
+        # Laid out one way, whatever the number of cars and samples: the kernel is compiled for each way.
+        u = np.ascontiguousarray(np.concatenate([self._inputs, scaled], axis=1))
+        y = np.ascontiguousarray(np.concatenate([self._outputs, np.zeros((len(u), samples))], axis=1))
         lags = self._lags
         kernel_bank.advance(
             u, y, depth, samples, lags.input_channel, lags.input_lag, lags.output_lag,
