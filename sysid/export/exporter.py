@@ -149,4 +149,5 @@ def with_remainders(state: NDArray[Any], length: int) -> NDArray[Any]:
     Returns:
         Shape ``(n_cars, length)``, with zeros for remainders that are not given.
     """
-    return np.pad(state, ((0, 0), (0, length - state.shape[1])))
+    # What numpy.pad takes a tenth of a millisecond for, which is what a step of a file takes.
+    return np.concatenate([state, np.zeros((len(state), length - state.shape[1]), dtype=state.dtype)], axis=1)
