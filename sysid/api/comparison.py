@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sysid.api.given import TracesLike, traces_of
 from sysid.api.several import Several
 from sysid.estimation import FitResult
 from sysid.extras import need
 from sysid.models import Start, StartKind, StartLike
-from sysid.traces import TraceSet
 from sysid.validation import Evaluation, evaluate_outputs
 from sysid.validation.metrics import percent
 
@@ -106,7 +106,7 @@ class Comparison:
         return comparison_figure(list(panels.values()))
 
 
-def compare(traces: TraceSet, *fits: FitResult | Several, start: StartLike = ESTIMATED) -> Comparison:
+def compare(traces: TracesLike, *fits: FitResult | Several, start: StartLike = ESTIMATED) -> Comparison:
     """Run fitted models over every case: fed with nothing but inputs and their own past output.
 
     Args:
@@ -119,7 +119,7 @@ def compare(traces: TraceSet, *fits: FitResult | Several, start: StartLike = EST
     """
     evaluations: dict[str, Evaluation] = {}
     outputs: dict[str, tuple[str, str]] = {}
-    start = Start.of(start)
+    traces, start = traces_of(traces, word="compare"), Start.of(start)
     for fit in fits:
         members = [fit] if isinstance(fit, FitResult) else list(fit.fits.values())
         several = len(members) > 1 or len(members[0].model.mapping.outputs) > 1

@@ -8,6 +8,7 @@ from typing import Any
 
 from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit, SystemFit
+from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
@@ -55,7 +56,7 @@ def load(source: str | Path) -> TraceSet:
 
 
 def fit(
-    traces: TraceSet,
+    traces: TracesLike,
     mapping: str | Mapping | Dict[str, Any],
     structure: AbstractStructure,
     training: Options | None = None,
@@ -68,7 +69,8 @@ def fit(
     """Fit one structure to the traces whose role is estimation; those for selection choose between starts.
 
     Args:
-        traces: The data set.
+        traces: The data set; a :class:`~sysid.traces.Trace` or a list of them is one whose records are all for
+            estimation.
         mapping: Which channels go in, which come out: ``"u1+u2 -> y"``, or ``"u1+u2 -> y1+y2"``. A structure with
             several outputs of its own, such as :class:`~sysid.VectorNARX` or a state space, gives one model of all; of
             any other, each output gets a model, and all of them are run as one. As lists,
@@ -91,7 +93,7 @@ def fit(
             apply to it.
         ChannelError: If a channel of the mapping is missing.
     """
-    mapped, start = Mapping.of(mapping), Start.of(start)
+    traces, mapped, start = traces_of(traces, word="fit"), Mapping.of(mapping), Start.of(start)
     structure = structure.for_outputs(len(mapped.outputs))
     chosen = structure.mappings(mapped)
     estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)

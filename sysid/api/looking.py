@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid import advice as room
+from sysid.api.given import TracesLike, traces_of
 from sysid.api.notebook import html_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
@@ -183,7 +184,7 @@ def _estimation(traces: TraceSet) -> tuple[Any, ...]:
     return traces.with_role(Role.ESTIMATION) or traces.traces
 
 
-def advise(traces: TraceSet, mapping: Given | None = None) -> Advice | SystemAdvice:
+def advise(traces: TracesLike, mapping: Given | None = None) -> Advice | SystemAdvice:
     """Look at a data set: what is in it, what is wrong with it, what to try.
 
     Args:
@@ -205,6 +206,7 @@ def advise(traces: TraceSet, mapping: Given | None = None) -> Advice | SystemAdv
         >>> found.find("excitation.few_moves", "u").figures["moves"]
         4
     """
+    traces = traces_of(traces, word="advise")
     chosen = mapping_of(traces, mapping)
     found = {one.output: _advice(room.advise(traces, one)) for one in chosen.each}
     return SystemAdvice(outputs=found) if len(found) > 1 else next(iter(found.values()))
@@ -243,7 +245,7 @@ def mapping_of(traces: TraceSet, mapping: Given | None) -> Mapping:
 
 
 def impulse_response(
-    traces: TraceSet,
+    traces: TracesLike,
     mapping: Given | None = None,
     *,
     lags: int | None = None,
@@ -268,6 +270,7 @@ def impulse_response(
         ConfigError: If an option is out of range.
         TraceError: If the record is too short, or an input never changes.
     """
+    traces = traces_of(traces, word="impulse_response")
     found = impulse.estimate_impulse_response(
         _estimation(traces),
         mapping_of(traces, mapping),
@@ -282,7 +285,7 @@ def impulse_response(
 
 
 def frequency_response(
-    traces: TraceSet,
+    traces: TracesLike,
     mapping: Given | None = None,
     *,
     method: str | SpectralMethod = "SPA",
@@ -307,6 +310,7 @@ def frequency_response(
         ConfigError: If an option is out of range.
         TraceError: If the record is too short.
     """
+    traces = traces_of(traces, word="frequency_response")
     found = response.estimate_frequency_response(
         _estimation(traces),
         mapping_of(traces, mapping),

@@ -12,6 +12,7 @@ import numpy as np
 
 from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit
+from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ConfigError
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
@@ -195,7 +196,7 @@ class OrderSearch:
 
 
 def search_orders(
-    traces: TraceSet,
+    traces: TracesLike,
     mapping: str | Mapping | Dict[str, Any],
     *,
     max_na: int | None = None,
@@ -242,7 +243,7 @@ def search_orders(
         >>> sysid.search_orders(sysid.data((u, y), sample_time=1.0, split=0.6), "u -> y").best("BIC").label
         'ARX [2; 1; 3]'
     """
-    chosen, start = Mapping.of(mapping), Start.of(start)
+    traces, chosen, start = traces_of(traces, word="search_orders"), Mapping.of(mapping), Start.of(start)
     chosen.check_single("an order search")
     estimation = traces.with_role(Role.ESTIMATION)
     if not estimation:

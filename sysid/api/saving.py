@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sysid.api.given import TracesLike, traces_of
 from sysid.api.several import Several
 from sysid.estimation import FitResult
 from sysid.models import Start, StartLike
-from sysid.traces import TraceSet
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def save(
     fit: FitResult | Several,
-    traces: TraceSet,
+    traces: TracesLike,
     folder: str | Path,
     *,
     formats: tuple[str, ...] | None = None,
@@ -40,6 +40,7 @@ def save(
     """
     from sysid.export import export_bundle
 
+    traces = traces_of(traces, word="save")
     if not isinstance(fit, FitResult):
         fits = {str(one.model.mapping): one for one in fit.fits.values()}
         return export_bundle(fit.model, traces, Path(folder), outputs=fit.outputs, formats=formats, fits=dict(fits))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.api.fits import Fit, SystemFit
+from sysid.api.given import TracesLike, traces_of
 from sysid.api.looking import mapping_of
 from sysid.api.notebook import html_of
 from sysid.errors import ConfigError
@@ -87,7 +88,7 @@ class AutoSearch:
 
 
 def auto(
-    traces: TraceSet,
+    traces: TracesLike,
     mapping: str | Mapping | Dict[str, Any] | None = None,
     *,
     minutes: float | None = None,
@@ -121,6 +122,7 @@ def auto(
         ConfigError: If no trace is for estimation, both budgets are given, or nothing that was tried can be used.
         ChannelError: If a channel of the mapping is missing.
     """
+    traces = traces_of(traces, word="auto")
     chosen, start = mapping_of(traces, mapping), Start.of(start)
     if not isinstance(rest_output, Dict):
         rest_output = {} if rest_output is None else {chosen.output: rest_output}
