@@ -6,17 +6,15 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.advice.finding import Finding, Topic, Verdict
-from sysid.advice.record import Record, stacked
+from sysid.advice.record import Record
 from sysid.estimation.nonparametric.evidence import triangle
+from sysid.estimation.nonparametric.excitation_order import MOST, NEEDED, excitation_order
 from sysid.estimation.nonparametric.segments import columns_of_lags
 
-MOST, NEEDED, ENOUGH = 40, 4, 20
-"""Orders of excitation that are looked for, below which nothing can be fitted, and from which all of it can."""
-SEEN = 1e-4
-"""Part of its largest direction that the smallest must have, in root mean square, to count as excited."""
+ENOUGH = 20
+"""Order of excitation from which all of it can be fitted."""
 SAME, ALIKE = 0.98, 0.8
 ACROSS = 6
 """Lags to either side at which one input is looked for in another."""
@@ -62,33 +60,6 @@ def _input(record: Record, name: str) -> Iterator[Finding]:
     yield Finding(topic=Topic.EXCITATION, code=code, verdict=verdict, subject=(name,), figures=figures)
     if levels == 2:
         yield Finding(topic=Topic.EXCITATION, code="excitation.two_levels", verdict=Verdict.NOTE, subject=(name,))
-
-
-def excitation_order(parts: list[NDArray[np.float64]], most: int = MOST) -> tuple[int, float]:
-    """How many past values of a signal can be told apart: its order of persistent excitation.
-
-    Args:
-        parts: Its stretches; each is counted from the mean of all.
-        most: The largest order that is looked for.
-
-    Returns:
-        The order, and the condition number of the lags at the order :data:`NEEDED` or the largest there is.
-    """
-    total = sum(map(len, parts))
-    n = max(1, min(most, total // 4, max(map(len, parts)) - 1))
-    mean = stacked(parts).mean()
-    blocks = [columns_of_lags(part - mean, range(n), slice(n - 1, None)) for part in parts if len(part) >= n]
-    R = triangle((np.column_stack([b, b[:, 0]]) for b in blocks), free=0).R[:n, :n]
-    best, condition = 0, np.inf
-    for order in range(1, n + 1):
-        size = linalg.svdvals(R[:order, :order]) if len(R) >= order else np.zeros(1)
-        ratio = float(size[0] / size[-1]) if size[-1] > 0.0 else np.inf
-        if ratio > 1.0 / SEEN:
-            break
-        best = order
-        if order <= NEEDED:
-            condition = ratio
-    return best, condition
 
 
 def _band(parts: list[NDArray[np.float64]]) -> float:

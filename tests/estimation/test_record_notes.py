@@ -152,3 +152,66 @@ def test_samples_far_from_all_others_are_told_and_large_steps_are_not() -> None:
     assert told.startswith("2 of 240 samples of y lie up to ")
     pulse = np.where(np.arange(N) % 100 < 3, 30.0, 0.0) + 0.01 * u  # 3 % of the samples are no faults
     assert not [note for note in _fit(pulse, _y(pulse, dead=1), STRUCTURES[0]).warnings if "samples of" in note]
+
+
+def _noisy(y: np.ndarray) -> np.ndarray:
+    return y + 0.02 * np.std(y) * np.random.default_rng(1).standard_normal(len(y))
+
+
+@pytest.mark.parametrize("structure", STRUCTURES[:1] + STRUCTURES[2:], ids=lambda s: s.kind)
+def test_a_dead_time_that_is_too_short_is_told_with_the_right_one(structure: object) -> None:
+    """Only a transfer function searches its dead time by itself."""
+    u = np.repeat(np.random.default_rng(0).uniform(-1, 1, 200), 4)
+    y = np.convolve(np.r_[np.zeros(30), u], 0.1 * 0.9 ** np.arange(800))[:800]
+    told = [note for note in _fit(u, _noisy(y), structure).warnings if "dead time is too" in note]
+    assert len(told) == 1
+    assert "acts from lag 1 on: its dead time is too short. Begin there (nk: 30," in told[0]
+
+
+def test_a_dead_time_that_is_too_long_is_told_with_the_right_one() -> None:
+    u = _u()
+    for structure in (sysid.ARX(na=1, nb=1, nk=12), sysid.OE(nb=1, nf=1, nk=12)):
+        told = [note for note in _fit(u, _noisy(_y(u, dead=3)), structure).warnings if "dead time is too" in note]
+        assert len(told) == 1
+        assert "acts from lag 12 on: its dead time is too long. Begin there (nk: 3," in told[0]
+
+
+@pytest.mark.parametrize("plant", ["quantised", "dead zone", "drift", "two paths", "slow"])
+def test_no_dead_time_is_told_where_something_else_is_wrong(plant: str) -> None:
+    """Each leaves an error that moves with earlier inputs, and each begins at the lag 1."""
+    u = np.repeat(np.random.default_rng(2).uniform(-1, 1, 60), 10)
+    linear = np.convolve(np.r_[0.0, u][:600], 0.1 * 0.9 ** np.arange(600))[:600]
+    rest = np.convolve(np.r_[0.0, np.sign(u) * np.maximum(np.abs(u) - 0.5, 0.0)][:600], 0.9 ** np.arange(600))[:600]
+    y = {
+        "quantised": np.round(4.0 * linear) / 4.0,
+        "dead zone": rest,
+        "drift": linear + 0.05 * np.cumsum(np.random.default_rng(3).standard_normal(600)),
+        "two paths": linear + 0.5 * np.r_[np.zeros(60), linear][:600],
+        "slow": np.convolve(linear, 0.05 * 0.95 ** np.arange(600))[:600],
+    }[plant]
+    traces = sysid.data((u, _noisy(y)), sample_time=1.0)
+    for structure in (sysid.ARX(na=1, nb=1, nk=1), sysid.OE(nb=1, nf=1, nk=1)):
+        assert not [note for note in sysid.fit(traces, "u -> y", structure).warnings if "dead time is too" in note]
+
+
+def test_a_free_run_that_grows_without_bound_is_told_and_ends_nothing() -> None:
+    """``y = 2 u`` at once, by an equation without that lag: its squares were too large to be numbers."""
+    u = np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 126), 8)[:1_000]
+    fit = sysid.fit(sysid.data((u, 2.0 * u), sample_time=0.1), "u -> y", sysid.ARX(na=2, nb=2, nk=1))
+    assert [note for note in fit.warnings if "of the same sample" in note or "than a constant" in note]
+
+
+@pytest.mark.parametrize(
+    ("u", "order"),
+    [(np.sin(0.1 * np.arange(N)), 3), (np.where(np.arange(N) % 2, 1.0, -1.0), 1), (_u(), None)],
+    ids=["one sine", "every other sample", "random"],
+)
+@pytest.mark.parametrize(
+    "structure",
+    [sysid.OE(nb=3, nf=2, nk=1), sysid.TransferFunction(poles=(2,), zeros=(2,)), sysid.LinearStateSpace(states=3)],
+    ids=lambda s: s.kind,
+)
+def test_an_input_that_moves_in_too_few_ways_is_told(structure: object, u: np.ndarray, order: int | None) -> None:
+    fit = sysid.fit(sysid.data((u, _noisy(_y(u, dead=1))), sample_time=1.0), "u -> y", structure)
+    told = [note for note in fit.warnings if "too few ways" in note]
+    assert [f"excites order {order}," in note for note in told] == ([] if order is None else [True])

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.informative import informative
 from sysid.estimation.linear.poles import sections_of
-from sysid.estimation.record_notes import informative
 from sysid.models import Domain, Mapping, Scaling, TransferFunction, TransferFunctionModel
 
 

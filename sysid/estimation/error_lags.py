@@ -1,0 +1,164 @@
+"""Inputs that act at lags which a model leaves out: what in the error of its free run moves with them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal, special
+
+from sysid.estimation.fitted_run import FreeRun
+from sysid.estimation.informative import SAME, informative, unit
+from sysid.models import AbstractModel
+
+LAGS = 5
+"""Past errors and inputs that are taken out of the error, before the input of one sample is looked at; and lags after
+its first one within which a model's dynamics may be what is wrong, and not its lags."""
+LEAST_SAMPLES = 100
+LEAST_ERROR = 1e-2
+"""Part of the output's standard deviation that the error must have to be worth an explanation."""
+SHARE, SURE = 0.2, 1e-6
+"""Part of the error that an input of the same sample must explain, and how improbable that is by chance."""
+ELSEWHERE, FIRST = 0.05, 0.25
+"""Part that an input of another sample must explain; and part of the most from which it is said to begin."""
+NEARLY_ALL = 0.9
+"""Part of what is new in an output that an input of the same sample explains, from which one may be the other."""
+
+
+def left_out(model: AbstractModel, run: FreeRun) -> list[str]:
+    """Inputs that act at lags where the model lets them not.
+
+    The error of the free run is explained by its own past and past inputs, and then by the inputs of the same sample as
+    well: an F test says whether they explain more than chance would. What is new in output and error is then held
+    beside what was new in each input earlier, sample by sample.
+
+    Args:
+        model: The fitted model.
+        run: Its free run over a record that was fitted.
+
+    Returns:
+        One sentence for each input and output of which this is so.
+    """
+    error, usable = run.output - run.simulated, run.usable
+    few = usable.sum() < LEAST_SAMPLES + LAGS * (1 + run.inputs.shape[1])
+    if few or not np.isfinite(error).all():
+        return []
+    told = []
+    for j in informative(run.inputs[usable]):
+        for i in range(len(model.mapping.outputs)):
+            worth = np.std(error[usable, i]) > LEAST_ERROR * np.std(run.output[usable, i])
+            if _has_path(model, run, j, i):
+                told += _read_backwards(model, run, j, i)
+            elif worth and (found := _at_once(model, run, error[:, i], j, i)):
+                told += found
+                continue
+            told += _elsewhere(model, run, error[:, i], j, i) if worth else []
+    return told
+
+
+def _at_once(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: int, i: int) -> list[str]:
+    """Whether an input acts within its sample where the model lets it act only later."""
+    share, name, target = _share(error, run.inputs, j, run.usable), model.mapping.inputs[j], model.mapping.outputs[i]
+    if share <= 0.0:
+        return []
+    return [
+        f"{100 * share:.0f} % of what is new in the error of {target} moves with {name} of the same sample."
+        f" Either {name} acts at once, which this model leaves out (give it the lag 0: nk: 0, delays: 0, "
+        f"input_delays from 0, feedthrough: true), or it is fed back from {target}."
+    ]
+
+
+def _elsewhere(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: int, i: int) -> list[str]:
+    """Whether an output begins to move with an input at another lag than in the model, and the error says so too."""
+    first = _first(model, run, j, i)
+    lag, share = _lag(run.output[:, i], run.inputs[:, j], run.usable, slice(0, 1))
+    own = slice(first, first + LAGS + 1)
+    if share <= 0.0 or lag in range(own.start, own.stop) or not _lag(error, run.inputs[:, j], run.usable, own)[1]:
+        return []
+    name, target = model.mapping.inputs[j], model.mapping.outputs[i]
+    begins = f"acts from lag {first} on" if first < len(run.inputs) else "does not act at all"
+    return [
+        f"{100 * share:.0f} % of what is new in {target} moves with {name} of {lag} sample{'s' if lag > 1 else ''} "
+        f"before, and in the model {name} {begins}: its dead time is too {'short' if first < lag else 'long'}. Begin "
+        f"there (nk: {lag}, delays: {lag}, input_delays from {lag}), or let it be searched (auto)."
+    ]
+
+
+def _read_backwards(model: AbstractModel, run: FreeRun, j: int, i: int) -> list[str]:
+    """Whether a model that lets inputs act at once, unasked, may have learnt the controller and not the plant."""
+    share = _share(run.output[:, i], run.inputs, j, run.usable) if model.structure.acts_at_once else 0.0
+    if share < NEARLY_ALL:
+        return []
+    name, target = model.mapping.inputs[j], model.mapping.outputs[i]
+    return [
+        f"{100 * share:.0f} % of what is new in {target} moves with {name} of the same sample, and the model takes "
+        f"{name} to act at once. Where {name} is set by a controller that reads {target}, that is the controller read "
+        "backwards and no plant: fit a structure whose inputs act from lag 1 on (NARX input_delays: 1, ARX nk: 1)."
+    ]
+
+
+def _has_path(model: AbstractModel, run: FreeRun, j: int, i: int) -> bool:
+    """Whether an output of the model moves with an input of the same sample."""
+    few = run.inputs[: LAGS + 1]
+    moved = few.copy()
+    moved[-1, j] += np.std(run.inputs[:, j]) or 1.0
+    before, after = (model.simulate(u, run.history).reshape(len(u), -1)[-1, i] for u in (few, moved))
+    return bool(before != after)
+
+
+def _first(model: AbstractModel, run: FreeRun, j: int, i: int) -> int:
+    """The first lag at which an output of the model moves with an input; the length of the run where it never does."""
+    moved = run.inputs.copy()
+    moved[0, j] += np.std(run.inputs[:, j]) or 1.0
+    before, after = (model.simulate(u, run.history).reshape(len(u), -1)[:, i] for u in (run.inputs, moved))
+    changed = np.flatnonzero(before != after)
+    return int(changed[0]) if len(changed) else len(before)
+
+
+def _lag(
+    target: NDArray[np.float64], column: NDArray[np.float64], usable: NDArray[np.bool_], but: slice
+) -> tuple[int, float]:
+    """The lag from which on an input explains most of a signal's innovation, and how much most is; 0 by chance.
+
+    What is new in each is what its own past leaves; masked samples, and those that follow them, count as nothing.
+    """
+    whole = np.logical_and.reduce([np.roll(usable, lag) for lag in range(LAGS + 1)])
+    whole[:LAGS] = False
+    left, new = (_innovations(x, whole) for x in (target, column))
+    most = len(left) // 3
+    if whole.sum() < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(column[whole]):
+        return 0, 0.0
+    both = signal.correlate(unit(left[:, np.newaxis])[:, 0], unit(new[:, np.newaxis])[:, 0])
+    shares = both[len(left) - 1 : len(left) - 1 + most] ** 2
+    shares[but] = 0.0
+    share, free = float(shares.max()), int(whole.sum()) - LAGS - 2
+    by_chance = most * float(special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))
+    if share <= ELSEWHERE or by_chance >= SURE:
+        return 0, 0.0
+    lag = int(np.flatnonzero(shares >= FIRST * share)[0])
+    return lag, share
+
+
+def _innovations(x: NDArray[np.float64], whole: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """What the last samples leave of a signal; zero where they are not all there."""
+    base = np.column_stack([*(np.roll(x, lag) for lag in range(1, LAGS + 1)), np.ones(len(x))])[whole]
+    found = np.zeros(len(x))
+    basis = unit(base)
+    found[whole] = x[whole] - basis @ np.linalg.lstsq(basis, x[whole], rcond=None)[0]
+    return found
+
+
+def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usable: NDArray[np.bool_]) -> float:
+    """The part of the error's innovation that an input of the same sample explains; 0 where chance may do it."""
+    past = [np.roll(column, lag) for column in (error, *inputs.T) for lag in range(1, LAGS + 1)]
+    whole = np.logical_and.reduce([np.roll(usable, lag) for lag in range(LAGS + 1)])
+    whole[:LAGS] = False
+    base = np.column_stack([*past, np.ones(len(error))])[whole]
+    basis, _ = np.linalg.qr(unit(base))
+    left, new = (x[whole] - basis @ (basis.T @ x[whole]) for x in (error, inputs[:, j]))
+    free = len(left) - base.shape[1] - 1
+    if free < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(inputs[whole, j]):
+        return 0.0
+    # Of length 1 first: the square of a free run that grows without bound is no number.
+    share = float(unit(left[:, np.newaxis])[:, 0] @ unit(new[:, np.newaxis])[:, 0]) ** 2
+    by_chance = float(special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))
+    return share if share > SHARE and by_chance < SURE else 0.0

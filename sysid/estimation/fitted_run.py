@@ -1,0 +1,57 @@
+"""The free run of a fitted model over a record that it was fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models import AbstractModel, History, Start, beginning
+from sysid.traces import Trace
+
+MOST_SAMPLES = 20_000
+"""Samples of a record that are looked at: more would not make the finding any surer."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeRun:
+    """The free run over a record that was fitted, from where it is scored on.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``.
+        output: As measured, shape ``(n_samples, n_outputs)``.
+        simulated: Likewise.
+        usable: Which samples are not masked, shape ``(n_samples,)``.
+        history: What the run began with.
+    """
+
+    inputs: NDArray[np.float64]
+    output: NDArray[np.float64]
+    simulated: NDArray[np.float64]
+    usable: NDArray[np.bool_]
+    history: History
+
+    @classmethod
+    def of(cls, model: AbstractModel, trace: Trace, start: Start) -> FreeRun:
+        """The run over a record, or over its beginning where that is long.
+
+        Args:
+            model: The fitted model.
+            trace: The record.
+            start: What stands before it.
+
+        Returns:
+            The run.
+        """
+        inputs, output, usable = trace.columns(model.mapping.inputs), model.measured(trace), trace.usable_samples
+        begun = beginning(model, inputs, output, start, usable, case=trace.name)
+        window = slice(begun.first, begun.first + MOST_SAMPLES)
+        shape = (-1, len(model.mapping.outputs))
+        return cls(
+            inputs=inputs[window],
+            output=output[window].reshape(shape),
+            simulated=model.simulate(inputs[window], begun.history).reshape(shape),
+            usable=usable[window],
+            history=begun.history,
+        )

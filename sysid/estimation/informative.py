@@ -1,0 +1,45 @@
+"""Which channels of some records say anything: those that move, and are not made of others."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+STILL = 8.0 * np.finfo(np.float64).eps
+"""How far a channel moves, relative to its size, below which it never changes."""
+SAME = 1e-9
+"""Part of an input that others do not explain, below which it is made of them."""
+
+
+def informative(inputs: NDArray[np.float64]) -> tuple[int, ...]:
+    """The inputs whose effects records tell: those that move, and are not made of ones before them.
+
+    Args:
+        inputs: All that count, shape ``(n_samples, n_inputs)``.
+
+    Returns:
+        Their places, in order.
+    """
+    kept: list[int] = []
+    for j, column in enumerate(inputs.T):
+        if not still(column) and not (kept and _made_of(column, inputs[:, kept])):
+            kept.append(j)
+    return tuple(kept)
+
+
+def still(column: NDArray[np.float64]) -> bool:
+    """Whether a channel never changes, but for rounding."""
+    return bool(np.ptp(column) <= STILL * np.abs(column).max(initial=0.0))
+
+
+def _made_of(column: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    basis = unit(np.column_stack([others, np.ones(len(column))]))
+    left = column - basis @ np.linalg.lstsq(basis, column, rcond=None)[0]
+    return bool(np.linalg.norm(left) <= SAME * np.linalg.norm(column - column.mean()))
+
+
+def unit(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns of length 1; those of zeros stay."""
+    tiny = float(np.finfo(np.float64).tiny)
+    lengths = np.maximum(np.sqrt(np.sum(columns**2, axis=0)), tiny)
+    return np.asarray(columns / lengths, dtype=np.float64)

@@ -1,0 +1,47 @@
+"""How many coefficients of its effect a signal can tell: its order of persistent excitation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from sysid.estimation.nonparametric.evidence import triangle
+from sysid.estimation.nonparametric.segments import columns_of_lags
+
+MOST, NEEDED = 40, 4
+"""Orders that are looked for, and below which nothing can be fitted."""
+SEEN = 1e-4
+"""Part of its largest direction that the smallest must have, in root mean square, to count as excited."""
+
+
+def excitation_order(
+    parts: Sequence[NDArray[np.float64]], most: int = MOST, *, seen: float = SEEN
+) -> tuple[int, float]:
+    """How many past values of a signal can be told apart: its order of persistent excitation.
+
+    Args:
+        parts: Its stretches; each is counted from the mean of all.
+        most: The largest order that is looked for.
+        seen: Part of its largest direction that the smallest must have, in root mean square, to count as excited.
+
+    Returns:
+        The order, and the condition number of the lags at the order :data:`NEEDED` or the largest there is.
+    """
+    total = sum(map(len, parts))
+    n = max(1, min(most, total // 4, max(map(len, parts)) - 1))
+    mean = np.concatenate(parts).mean()
+    blocks = [columns_of_lags(part - mean, range(n), slice(n - 1, None)) for part in parts if len(part) >= n]
+    R = triangle((np.column_stack([b, b[:, 0]]) for b in blocks), free=0).R[:n, :n]
+    best, condition = 0, np.inf
+    for order in range(1, n + 1):
+        size = linalg.svdvals(R[:order, :order]) if len(R) >= order else np.zeros(1)
+        ratio = float(size[0] / size[-1]) if size[-1] > 0.0 else np.inf
+        if ratio > 1.0 / seen:
+            break
+        best = order
+        if order <= NEEDED:
+            condition = ratio
+    return best, condition
