@@ -107,7 +107,7 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
         # Of an equation with past outputs the noise excites the denominator.
         of_input = len(ratio.B) if ratio.past_outputs else len(ratio.B) + len(ratio.F) - 1
         asked[j] = max(asked.get(j, 0), of_input)
-    segments, told = segments_of(traces, model.mapping), []
+    segments, told = segments_of(traces, model.mapping.each[0]), []  # of each output the same inputs
     for j, needed in asked.items():
         parts = [segment.inputs[:, j] for segment in segments]
         if needed > MOST or sum(map(len, parts)) < LEAST_SAMPLES or still(np.concatenate(parts)):

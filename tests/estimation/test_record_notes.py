@@ -215,3 +215,10 @@ def test_an_input_that_moves_in_too_few_ways_is_told(structure: object, u: np.nd
     fit = sysid.fit(sysid.data((u, _noisy(_y(u, dead=1))), sample_time=1.0), "u -> y", structure)
     told = [note for note in fit.warnings if "too few ways" in note]
     assert [f"excites order {order}," in note for note in told] == ([] if order is None else [True])
+
+
+def test_inputs_of_several_outputs_are_looked_at_once() -> None:
+    u = np.sin(0.1 * np.arange(N))
+    traces = sysid.data((u, np.column_stack([_noisy(_y(u, dead=1)), _noisy(_y(u, dead=2))])), sample_time=1.0)
+    fit = sysid.fit(traces, "u -> y1+y2", sysid.VectorStateSpace(states=3))
+    assert len([note for note in fit.warnings if "too few ways" in note]) == 1
