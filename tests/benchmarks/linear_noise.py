@@ -121,7 +121,7 @@ def three_systems(seeds: range, *, beside: bool) -> None:
         fit_, seconds = np.median(pairs[1:], axis=0)
         peer = best.get(system)
         said = "" if peer is None else f"{peer[0]}: {peer[1]:.2f} % in {peer[2]:.3f} s"
-        found(f"{NAMES[system]}, {name}, fit", fit_, "%", peer=said, note=f"median of {len(seeds)} seeds")
+        found(f"{NAMES[system]}, {name}, fit", fit_, "%", peer=said, note=f"{fit_:.2f} %, median of {len(seeds)} seeds")
         found(f"{NAMES[system]}, {name}, processor time", seconds, "s")
 
 
