@@ -70,16 +70,18 @@ def _at_once(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: 
 def _elsewhere(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: int, i: int) -> list[str]:
     """Whether an output begins to move with an input at another lag than in the model, and the error says so too."""
     first = _first(model, run, j, i)
+    if first is None:
+        return []
     lag, share = _lag(run.output[:, i], run.inputs[:, j], run.usable, slice(0, 1))
     own = slice(first, first + LAGS + 1)
     if share <= 0.0 or lag in range(own.start, own.stop) or not _lag(error, run.inputs[:, j], run.usable, own)[1]:
         return []
     name, target = model.mapping.inputs[j], model.mapping.outputs[i]
-    begins = f"acts from lag {first} on" if first < len(run.inputs) else "does not act at all"
     return [
         f"{100 * share:.0f} % of what is new in {target} moves with {name} of {lag} sample{'s' if lag > 1 else ''} "
-        f"before, and in the model {name} {begins}: its dead time is too {'short' if first < lag else 'long'}. Begin "
-        f"there (nk: {lag}, delays: {lag}, input_delays from {lag}), or let it be searched (auto)."
+        f"before, and in the model {name} acts from lag {first} on: its dead time is too "
+        f"{'short' if first < lag else 'long'}. Begin there (nk: {lag}, delays: {lag}, input_delays from {lag}), or "
+        "let it be searched (auto)."
     ]
 
 
@@ -105,13 +107,16 @@ def _has_path(model: AbstractModel, run: FreeRun, j: int, i: int) -> bool:
     return bool(before != after)
 
 
-def _first(model: AbstractModel, run: FreeRun, j: int, i: int) -> int:
-    """The first lag at which an output of the model moves with an input; the length of the run where it never does."""
+def _first(model: AbstractModel, run: FreeRun, j: int, i: int) -> int | None:
+    """The first lag at which an output of the model moves with an input.
+
+    ``None`` where a move at the run's beginning is not seen, as in a dead zone: that says nothing of lags.
+    """
     moved = run.inputs.copy()
     moved[0, j] += np.std(run.inputs[:, j]) or 1.0
     before, after = (model.simulate(u, run.history).reshape(len(u), -1)[:, i] for u in (run.inputs, moved))
     changed = np.flatnonzero(before != after)
-    return int(changed[0]) if len(changed) else len(before)
+    return int(changed[0]) if len(changed) else None
 
 
 def _lag(
@@ -121,18 +126,16 @@ def _lag(
 
     What is new in each is what its own past leaves; masked samples, and those that follow them, count as nothing.
     """
-    whole = np.logical_and.reduce([np.roll(usable, lag) for lag in range(LAGS + 1)])
-    whole[:LAGS] = False
+    whole = _whole(usable)
     left, new = (_innovations(x, whole) for x in (target, column))
     most = len(left) // 3
     if whole.sum() < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(column[whole]):
         return 0, 0.0
-    both = signal.correlate(unit(left[:, np.newaxis])[:, 0], unit(new[:, np.newaxis])[:, 0])
+    both = signal.correlate(_direction(left), _direction(new))
     shares = both[len(left) - 1 : len(left) - 1 + most] ** 2
     shares[but] = 0.0
     share, free = float(shares.max()), int(whole.sum()) - LAGS - 2
-    by_chance = most * float(special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))
-    if share <= ELSEWHERE or by_chance >= SURE:
+    if share <= ELSEWHERE or most * _by_chance(share, free) >= SURE:
         return 0, 0.0
     lag = int(np.flatnonzero(shares >= FIRST * share)[0])
     return lag, share
@@ -150,8 +153,7 @@ def _innovations(x: NDArray[np.float64], whole: NDArray[np.bool_]) -> NDArray[np
 def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usable: NDArray[np.bool_]) -> float:
     """The part of the error's innovation that an input of the same sample explains; 0 where chance may do it."""
     past = [np.roll(column, lag) for column in (error, *inputs.T) for lag in range(1, LAGS + 1)]
-    whole = np.logical_and.reduce([np.roll(usable, lag) for lag in range(LAGS + 1)])
-    whole[:LAGS] = False
+    whole = _whole(usable)
     base = np.column_stack([*past, np.ones(len(error))])[whole]
     basis, _ = np.linalg.qr(unit(base))
     left, new = (x[whole] - basis @ (basis.T @ x[whole]) for x in (error, inputs[:, j]))
@@ -159,6 +161,21 @@ def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usab
     if free < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(inputs[whole, j]):
         return 0.0
     # Of length 1 first: the square of a free run that grows without bound is no number.
-    share = float(unit(left[:, np.newaxis])[:, 0] @ unit(new[:, np.newaxis])[:, 0]) ** 2
-    by_chance = float(special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))
-    return share if share > SHARE and by_chance < SURE else 0.0
+    share = float(_direction(left) @ _direction(new)) ** 2
+    return share if share > SHARE and _by_chance(share, free) < SURE else 0.0
+
+
+def _whole(usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples that are not masked, nor any of the last ones before them."""
+    whole = np.all([np.roll(usable, lag) for lag in range(LAGS + 1)], axis=0)
+    whole[:LAGS] = False
+    return np.asarray(whole)
+
+
+def _direction(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    return unit(x[:, np.newaxis])[:, 0]
+
+
+def _by_chance(share: float, free: int) -> float:
+    """How probable it is that one column explains that much of noise (F test with 1 and ``free`` degrees)."""
+    return float(special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import sysid
+from sysid.estimation.error_lags import left_out
+from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.record_notes import contradicted, outnumbered
-from sysid.models import Start
+from sysid.models import History, Mapping, Start
 
 N = 400
 STRUCTURES = [
@@ -222,3 +225,27 @@ def test_inputs_of_several_outputs_are_looked_at_once() -> None:
     traces = sysid.data((u, np.column_stack([_noisy(_y(u, dead=1)), _noisy(_y(u, dead=2))])), sample_time=1.0)
     fit = sysid.fit(traces, "u -> y1+y2", sysid.VectorStateSpace(states=3))
     assert len([note for note in fit.warnings if "too few ways" in note]) == 1
+
+
+@pytest.mark.parametrize(("zone", "told"), [(0.8, False), (0.0, True)], ids=["within a dead zone", "without one"])
+def test_a_model_that_a_move_at_the_beginning_does_not_reach_is_not_accused(zone: float, told: bool) -> None:
+    """Its first sample moves nothing, and that is no dead time."""
+
+    def response(u: np.ndarray, dead: int, pole: float) -> np.ndarray:
+        held = np.sign(u) * np.maximum(np.abs(u) - zone, 0.0)
+        return np.convolve(np.r_[np.zeros(dead), held], 0.1 * pole ** np.arange(len(u)))[: len(u)]
+
+    u = np.r_[np.zeros((20, 1)), np.repeat(np.random.default_rng(4).uniform(-1, 1, (60, 1)), 10, axis=0)]
+    model = SimpleNamespace(
+        mapping=Mapping(inputs=("u",), outputs=("y",)),
+        structure=SimpleNamespace(acts_at_once=False),
+        simulate=lambda u, _: response(u[:, 0], 1, 0.9),
+    )
+    run = FreeRun(
+        inputs=u,
+        output=_noisy(response(u[:, 0], 20, 0.9))[:, np.newaxis],
+        simulated=response(u[:, 0], 1, 0.9)[:, np.newaxis],
+        usable=np.ones(620, dtype=bool),
+        history=History.at_rest(inputs=[0.0], output=0.0),
+    )
+    assert ["dead time is too short" in note for note in left_out(model, run)] == [True] * told
